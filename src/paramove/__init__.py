@@ -1,0 +1,1 @@
+"""paramove: parametric human movements, learned from few demonstrations."""
