@@ -1,0 +1,135 @@
+"""The one table of topics: name, message type, rate, profile, frame, whether recorded.
+
+A node names its topics from here (`topics.CAMERA_IMAGE`); nothing else spells a topic name.
+"""
+
+from __future__ import annotations
+
+import difflib
+import enum
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+
+from paramove.msgs.clock_pb2 import Clock
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
+from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.msgs.tracked_objects_pb2 import TrackedObjects
+from paramove.msgs.truth_pb2 import TruthLayout, TruthState
+
+
+class Profile(enum.Enum):
+    """How a topic treats a message that a later one follows."""
+
+    LATEST = "latest"  # only the newest is of use; the reader drops the older ones
+    QUEUE = "queue"  # every message counts
+    LATCHED = "latched"  # every message counts and a late joiner gets the newest one
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One row of the table.
+
+    Attributes:
+        name: Parts of lower-case letters, digits and `_`, joined by `/`.
+        type: Protobuf class of the message.
+        rate_hz: Nominal rate; None where messages come with events.
+        profile: See `Profile`.
+        frame: Coordinate frame of spatial content; "" where there is none or the message says it.
+        recorded: Whether the recorder keeps it.
+    """
+
+    name: str
+    type: type[Any]
+    rate_hz: float | None
+    profile: Profile
+    frame: str = ""
+    recorded: bool = False
+
+    @property
+    def type_name(self) -> str:
+        """Full protobuf name of the message type."""
+        return str(self.type.DESCRIPTOR.full_name)
+
+    @property
+    def truth(self) -> bool:
+        """Whether only the simulator and evaluators may know the topic's folder."""
+        return self.name.startswith("truth/")
+
+    @property
+    def is_image(self) -> bool:
+        """Whether a message carries pixels, so that few may wait and one may be large."""
+        return self.type in (RawImage, CompressedImage)
+
+    @property
+    def high_water_mark(self) -> int:
+        """How many messages may wait in each direction before the newest is dropped (and counted as lost)."""
+        return 4 if self.is_image else 1000
+
+    @property
+    def max_bytes(self) -> int:
+        """Largest payload; a larger one is refused at the publisher and by every subscriber."""
+        return 16 * 2**20 if self.is_image else 2**20
+
+
+_LATEST, _QUEUE, _LATCHED = Profile.LATEST, Profile.QUEUE, Profile.LATCHED
+
+CLOCK = Topic("clock", Clock, 15, _QUEUE)
+CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical")
+CAMERA_IMAGE = Topic("camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True)
+OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
+GESTURES = Topic("gestures", Gesture, None, _QUEUE, recorded=True)
+CALIBRATION_PLANE = Topic("calibration/plane", PlaneCalibration, None, _LATCHED, "right_shoulder", recorded=True)
+RULES = Topic("rules", Rules, None, _LATCHED, "right_shoulder", recorded=True)
+APPLICATION_STAGE = Topic("application/stage", ApplicationStage, 1, _LATCHED, recorded=True)
+SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)
+RELOCATION_GOAL = Topic("relocation/goal", RelocationGoal, None, _QUEUE, "right_shoulder", recorded=True)
+RELOCATION_STATUS = Topic("relocation/status", RelocationStatus, None, _QUEUE, recorded=True)
+ARM_TRAJECTORY = Topic("arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True)
+ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _QUEUE, recorded=True)
+ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)
+ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
+OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
+WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True)
+WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
+TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
+TRUTH_STATE = Topic("truth/state", TruthState, 15, _QUEUE, "world")
+
+TOPICS: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
+"""Every topic but the status topics, which exist once per node: see `status`."""
+
+_STATUS_PREFIX = "status/"
+_NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")
+
+
+def status(node: str) -> Topic:
+    """Topic on which the node called `node` says how it fares.
+
+    Raises ValueError if the name has other characters than lower-case letters, digits and `_`.
+    """
+    name = _STATUS_PREFIX + node
+    if not _NAME.fullmatch(name) or "/" in node:
+        raise ValueError(f"node name {node!r}: expected lower-case letters, digits and '_' only")
+    return Topic(name, NodeStatus, 1, _LATCHED, recorded=True)
+
+
+def by_name(name: str) -> Topic:
+    """Topic of that name; raises KeyError that names the nearest topics."""
+    if name.startswith(_STATUS_PREFIX):
+        return status(name.removeprefix(_STATUS_PREFIX))
+    for topic in TOPICS:
+        if topic.name == name:
+            return topic
+    known = [topic.name for topic in TOPICS]
+    nearest = difflib.get_close_matches(name, known, n=3) or known
+    raise KeyError(f"no topic {name!r} in paramove.bus.topics; nearest: {', '.join(nearest)}")

@@ -1,0 +1,58 @@
+from google.protobuf import timestamp_pb2 as _timestamp_pb2
+from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Mapping, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class NodeStatus(_message.Message):
+    __slots__ = ("node", "state", "sentence", "pid", "captured", "processing_seconds", "processed", "said", "heard")
+    class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATE_UNSPECIFIED: _ClassVar[NodeStatus.State]
+        STATE_STARTING: _ClassVar[NodeStatus.State]
+        STATE_READY: _ClassVar[NodeStatus.State]
+        STATE_DEGRADED: _ClassVar[NodeStatus.State]
+        STATE_FAILED: _ClassVar[NodeStatus.State]
+        STATE_STOPPED: _ClassVar[NodeStatus.State]
+    STATE_UNSPECIFIED: NodeStatus.State
+    STATE_STARTING: NodeStatus.State
+    STATE_READY: NodeStatus.State
+    STATE_DEGRADED: NodeStatus.State
+    STATE_FAILED: NodeStatus.State
+    STATE_STOPPED: NodeStatus.State
+    NODE_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    PID_FIELD_NUMBER: _ClassVar[int]
+    CAPTURED_FIELD_NUMBER: _ClassVar[int]
+    PROCESSING_SECONDS_FIELD_NUMBER: _ClassVar[int]
+    PROCESSED_FIELD_NUMBER: _ClassVar[int]
+    SAID_FIELD_NUMBER: _ClassVar[int]
+    HEARD_FIELD_NUMBER: _ClassVar[int]
+    node: str
+    state: NodeStatus.State
+    sentence: str
+    pid: int
+    captured: _timestamp_pb2.Timestamp
+    processing_seconds: float
+    processed: int
+    said: _containers.RepeatedCompositeFieldContainer[TopicCount]
+    heard: _containers.RepeatedCompositeFieldContainer[TopicCount]
+    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., sentence: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., said: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., heard: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
+
+class TopicCount(_message.Message):
+    __slots__ = ("topic", "messages", "lost", "repeated_", "refused")
+    TOPIC_FIELD_NUMBER: _ClassVar[int]
+    MESSAGES_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    REPEATED__FIELD_NUMBER: _ClassVar[int]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
+    topic: str
+    messages: int
+    lost: int
+    repeated_: int
+    refused: int
+    def __init__(self, topic: _Optional[str] = ..., messages: _Optional[int] = ..., lost: _Optional[int] = ..., repeated_: _Optional[int] = ..., refused: _Optional[int] = ...) -> None: ...

@@ -1,0 +1,51 @@
+"""The topic table and the schema hashes."""
+
+from __future__ import annotations
+
+import pytest
+
+from paramove.bus import topics
+from paramove.bus.schema_hash import schema_hash, type_of_hash
+from paramove.bus.topics import Profile
+from paramove.msgs.clock_pb2 import Clock
+from paramove.msgs.node_status_pb2 import NodeStatus
+
+
+def test_names_are_unique_and_well_formed() -> None:
+    names = [topic.name for topic in topics.TOPICS]
+    assert len(names) == len(set(names))
+    assert all(name == name.lower() and " " not in name and "." not in name for name in names)
+
+
+def test_truth_and_raw_light_are_never_recorded() -> None:
+    assert {topic.name for topic in topics.TOPICS if topic.truth} == {"truth/layout", "truth/state"}
+    assert not any(topic.recorded for topic in topics.TOPICS if topic.truth)
+
+
+def test_only_images_drop_older_messages() -> None:
+    assert all(topic.is_image == (topic.profile is Profile.LATEST) for topic in topics.TOPICS)
+
+
+def test_a_topic_is_found_by_name_and_a_wrong_name_gets_a_hint() -> None:
+    assert topics.by_name("gestures") is topics.GESTURES
+    assert topics.by_name("status/camera").type is NodeStatus
+    with pytest.raises(KeyError, match="camera/image"):
+        topics.by_name("camera/imgae")
+
+
+@pytest.mark.parametrize("node", ["a/b", "A", "", "x y"])
+def test_a_bad_node_name_is_refused(node: str) -> None:
+    with pytest.raises(ValueError, match="node name"):
+        topics.status(node)
+
+
+def test_schema_hashes_differ_between_types_and_find_their_type() -> None:
+    hashes = {topic.type: schema_hash(topic.type) for topic in topics.TOPICS}
+    assert len(set(hashes.values())) == len(hashes)
+    assert type_of_hash(schema_hash(Clock)) == "paramove.msgs.Clock"
+    assert type_of_hash(1) is None
+
+
+def test_schema_hash_is_the_same_in_every_process_and_release() -> None:
+    """A pinned value: it changes only when clock.proto does."""
+    assert schema_hash(Clock) == 0x2A66455DB97F00FF
