@@ -22,7 +22,7 @@ class TrackedObjects(_message.Message):
     def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame: _Optional[str] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., objects: _Optional[_Iterable[_Union[TrackedObject, _Mapping]]] = ...) -> None: ...
 
 class TrackedObject(_message.Message):
-    __slots__ = ("name", "kind", "u_px", "v_px", "area_px", "width_px", "height_px", "confidence")
+    __slots__ = ("name", "kind", "u_px", "v_px", "area_px", "width_px", "height_px", "confidence", "left_px", "top_px", "outline")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[TrackedObject.Kind]
@@ -39,6 +39,9 @@ class TrackedObject(_message.Message):
     WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
     HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
     CONFIDENCE_FIELD_NUMBER: _ClassVar[int]
+    LEFT_PX_FIELD_NUMBER: _ClassVar[int]
+    TOP_PX_FIELD_NUMBER: _ClassVar[int]
+    OUTLINE_FIELD_NUMBER: _ClassVar[int]
     name: str
     kind: TrackedObject.Kind
     u_px: float
@@ -47,4 +50,15 @@ class TrackedObject(_message.Message):
     width_px: float
     height_px: float
     confidence: float
-    def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[TrackedObject.Kind, str]] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., area_px: _Optional[float] = ..., width_px: _Optional[float] = ..., height_px: _Optional[float] = ..., confidence: _Optional[float] = ...) -> None: ...
+    left_px: float
+    top_px: float
+    outline: _containers.RepeatedCompositeFieldContainer[OutlinePoint]
+    def __init__(self, name: _Optional[str] = ..., kind: _Optional[_Union[TrackedObject.Kind, str]] = ..., u_px: _Optional[float] = ..., v_px: _Optional[float] = ..., area_px: _Optional[float] = ..., width_px: _Optional[float] = ..., height_px: _Optional[float] = ..., confidence: _Optional[float] = ..., left_px: _Optional[float] = ..., top_px: _Optional[float] = ..., outline: _Optional[_Iterable[_Union[OutlinePoint, _Mapping]]] = ...) -> None: ...
+
+class OutlinePoint(_message.Message):
+    __slots__ = ("u_px", "v_px")
+    U_PX_FIELD_NUMBER: _ClassVar[int]
+    V_PX_FIELD_NUMBER: _ClassVar[int]
+    u_px: float
+    v_px: float
+    def __init__(self, u_px: _Optional[float] = ..., v_px: _Optional[float] = ...) -> None: ...
