@@ -1,0 +1,250 @@
+"""Finds objects and the hand by their colours (thesis 5.2.6: "tracked by a color tracker in a camera view").
+
+Regions are found at half resolution and measured at full resolution. The measure is soft: a pixel at the border that is
+half object, half background counts half, which gives centres to about 0.1 px.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
+from paramove.vision.full_size import FullSize
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Colour:
+    """A colour to be tracked.
+
+    Attributes:
+        name: Name of the colour, used as the object's name.
+        hue_deg: Lower and upper hue, 0 to 360; lower > upper wraps over red.
+        saturation: Least saturation, (max - min)/max of RGB, 0 to 1.
+        hand: True for the instructor's hand.
+    """
+
+    name: str
+    hue_deg: tuple[float, float]
+    saturation: float = 0.45
+    hand: bool = False
+
+    def __post_init__(self) -> None:
+        if not all(0 <= hue <= 360 for hue in self.hue_deg) or not 0 < self.saturation < 1:
+            raise ValueError(
+                f"colour {self.name!r}: hue {self.hue_deg} and saturation {self.saturation} found, "
+                "hues within 0..360 degrees and a saturation within 0..1 expected"
+            )
+
+
+DEFAULT_COLOURS = (
+    Colour("yellow", (42.0, 75.0)),
+    Colour("green", (90.0, 165.0)),
+    Colour("blue", (195.0, 262.0)),
+    Colour("magenta", (280.0, 345.0), hand=True),
+)
+"""Gaps of at least 15 degrees between neighbours keep noisy dark pixels out of the wrong colour."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """One measured region. Pixels; u right, v down; the middle of the first pixel is 0."""
+
+    u_px: float
+    v_px: float
+    area_px: float
+    left_px: float
+    top_px: float
+    width_px: float
+    height_px: float
+    outline: NDArray[np.float64]  # [M, 2] convex hull
+
+
+class ColourTracker:
+    """Tracks one region per colour.
+
+    Args:
+        colours: What to look for.
+        least_area_px: Smaller regions are noise; an object of 20 x 50 mm has about 400 px.
+        largest_share: Regions above this share of the image are background.
+    """
+
+    STILL_PX = 0.75  # centres of a standing object scatter by about 0.15 px
+    STILL_FRAMES = 8  # half a second at 15 Hz
+
+    def __init__(
+        self, colours: Sequence[Colour] = DEFAULT_COLOURS, least_area_px: float = 24.0, largest_share: float = 0.12
+    ) -> None:
+        if not colours or len({colour.name for colour in colours}) != len(colours):
+            raise ValueError(f"colours {[c.name for c in colours]}: at least one, each name once, expected")
+        cv2.setNumThreads(1)  # images are small: threads cost more than they give, and other nodes need the cores
+        self._colours = tuple(colours)
+        self._least_area = least_area_px
+        self._largest_share = largest_share
+        self._full_size = FullSize()
+        self._recent: dict[str, deque[Region]] = {
+            colour.name: deque(maxlen=self.STILL_FRAMES) for colour in self._colours
+        }
+
+    def update(self, image_bgr: Image, captured_ns: int = 0) -> TrackedObjects:
+        """The coloured regions of one image [H, W, 3] uint8, BGR. Raises ValueError for any other array."""
+        if image_bgr.ndim != 3 or image_bgr.shape[2] != 3 or image_bgr.dtype != np.uint8:
+            raise ValueError(f"image of shape {image_bgr.shape} and type {image_bgr.dtype}: [H, W, 3] uint8 expected")
+        height, width = image_bgr.shape[:2]
+        tracked = TrackedObjects(frame="camera_optical", width_px=width, height_px=height)
+        tracked.captured.FromNanoseconds(captured_ns)
+        small = cv2.resize(image_bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        hsv, chroma = _hue_and_chroma(small)
+        coloured = cv2.compare(chroma, _least_chroma(small, hsv), cv2.CMP_GE)
+        for colour in self._colours:
+            box = self._find(_of_colour(hsv, coloured, colour))
+            region = None if box is None else _measure(image_bgr, box, colour)
+            if region is not None and region.area_px >= self._least_area:
+                tracked.objects.append(self._message(colour, region))
+            else:
+                self._recent[colour.name].clear()
+        return tracked
+
+    def _find(self, mask: Image) -> tuple[int, int, int, int] | None:
+        """Box (left, top, right, bottom), full-resolution px, of the largest region and of its pieces beside it."""
+        count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        least, most = self._least_area / 4, self._largest_share * mask.size
+        pieces = [row for row in stats[1:count] if row[cv2.CC_STAT_AREA] >= 2 and row[cv2.CC_STAT_AREA] <= most]
+        pieces.sort(key=lambda row: -int(row[cv2.CC_STAT_AREA]))
+        if not pieces or pieces[0][cv2.CC_STAT_AREA] < least:
+            return None
+        left, top, right, bottom = _corners(pieces[0])
+        reach = max(right - left, bottom - top)
+        for piece in pieces[1:]:  # an arm in front may cut a region into pieces
+            if piece[cv2.CC_STAT_AREA] < max(least, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
+                break
+            other = _corners(piece)
+            if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
+                left, top = min(left, other[0]), min(top, other[1])
+                right, bottom = max(right, other[2]), max(bottom, other[3])
+        return 2 * left, 2 * top, 2 * right, 2 * bottom
+
+    def _message(self, colour: Colour, region: Region) -> TrackedObject:
+        kind = TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT
+        found = TrackedObject(
+            name=colour.name,
+            kind=kind,
+            u_px=region.u_px,
+            v_px=region.v_px,
+            area_px=region.area_px,
+            width_px=region.width_px,
+            height_px=region.height_px,
+            left_px=region.left_px,
+            top_px=region.top_px,
+            confidence=1.0,
+        )
+        if colour.hand:
+            for u, v in region.outline:
+                found.outline.add(u_px=float(u), v_px=float(v))
+            return found
+        recent = self._recent[colour.name]
+        recent.append(region)
+        if self._stands_still(recent):
+            area = float(np.median([r.area_px for r in recent]))
+            height = float(np.median([r.height_px for r in recent]))
+            self._full_size.learn(colour.name, region.u_px, region.v_px, area, height)
+        found.confidence = self._full_size.visible_share(colour.name, region.u_px, region.v_px, region.area_px)
+        return found
+
+    def _stands_still(self, recent: deque[Region]) -> bool:
+        if len(recent) < self.STILL_FRAMES:
+            return False
+        centres = np.array([(r.u_px, r.v_px) for r in recent])
+        return bool(np.all(np.abs(centres - np.median(centres, axis=0)) < self.STILL_PX))
+
+
+def _hue_and_chroma(image: Image) -> tuple[Image, Image]:
+    """HSV image (hue in 2 degrees, OpenCV's unit) and chroma = max - min of the channels."""
+    hsv: Any = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
+    chroma: Any = cv2.multiply(hsv[:, :, 1], hsv[:, :, 2], scale=1 / 255.0)
+    return hsv, chroma
+
+
+def _least_chroma(image: Image, hsv: Image) -> float:
+    """Chroma that neither noise nor a grey surface reaches, from this image alone.
+
+    Grows with the scene's brightness (a colour's chroma is proportional to the light) and with the noise (of the
+    difference of neighbours, whose median absolute value is 0.954 sigma; max - min of three channels stays below 5).
+    """
+    bright = float(np.percentile(hsv[::6, ::6, 2], 90))
+    green = image[::3, :, 1].astype(np.int16)
+    noise = float(np.mean(np.abs(np.diff(green, axis=1)) * (np.abs(np.diff(green, axis=1)) < 20))) / 1.13
+    return max(8.0, 0.09 * bright, 5.0 * noise)
+
+
+def _of_colour(hsv: Image, coloured: Image, colour: Colour) -> Image:
+    low, high = colour.hue_deg[0] / 2, colour.hue_deg[1] / 2
+    least = 255 * colour.saturation
+    if low <= high:
+        mask: Any = cv2.inRange(hsv, (low, least, 0), (high, 255, 255))
+    else:
+        mask = cv2.inRange(hsv, (low, least, 0), (180, 255, 255)) | cv2.inRange(hsv, (0, least, 0), (high, 255, 255))
+    return cv2.bitwise_and(mask, coloured)  # type: ignore[no-any-return]
+
+
+def _corners(row: NDArray[np.int32]) -> tuple[int, int, int, int]:
+    left, top = int(row[cv2.CC_STAT_LEFT]), int(row[cv2.CC_STAT_TOP])
+    return left, top, left + int(row[cv2.CC_STAT_WIDTH]), top + int(row[cv2.CC_STAT_HEIGHT])
+
+
+def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Region | None:
+    """Measure the region of a colour within the box and 5 px around it."""
+    left, top = max(0, box[0] - 5), max(0, box[1] - 5)
+    patch = cv2.GaussianBlur(image[top : box[3] + 5, left : box[2] + 5], (3, 3), 0.8)
+    hsv, chroma = _hue_and_chroma(patch)
+    of_hue = _of_colour(hsv, np.full_like(chroma, 255), Colour(colour.name, colour.hue_deg, 0.6 * colour.saturation))
+    core = chroma[(of_hue > 0) & (chroma >= np.percentile(chroma, 50))]
+    if core.size == 0:
+        return None
+    # The 30th percentile is the region's shaded side; half of it is the border between region and grey background.
+    side = float(np.percentile(core, 30))
+    weight = np.clip((chroma - 0.25 * side) / (0.5 * side), 0.0, 1.0) * (of_hue > 0)
+    return _region(weight, left, top)
+
+
+def _region(weight: NDArray[np.float64], left: int, top: int) -> Region | None:
+    area = float(weight.sum())
+    if area <= 0:
+        return None
+    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
+    left_edge, right_edge = _extent(columns)
+    top_edge, bottom_edge = _extent(rows)
+    points = cv2.findNonZero((weight > 0.5).astype(np.uint8))
+    if points is None:
+        return None
+    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
+    return Region(
+        u_px=left + float(columns @ np.arange(columns.size)) / area,
+        v_px=top + float(rows @ np.arange(rows.size)) / area,
+        area_px=area,
+        left_px=left + left_edge,
+        top_px=top + top_edge,
+        width_px=right_edge - left_edge,
+        height_px=bottom_edge - top_edge,
+        outline=hull + (left, top),
+    )
+
+
+def _extent(profile: NDArray[np.float64]) -> tuple[float, float]:
+    """Where a profile first and last crosses half of its typical value, to a part of a pixel."""
+    level = 0.5 * float(np.median(profile[profile > 0.2 * profile.max()]))
+    inside = np.flatnonzero(profile >= level)
+    first, last = int(inside[0]), int(inside[-1])
+    before = profile[first - 1] if first > 0 else 0.0
+    after = profile[last + 1] if last + 1 < profile.size else 0.0
+    rise = (profile[first] - level) / max(profile[first] - before, 1e-9)
+    fall = (profile[last] - level) / max(profile[last] - after, 1e-9)
+    return first - float(rise), last + float(fall)
