@@ -11,7 +11,6 @@ from typing import Any
 
 from paramove.bus import topics
 
-
 _KNOWN: dict[Any, int] = {}
 
 

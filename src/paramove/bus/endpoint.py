@@ -1,0 +1,124 @@
+"""Where a topic's socket lies in the file system, and who owns it.
+
+libzmq's `ipc://` bind removes whatever lies at its path: a second publisher would silently take the topic over, and a
+regular file would be gone. A lock beside the socket, held for the publisher's life, keeps both from happening.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import stat
+from pathlib import Path
+from types import TracebackType
+
+PATH_BYTES = 107
+"""Longest path of a Unix socket on Linux."""
+
+
+class BusFolderError(Exception):
+    """The bus folder cannot be used; the text says what to do."""
+
+
+class TopicTakenError(Exception):
+    """Another process already says this topic; the text names it."""
+
+
+def socket_path(folder: Path, name: str) -> Path:
+    """Path of the socket of the topic or service `name`; raises BusFolderError if it is too long for a socket."""
+    path = folder / name.replace("/", ".")
+    size = len(os.fsencode(path))
+    if size > PATH_BYTES:
+        raise BusFolderError(
+            f"socket path {path} has {size} bytes, Linux allows {PATH_BYTES}; choose a bus folder that is at least "
+            f"{size - PATH_BYTES} bytes shorter"
+        )
+    return path
+
+
+def prepare_folder(folder: Path) -> None:
+    """Makes the bus folder (mode 0700); raises BusFolderError if it belongs to others or is open to them."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except OSError as error:
+        raise BusFolderError(
+            f"bus folder {folder}: {error.strerror}; choose another one with $XDG_RUNTIME_DIR"
+        ) from error
+    if found.st_uid != os.geteuid():
+        raise BusFolderError(f"bus folder {folder} belongs to user {found.st_uid}, not to us ({os.geteuid()})")
+    if found.st_mode & 0o077:
+        mode = stat.S_IMODE(found.st_mode)
+        raise BusFolderError(f"bus folder {folder} is open to other users (mode {mode:04o}); run: chmod 700 {folder}")
+
+
+class Ownership:
+    """The right to bind one socket path, held until `release` or the end of the process.
+
+    Raises:
+        TopicTakenError: another living process holds it; names its pid.
+        BusFolderError: something that is not our own stale socket lies at the path. It is left alone.
+    """
+
+    def __init__(self, path: Path, holder: str) -> None:
+        self.path = path
+        lock_path = path.with_name(path.name + ".lock")
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        try:
+            self._lock = os.open(lock_path, flags, 0o600)
+        except OSError as error:
+            raise BusFolderError(f"lock {lock_path}: {error.strerror}; remove it and start again") from error
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _check_free(path)
+        except BlockingIOError:
+            owner = os.pread(self._lock, 200, 0).decode(errors="replace").strip() or "a process that just started"
+            os.close(self._lock)
+            raise TopicTakenError(f"{path.name} is already said by {owner}; a topic has one speaker") from None
+        except BusFolderError:
+            os.close(self._lock)
+            raise
+        os.ftruncate(self._lock, 0)
+        os.pwrite(self._lock, f"pid {os.getpid()} ({holder})".encode(), 0)
+
+    def release(self) -> None:
+        """Gives the path up. The socket must be closed before: libzmq removes its file when it closes."""
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+    def __enter__(self) -> Ownership:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+
+def _check_free(path: Path) -> None:
+    """Passes if nothing lies at `path` or a socket of ours that nobody listens at; else raises BusFolderError."""
+    try:
+        found = path.lstat()
+    except FileNotFoundError:
+        return
+    if not stat.S_ISSOCK(found.st_mode):
+        raise BusFolderError(f"{path} exists and is not a socket; it is left alone, move it away")
+    if found.st_uid != os.geteuid():
+        raise BusFolderError(f"socket {path} belongs to user {found.st_uid}, not to us ({os.geteuid()})")
+    if is_alive(path):
+        raise BusFolderError(f"a process listens at {path} without holding its lock; end that process")
+
+
+def is_alive(path: Path) -> bool:
+    """Whether somebody listens at the socket `path`. Never waits."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        try:
+            probe.connect(os.fspath(path))
+        except BlockingIOError:
+            return True  # the listener's queue is full: somebody is there
+        except OSError:
+            return False
+    return True

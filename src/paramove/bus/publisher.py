@@ -1,0 +1,106 @@
+"""Says one topic."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from paramove.bus.endpoint import Ownership, prepare_folder, socket_path
+from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_WELCOME, Envelope, pack, publisher_id
+from paramove.bus.schema_hash import schema_hash
+from paramove.bus.topics import Profile, Topic
+
+LINGER_MS = 500
+"""How long closing waits for messages said just before."""
+
+
+class Publisher:
+    """The one speaker of a topic, bound to `ipc://<folder>/<name with . for />`.
+
+    Every new subscription is answered by a *welcome* with the epoch and the newest sequence. The subscriber learns from
+    it that it is connected and from where on to count losses; on a latched topic it holds the newest message. The
+    welcome is sent from `serve` and `publish`: there is no thread.
+
+    Args:
+        context: libzmq context; `ownership` may be released only after it was terminated.
+        folder: Bus folder; made if missing.
+        topic: Row of the table.
+        node: Name of the node, for the publisher id and the error a second publisher gets.
+        name: Name on the bus where it differs from the topic's (a remap).
+
+    Raises:
+        TopicTakenError, BusFolderError: see `paramove.bus.endpoint`.
+    """
+
+    def __init__(
+        self, context: zmq.Context[Any], folder: Path, topic: Topic, node: str, name: str | None = None
+    ) -> None:
+        self.topic = topic
+        self.name = name or topic.name
+        self.epoch = secrets.randbits(32)
+        self.sequence = 0
+        prepare_folder(folder)
+        path = socket_path(folder, self.name)
+        self.ownership = Ownership(path, node)
+        self._frame = self.name.encode() + b"\0"
+        self._schema = schema_hash(topic.type)
+        self._publisher = publisher_id(node)
+        self._last: tuple[Envelope, bytes] | None = None
+        self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
+        self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        self.socket.setsockopt(zmq.SNDHWM, topic.high_water_mark)
+        self.socket.setsockopt(zmq.LINGER, LINGER_MS)
+        # A subscriber only ever sends subscriptions.
+        self.socket.setsockopt(zmq.MAXMSGSIZE, 1024)
+        self.socket.bind(f"ipc://{path}")
+
+    def publish(self, message: Any, captured_ns: int, now_ns: int) -> int:
+        """Says `message` and returns its sequence number. Never waits.
+
+        Raises:
+            TypeError: the topic carries another type.
+            ValueError: the message is larger than the topic allows.
+        """
+        if type(message) is not self.topic.type:
+            found = getattr(getattr(message, "DESCRIPTOR", None), "full_name", type(message).__name__)
+            raise TypeError(f"topic {self.topic.name} carries {self.topic.type_name}, not {found}")
+        payload: bytes = message.SerializeToString(deterministic=True)
+        if len(payload) > self.topic.max_bytes:
+            raise ValueError(
+                f"message on {self.topic.name} has {len(payload)} bytes, the topic allows {self.topic.max_bytes}"
+            )
+        self.serve()
+        self.sequence += 1
+        envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence, now_ns, captured_ns)
+        if self.topic.profile is Profile.LATCHED:
+            self._last = (envelope, payload)
+        self._send(envelope, payload)
+        return self.sequence
+
+    def serve(self) -> None:
+        """Answers the subscriptions that have come in since the last call."""
+        welcome = False
+        while self.socket.poll(0):
+            event = self.socket.recv(zmq.NOBLOCK)
+            welcome |= event[:1] == b"\x01"
+        if welcome:
+            self._welcome()
+
+    def close(self) -> None:
+        """Closes the socket; messages already said are still delivered for `LINGER_MS`."""
+        self.socket.close()
+
+    def _welcome(self) -> None:
+        if self._last is not None:
+            envelope, payload = self._last
+            self._send(envelope._replace(flags=FLAG_WELCOME | FLAG_LAST_VALUE), payload)
+        else:
+            self._send(
+                Envelope(self._schema, self._publisher, self.epoch, self.sequence, 0, 0, flags=FLAG_WELCOME), b""
+            )
+
+    def _send(self, envelope: Envelope, payload: bytes) -> None:
+        self.socket.send_multipart([self._frame, pack(envelope, payload), payload], zmq.NOBLOCK)

@@ -1,0 +1,74 @@
+"""Exact counts of what one subscriber got of one topic, from epochs and sequence numbers alone."""
+
+from __future__ import annotations
+
+import enum
+from collections import Counter
+
+from paramove.bus.envelope import Envelope, Reason
+
+
+class Arrival(enum.Enum):
+    """What a message is to a subscriber that has seen the ones before it."""
+
+    NEW = "new"
+    REPEATED = "repeated"
+    WELCOME = "welcome"  # carries no message
+    OUTDATED = "outdated"  # of a publisher that another one has replaced
+
+
+class SequenceCounter:
+    """Follows one topic.
+
+    The first thing heard of an epoch, a welcome as a rule, is the base line: nothing said before it was meant for this
+    subscriber. From there on every gap is a loss, and a later welcome also shows a loss at the end. A new epoch is a
+    restarted publisher, hence a new base line and no loss.
+
+    Attributes:
+        epoch: Of the present publisher; None until something was heard.
+        sequence: Newest of that epoch.
+        messages: Messages heard, each counted once.
+        lost: Messages said and not heard.
+        repeated: Messages that came again.
+        refused: How many messages were refused, by reason.
+        epochs: How many publishers followed each other.
+    """
+
+    def __init__(self) -> None:
+        self.epoch: int | None = None
+        self.sequence = 0
+        self.messages = 0
+        self.lost = 0
+        self.repeated = 0
+        self.epochs = 0
+        self.refused: Counter[Reason] = Counter()
+        self._past: set[int] = set()
+
+    def accept(self, envelope: Envelope) -> Arrival:
+        """Counts one message that passed the checks of the envelope."""
+        if envelope.epoch in self._past:
+            self.refused[Reason.EPOCH] += 1
+            return Arrival.OUTDATED
+        first = envelope.epoch != self.epoch
+        if first:
+            if self.epoch is not None:
+                self._past.add(self.epoch)
+            self.epoch = envelope.epoch
+            self.epochs += 1
+        elif envelope.sequence <= self.sequence:
+            if not envelope.has_message:
+                return Arrival.WELCOME
+            self.repeated += 1
+            return Arrival.REPEATED
+        else:
+            # A welcome without a message says that everything up to its sequence had been said.
+            self.lost += envelope.sequence - self.sequence - int(envelope.has_message)
+        self.sequence = envelope.sequence
+        if not envelope.has_message:
+            return Arrival.WELCOME
+        self.messages += 1
+        return Arrival.NEW
+
+    def has_reached(self, epoch: int, sequence: int) -> bool:
+        """Whether everything up to that message has been heard, or belongs to a publisher that was replaced."""
+        return epoch in self._past or (epoch == self.epoch and self.sequence >= sequence)

@@ -1,0 +1,248 @@
+"""Publisher and subscriber over real sockets."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.endpoint import BusFolderError, TopicTakenError, is_alive, prepare_folder, socket_path
+from paramove.bus.envelope import Reason
+from paramove.bus.publisher import Publisher
+from paramove.bus.subscriber import Subscriber
+from paramove.msgs.clock_pb2 import Clock
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.rule_pb2 import Rules
+from tests.bus.conftest import Wait
+
+Context = zmq.Context[Any]
+
+
+def _connect(publisher: Publisher, subscriber: Subscriber, wait: Wait) -> None:
+    def welcomed() -> bool:
+        assert subscriber.receive() is None
+        return subscriber.welcomed
+
+    wait(welcomed, publisher.serve)
+
+
+def test_a_message_arrives_with_its_times(context: Context, folder: Path, wait: Wait) -> None:
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    _connect(publisher, subscriber, wait)
+    assert publisher.publish(Gesture(object="red"), captured_ns=-5, now_ns=7) == 1
+    heard = wait(subscriber.receive)
+    assert (heard.message.object, heard.captured_ns, heard.published_ns, heard.sequence) == ("red", -5, 7, 1)
+    assert Gesture.FromString(heard.payload) == heard.message
+
+
+def test_a_subscriber_may_come_first(context: Context, folder: Path, wait: Wait) -> None:
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    _connect(publisher, subscriber, wait)
+
+
+def test_a_late_joiner_gets_the_latched_value(context: Context, folder: Path, wait: Wait) -> None:
+    publisher = Publisher(context, folder, topics.RULES, "rule_learner")
+    first = Subscriber(context, folder, topics.RULES)
+    for name in ("old", "new"):
+        publisher.publish(Rules(frame=name), 1, 2)
+    late = Subscriber(context, folder, topics.RULES)
+    heard = wait(late.receive, publisher.serve)
+    assert (heard.message.frame, heard.sequence) == ("new", 2)
+    # Whoever was there before sees the value again and drops it.
+    newest = []
+    wait(lambda: first.counter.repeated, publisher.serve, lambda: newest.append(first.receive()))
+    assert [item.sequence for item in newest if item] == [2]
+
+
+def test_loss_at_a_subscriber_that_stopped_reading_is_counted_exactly(
+    context: Context, folder: Path, wait: Wait
+) -> None:
+    publisher = Publisher(context, folder, topics.CAMERA_IMAGE, "camera")  # four may wait on each side
+    subscriber = Subscriber(context, folder, topics.CAMERA_IMAGE)
+    _connect(publisher, subscriber, wait)
+    said = 300
+    for _ in range(said):
+        publisher.publish(topics.CAMERA_IMAGE.type(data=b"x" * 50_000), 0, 0)
+    heard = []
+    # A second subscription brings a welcome, which shows what was lost last.
+    wait(lambda: subscriber.receive() is None and subscriber.counter.messages)
+    other = Subscriber(context, folder, topics.CAMERA_IMAGE)
+    wait(
+        lambda: subscriber.counter.sequence == said,
+        publisher.serve,
+        lambda: heard.append(subscriber.receive()),
+        other.receive,
+    )
+    assert subscriber.counter.lost > 0
+    assert subscriber.counter.messages + subscriber.counter.lost == said
+
+
+def test_a_restarted_publisher_is_no_loss(folder: Path, context: Context, wait: Wait) -> None:
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    for _ in range(2):
+        with zmq.Context() as own:
+            publisher = Publisher(own, folder, topics.GESTURES, "recognizer")
+            epochs = subscriber.counter.epochs
+            wait(
+                lambda before=epochs: subscriber.receive() is None and subscriber.counter.epochs > before,
+                publisher.serve,
+            )
+            for _ in range(5):
+                publisher.publish(Gesture(), 0, 0)
+            publisher.close()
+        publisher.ownership.release()
+        target = subscriber.counter.epochs * 5
+        wait(lambda target=target: subscriber.receive() is None and subscriber.counter.messages == target)
+    assert (subscriber.counter.messages, subscriber.counter.lost, subscriber.counter.epochs) == (10, 0, 2)
+
+
+def test_a_second_publisher_is_refused_and_told_who_was_first(context: Context, folder: Path, wait: Wait) -> None:
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    with pytest.raises(TopicTakenError, match=rf"gestures is already said by pid {os.getpid()} \(recognizer\)"):
+        Publisher(context, folder, topics.GESTURES, "impostor")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    _connect(publisher, subscriber, wait)
+
+
+_KILLED = """
+import sys, zmq
+from pathlib import Path
+from paramove.bus import topics
+from paramove.bus.publisher import Publisher
+publisher = Publisher(zmq.Context(), Path(sys.argv[1]), topics.GESTURES, "recognizer")
+sys.stdout.write("bound\\n")
+sys.stdout.flush()
+while True:
+    publisher.socket.poll()
+"""
+
+
+def test_a_killed_publisher_is_named_while_it_lives_and_replaced_after(
+    context: Context, folder: Path, wait: Wait
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", _KILLED, str(folder)], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"bound\n"
+        with pytest.raises(TopicTakenError, match=f"pid {process.pid} "):
+            Publisher(context, folder, topics.GESTURES, "recognizer")
+        process.send_signal(signal.SIGKILL)
+    path = socket_path(folder, "gestures")
+    assert path.exists()
+    assert not is_alive(path)
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    _connect(publisher, subscriber, wait)
+
+
+def test_a_regular_file_is_left_alone(context: Context, folder: Path) -> None:
+    path = folder / "gestures"
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(BusFolderError, match="is not a socket; it is left alone"):
+        Publisher(context, folder, topics.GESTURES, "recognizer")
+    assert path.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_living_foreign_socket_is_left_alone(context: Context, folder: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(folder / "gestures"))
+        listener.listen()
+        with pytest.raises(BusFolderError, match="without holding its lock"):
+            Publisher(context, folder, topics.GESTURES, "recognizer")
+
+
+def test_a_long_path_is_refused(context: Context, folder: Path) -> None:
+    deep = folder / ("x" * 120)
+    with pytest.raises(BusFolderError, match="Linux allows 107"):
+        Publisher(context, deep, topics.GESTURES, "recognizer")
+
+
+def test_the_folder_is_private(folder: Path) -> None:
+    made = folder / "domain"
+    prepare_folder(made)
+    assert made.stat().st_mode & 0o777 == 0o700
+    made.chmod(0o755)
+    with pytest.raises(BusFolderError, match="run: chmod 700"):
+        prepare_folder(made)
+
+
+def test_another_type_than_the_topics_is_refused_by_the_publisher(context: Context, folder: Path) -> None:
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    with pytest.raises(TypeError, match=r"gestures carries paramove\.msgs\.Gesture, not paramove\.msgs\.Clock"):
+        publisher.publish(Clock(), 0, 0)
+    with pytest.raises(ValueError, match="the topic allows 1048576"):
+        publisher.publish(Gesture(object="x" * 2**20), 0, 0)
+
+
+def test_foreign_and_wrong_messages_are_counted_and_good_ones_still_heard(
+    context: Context, folder: Path, wait: Wait, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A program that is not ours speaks on the topic's socket."""
+    foreign: zmq.Socket[Any] = context.socket(zmq.XPUB)
+    foreign.bind(f"ipc://{folder / 'gestures'}")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    wait(lambda: foreign.poll(0))
+    helper = Publisher(context, folder, topics.CLOCK, "simulator")
+    spy: zmq.Socket[Any] = context.socket(zmq.SUB)
+    spy.connect(f"ipc://{folder / 'clock'}")
+    spy.subscribe(b"")
+    _, header, payload = wait(lambda: spy.poll(0) and spy.recv_multipart(), helper.serve)
+    foreign.send_multipart([b"gestures\0", b"GET / HTTP/1.1", b""])
+    foreign.send_multipart([b"gestures\0"])
+    foreign.send_multipart([b"gestures\0", header, payload])
+    for reason in (Reason.SIZE, Reason.FRAMES, Reason.SCHEMA):
+        wait(lambda reason=reason: subscriber.receive() is None and subscriber.counter.refused[reason] == 1)
+    assert not subscriber.welcomed
+    assert "paramove.msgs.Clock" in caplog.text
+
+
+def test_a_prefix_of_a_topic_is_another_topic(context: Context, folder: Path, wait: Wait) -> None:
+    """libzmq matches subscriptions as prefixes: the zero byte at the end keeps `arm` from hearing `arm/safety`."""
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    prefix: zmq.Socket[Any] = context.socket(zmq.SUB)
+    prefix.connect(f"ipc://{folder / 'gestures'}")
+    prefix.subscribe(b"gesture\0")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    _connect(publisher, subscriber, wait)
+    publisher.publish(Gesture(), 0, 0)
+    wait(subscriber.receive)
+    assert not prefix.poll(0)
+
+
+def test_a_socket_gone_deaf_after_an_oversized_message_is_rebuilt(context: Context, folder: Path, wait: Wait) -> None:
+    foreign: zmq.Socket[Any] = context.socket(zmq.XPUB)
+    foreign.setsockopt(zmq.XPUB_VERBOSE, 1)
+    foreign.bind(f"ipc://{folder / 'gestures'}")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    wait(lambda: foreign.poll(0) and foreign.recv())
+    foreign.send_multipart([b"gestures\0", b"x", b"y" * (2**20 + 1000)])
+    wait(lambda: subscriber.rebuilt == 1, subscriber.watch, subscriber.receive)
+    wait(lambda: foreign.poll(0) and foreign.recv() == b"\x01gestures\0")
+    foreign.send_multipart([b"gestures\0", b"x", b"y"])
+    wait(lambda: subscriber.receive() is None and subscriber.counter.refused[Reason.SIZE] == 1)
+    assert subscriber.rebuilt == 1
+
+
+def test_memory_of_a_publisher_with_a_stopped_image_subscriber_stays_small(
+    context: Context, folder: Path, wait: Wait
+) -> None:
+    import psutil
+
+    publisher = Publisher(context, folder, topics.CAMERA_LIGHT, "simulator")
+    subscriber = Subscriber(context, folder, topics.CAMERA_LIGHT)
+    _connect(publisher, subscriber, wait)
+    image = topics.CAMERA_LIGHT.type(data=b"\1" * 1_000_000)
+    before = psutil.Process().memory_info().rss
+    for _ in range(300):
+        publisher.publish(image, 0, 0)
+    grown = psutil.Process().memory_info().rss - before
+    assert grown < 40e6, f"{grown / 1e6:.0f} MB for 300 MB said"
