@@ -1,0 +1,71 @@
+"""Checks and resampling of sequences."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+class SequenceLengthError(ValueError):
+    """A sequence is shorter or longer than the model's durations allow."""
+
+
+def checked_sequence(sequence: ArrayLike, dim: int | None = None) -> Floats:
+    """The sequence as contiguous float64, shape (T, D).
+
+    Raises ValueError for a wrong shape, a wrong dimension or values that are not finite.
+    """
+    array = np.ascontiguousarray(sequence, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] == 0:
+        raise ValueError(f"a sequence has shape (frames, dimensions) with at least one frame, found {array.shape}")
+    if dim is not None and array.shape[1] != dim:
+        raise ValueError(f"the model describes {dim} dimensions per frame, the sequence has {array.shape[1]}")
+    bad = ~np.isfinite(array).all(axis=1)
+    if bad.any():
+        raise ValueError(f"{int(bad.sum())} of {len(array)} frames hold values that are not finite; "
+                         f"the first is frame {int(bad.argmax())}; fill or cut them")  # fmt: skip
+    return array
+
+
+def checked_sequences(sequences: Sequence[ArrayLike]) -> list[Floats]:
+    """All sequences checked and of one dimension. Raises ValueError and names the sequence that is wrong."""
+    if len(sequences) == 0:
+        raise ValueError("no sequences were given; at least one is needed")
+    checked: list[Floats] = []
+    for index, sequence in enumerate(sequences):
+        try:
+            checked.append(checked_sequence(sequence, checked[0].shape[1] if checked else None))
+        except ValueError as error:
+            raise ValueError(f"sequence {index}: {error}") from error
+    return checked
+
+
+def check_length(n_frames: int, n_states: int, d_min: int, d_max: int) -> None:
+    """Raise SequenceLengthError unless N d_min <= T <= N d_max (thesis 4.1.2.1)."""
+    shortest, longest = n_states * d_min, n_states * d_max
+    if not shortest <= n_frames <= longest:
+        raise SequenceLengthError(
+            f"a sequence of {n_frames} frames does not fit {n_states} states of {d_min} to {d_max} frames each: "
+            f"allowed are {shortest} to {longest} frames; resample it, best to about {(shortest + longest) // 2}"
+        )
+
+
+def resample(sequence: ArrayLike, n_frames: int) -> Floats:
+    """The sequence at `n_frames` equally spaced times, linearly interpolated, ends kept. Shape (n_frames, D)."""
+    array = checked_sequence(sequence)
+    if n_frames < 2:
+        raise ValueError(f"resampling needs at least 2 frames, found {n_frames}")
+    if len(array) == n_frames:
+        return array.copy()
+    return interpolate(array, np.linspace(0.0, len(array) - 1.0, n_frames))
+
+
+def interpolate(points: Floats, positions: Floats) -> Floats:
+    """Rows of `points` at fractional row positions, linearly interpolated. Shape (len(positions), D)."""
+    lower = np.clip(np.floor(positions).astype(np.int64), 0, len(points) - 1)
+    upper = np.minimum(lower + 1, len(points) - 1)
+    share = (positions - lower)[:, None]
+    result: Floats = (1.0 - share) * points[lower] + share * points[upper]
+    return result

@@ -1,0 +1,135 @@
+"""Baum-Welch training: initialisation, iterations, convergence monitor (thesis 2.1.6, 2.2.2)."""
+
+import logging
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.hmm.estimation import (
+    Parameters,
+    Statistics,
+    covariances_of,
+    durations_of,
+    penalty,
+    pooled_covariance,
+)
+from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
+
+Floats = NDArray[np.float64]
+logger = logging.getLogger(__name__)
+
+
+class LikelihoodDecreaseWarning(RuntimeWarning):
+    """The objective fell although every step should raise it: a sign of numerical trouble."""
+
+
+@dataclass
+class ConvergenceMonitor:
+    """Follows the objective that EM maximises, warns when it falls, says when it has converged."""
+
+    tolerance_per_frame: float
+    n_frames: int
+    objectives: list[float] = field(default_factory=list)
+    log_likelihoods: list[float] = field(default_factory=list)
+    converged: bool = False
+
+    def add(self, log_likelihood: float, objective: float | None) -> None:
+        """Note one iteration; `objective` is None while the prior is still being annealed."""
+        self.log_likelihoods.append(log_likelihood)
+        if objective is None:
+            return
+        if self.objectives:
+            gain = objective - self.objectives[-1]
+            if gain < -1e-8 * max(1.0, abs(objective)):
+                warnings.warn(
+                    f"the training objective fell by {-gain:.3g} to {objective:.6g} in iteration "
+                    f"{len(self.log_likelihoods)}; more shrinkage or a higher floor helps",
+                    LikelihoodDecreaseWarning,
+                    stacklevel=3,
+                )
+            self.converged = gain < self.tolerance_per_frame * self.n_frames
+        self.objectives.append(objective)
+
+    def summary(self, n_sequences: int) -> TrainingSummary:
+        """What happened, frozen."""
+        history, objectives = tuple(self.log_likelihoods), tuple(self.objectives)
+        return TrainingSummary(history, objectives, n_sequences, self.n_frames, self.converged)
+
+
+def root_mean_deviation(sequences: Sequence[Floats]) -> float:
+    """Square root of the mean variance per dimension over all frames: the unit of the option fractions."""
+    return float(np.sqrt(np.concatenate(list(sequences)).var(axis=0).mean()))
+
+
+def equal_segments(
+    sequences: Sequence[Floats], n_states: int, d_min: int, d_max: int, options: TrainingOptions
+) -> Parameters:
+    """Initial parameters from cutting each sequence into N equal parts; durations uniform over d_min..d_max."""
+    dim = sequences[0].shape[1]
+    labels = [np.arange(len(sequence)) * n_states // len(sequence) for sequence in sequences]
+    frames, states = np.concatenate(list(sequences)), np.concatenate(labels)
+    weight = np.bincount(states, minlength=n_states).astype(np.float64)
+    means = np.zeros((n_states, dim))
+    np.add.at(means, states, frames)
+    means /= weight[:, None]
+    scatter = np.empty((n_states, dim, dim))
+    for i in range(n_states):
+        deviations = frames[states == i] - means[i]
+        scatter[i] = deviations.T @ deviations
+    durations = np.zeros((n_states, d_max))
+    durations[:, d_min - 1 :] = 1.0 / (d_max - d_min + 1)
+    # The first E-step needs covariances that are safe whatever the options say, hence the pooled one underneath.
+    scale = root_mean_deviation(sequences)
+    target = pooled_covariance(scatter, weight) + (1e-3 * scale) ** 2 * np.eye(dim)
+    floor = (options.floor_fraction * scale) ** 2
+    start = Regularisation(
+        (options.prior_fraction * scale) ** 2, floor, target, max(dim, options.shrinkage_frames), 0.0
+    )
+    return Parameters(means, covariances_of(scatter, weight, start), durations, d_min)
+
+
+def train(
+    initial: Parameters, sequences: Sequence[Floats], options: TrainingOptions
+) -> tuple[Parameters, TrainingSummary]:
+    """Iterate Baum-Welch from `initial` until the objective converges or the iterations are used up.
+
+    Warns (LikelihoodDecreaseWarning) if the objective falls after the annealing.
+    """
+    scale = root_mean_deviation(sequences)
+    monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
+    parameters = initial
+    target: Floats | None = None
+    for iteration in range(options.max_iterations):
+        statistics = Statistics.gathered(parameters, sequences)
+        means = statistics.means()
+        scatter = statistics.scatter(means)
+        annealing = iteration < options.annealing_iterations
+        # The target moves while the prior does and then stays, which makes the objective a fixed function.
+        if annealing or target is None or iteration == options.annealing_iterations:
+            target = pooled_covariance(scatter, statistics.weight)
+        regularisation = regularisation_at(iteration, options, scale, target)
+        objective = None if annealing else statistics.log_likelihood + penalty(parameters, regularisation)
+        monitor.add(statistics.log_likelihood, objective)
+        parameters = Parameters(
+            means,
+            covariances_of(scatter, statistics.weight, regularisation),
+            durations_of(statistics.durations, parameters.d_min, options.duration_pseudocount),
+            parameters.d_min,
+        )
+        if monitor.converged:
+            break
+    logger.debug(
+        "trained %d states on %d sequences in %d iterations", len(parameters.means), len(sequences), iteration + 1
+    )
+    return parameters, monitor.summary(len(sequences))
+
+
+def regularisation_at(iteration: int, options: TrainingOptions, scale: float, target: Floats) -> Regularisation:
+    """The options in the data's unit; the prior's deviation falls linearly to zero (thesis 2.2.2)."""
+    remaining = max(0.0, 1.0 - iteration / options.annealing_iterations) if options.annealing_iterations else 0.0
+    added = (options.prior_fraction * scale * remaining) ** 2
+    floor = (options.floor_fraction * scale) ** 2
+    return Regularisation(added, floor, target, options.shrinkage_frames, options.duration_pseudocount)
