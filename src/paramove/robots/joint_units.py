@@ -1,0 +1,101 @@
+"""Joint angles to the integer units that a robot is commanded in, and back.
+
+Thesis table 5.1: +-209 counts per degree for the geared joints, 0 to 120 for the wrist and the fingers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+INT16_RANGE = (-32768, 32767)
+
+
+class JointRangeError(ValueError):
+    """A joint value that cannot be commanded: not finite, beyond the joint's range, or not an integer unit."""
+
+
+@dataclass(frozen=True)
+class JointUnits:
+    """Linear units of J joints: counts = zero_counts + counts_per_rad * angle.
+
+    Attributes:
+        names: Joint names, J of them.
+        counts_per_rad: Signed factors, shape [J].
+        zero_counts: Counts at the angle 0, shape [J].
+        lower, upper: Mechanical range, rad, shape [J].
+    """
+
+    names: tuple[str, ...]
+    counts_per_rad: NDArray[np.float64]
+    zero_counts: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+    def counts_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Smallest and largest counts that keep each joint inside its mechanical range, each [J]."""
+        ends = np.stack([self.zero_counts + self.counts_per_rad * end for end in (self.lower, self.upper)])
+        # The manual's ends are whole counts; rounding must not shut them out.
+        return np.ceil(ends.min(axis=0) - 1e-6), np.floor(ends.max(axis=0) + 1e-6)
+
+    def to_counts(self, angles: ArrayLike) -> NDArray[np.int16]:
+        """Nearest integer units of joint angles.
+
+        Args:
+            angles: Shape [..., J], rad.
+
+        Returns:
+            Shape [..., J].
+
+        Raises:
+            JointRangeError: Wrong number of joints, a value that is not finite, or one beyond the joint's range by more
+                than half a count. Nothing is clipped: a clipped NaN would be full travel.
+        """
+        values = self._checked(angles, "angles")
+        counts = np.rint(self.zero_counts + self.counts_per_rad * values)
+        low, high = self.counts_range()
+        self._refuse_first(values, (counts < low) | (counts > high))
+        return counts.astype(np.int16)
+
+    def to_radians(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Joint angles of integer units. Measured joints may lie a little beyond their range, so that is no error.
+
+        Args:
+            counts: Shape [..., J], integers that fit in 16 bits.
+
+        Returns:
+            Shape [..., J], rad.
+
+        Raises:
+            JointRangeError: Wrong number of joints, not finite, not an integer, or beyond 16 bits.
+        """
+        values = self._checked(counts, "counts")
+        bad = (values != np.rint(values)) | (values < INT16_RANGE[0]) | (values > INT16_RANGE[1])
+        if bad.any():
+            place = tuple(int(i) for i in np.argwhere(bad)[0])
+            raise JointRangeError(
+                f"joint {self.names[place[-1]]}: {values[place]!r} is not an integer unit of 16 bits "
+                f"({INT16_RANGE[0]} to {INT16_RANGE[1]})"
+            )
+        return np.asarray((values - self.zero_counts) / self.counts_per_rad, dtype=np.float64)
+
+    def _checked(self, values: ArrayLike, what: str) -> NDArray[np.float64]:
+        array = np.asarray(values, dtype=np.float64)
+        if array.ndim == 0 or array.shape[-1] != len(self.names):
+            raise JointRangeError(f"{what} have shape {array.shape}; the last axis must hold {len(self.names)} joints")
+        if not np.isfinite(array).all():
+            place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+            raise JointRangeError(f"joint {self.names[place[-1]]}: {array[place]} is not a finite number")
+        return array
+
+    def _refuse_first(self, angles: NDArray[np.float64], bad: NDArray[np.bool_]) -> None:
+        if not bad.any():
+            return
+        place = tuple(int(i) for i in np.argwhere(bad)[0])
+        joint = place[-1]
+        raise JointRangeError(
+            f"joint {self.names[joint]}: {np.rad2deg(angles[place]):.3f} deg is outside its range "
+            f"{np.rad2deg(self.lower[joint]):.3f} to {np.rad2deg(self.upper[joint]):.3f} deg"
+        )
