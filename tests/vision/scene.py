@@ -94,15 +94,21 @@ class Scene:
         self._draw = np.random.default_rng(seed)
         self._model = mujoco.MjModel.from_xml_string(_world(opening_half))
         self._data = mujoco.MjData(self._model)
-        self._renderer = mujoco.Renderer(self._model, 360 + 2 * MARGIN, 480 + 2 * MARGIN)
-        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._open_renderer()
         self.focal_px = 560.0 * look.focal_scale
         self._place_camera()
         self._set_lights()
         self._map = self._distortion_map()
 
     def close(self) -> None:
-        self._renderer.close()
+        self._context.free()
+        self._gl.free()
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def put(self, name: str, position: tuple[float, float, float], yaw: float = 0.0) -> None:
         """Put a body's centre at `position`; a standing cylinder's is 25 mm above the plane."""
@@ -119,9 +125,14 @@ class Scene:
     def image(self) -> NDArray[np.uint8]:
         """The image, BGR, [360, 480, 3]."""
         mujoco.mj_forward(self._model, self._data)
-        self._renderer.update_scene(self._data, camera="eye")
-        rgb = self._renderer.render()
-        bgr = cv2.remap(cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), *self._map, interpolation=cv2.INTER_LINEAR)
+        self._gl.make_current()
+        everything = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(self._model, self._data, self._options, None, self._eye, everything, self._scene)
+        rgb = np.zeros((360 + 2 * MARGIN, 480 + 2 * MARGIN, 3), np.uint8)
+        area = mujoco.MjrRect(0, 0, rgb.shape[1], rgb.shape[0])
+        mujoco.mjr_render(area, self._scene, self._context)
+        mujoco.mjr_readPixels(rgb, None, area, self._context)
+        bgr = cv2.remap(cv2.cvtColor(np.flipud(rgb), cv2.COLOR_RGB2BGR), *self._map, interpolation=cv2.INTER_LINEAR)
         noisy = bgr + self._draw.normal(0.0, self.look.noise, bgr.shape)
         return np.clip(np.round(noisy), 0, 255).astype(np.uint8)
 
@@ -131,6 +142,20 @@ class Scene:
         x, y = in_camera[0] / in_camera[2], in_camera[1] / in_camera[2]
         scale = 1 + self.look.k1 * (x * x + y * y)
         return np.array([self.focal_px * x * scale + 239.5, self.focal_px * y * scale + 179.5])
+
+    def _open_renderer(self) -> None:
+        """By EGL directly: mujoco.Renderer depends on MUJOCO_GL at the first import of mujoco anywhere in the tests."""
+        from mujoco.egl import GLContext
+
+        self._gl = GLContext(480 + 2 * MARGIN, 360 + 2 * MARGIN)
+        self._gl.make_current()
+        self._scene = mujoco.MjvScene(self._model, maxgeom=100)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._options = mujoco.MjvOption()
+        self._eye = mujoco.MjvCamera()
+        self._eye.type, self._eye.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, self._model.camera("eye").id
+        self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
 
     def _place_camera(self) -> None:
         look = self.look

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Any
 
 import cv2
@@ -18,7 +19,8 @@ from numpy.typing import NDArray
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.vision.full_size import FullSize
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]  # uint8; cv2's own annotations say only integer or floating
+MOST_PIECES = 6
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class ColourTracker:
         tracked.captured.FromNanoseconds(captured_ns)
         small = cv2.resize(image_bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
         hsv, chroma = _hue_and_chroma(small)
-        coloured = cv2.compare(chroma, _least_chroma(small, hsv), cv2.CMP_GE)
+        _, coloured = cv2.threshold(chroma, int(_least_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
         for colour in self._colours:
             box = self._find(_of_colour(hsv, coloured, colour))
             region = None if box is None else _measure(image_bgr, box, colour)
@@ -115,11 +117,15 @@ class ColourTracker:
 
     def _find(self, mask: Image) -> tuple[int, int, int, int] | None:
         """Box (left, top, right, bottom), full-resolution px, of the largest region and of its pieces beside it."""
-        count, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        x, y, width, height = cv2.boundingRect(mask)
+        if width == 0:
+            return None
+        _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
         least, most = self._least_area / 4, self._largest_share * mask.size
-        pieces = [row for row in stats[1:count] if row[cv2.CC_STAT_AREA] >= 2 and row[cv2.CC_STAT_AREA] <= most]
-        pieces.sort(key=lambda row: -int(row[cv2.CC_STAT_AREA]))
-        if not pieces or pieces[0][cv2.CC_STAT_AREA] < least:
+        areas = stats[1:, cv2.CC_STAT_AREA]
+        pieces = stats[1:][(areas >= max(2.0, 0.1 * least)) & (areas <= most)]
+        pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MOST_PIECES]
+        if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < least:
             return None
         left, top, right, bottom = _corners(pieces[0])
         reach = max(right - left, bottom - top)
@@ -130,7 +136,7 @@ class ColourTracker:
             if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
                 left, top = min(left, other[0]), min(top, other[1])
                 right, bottom = max(right, other[2]), max(bottom, other[3])
-        return 2 * left, 2 * top, 2 * right, 2 * bottom
+        return 2 * (x + left), 2 * (y + top), 2 * (x + right), 2 * (y + bottom)
 
     def _message(self, colour: Colour, region: Region) -> TrackedObject:
         kind = TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT
@@ -153,8 +159,7 @@ class ColourTracker:
         recent = self._recent[colour.name]
         recent.append(region)
         if self._stands_still(recent):
-            area = float(np.median([r.area_px for r in recent]))
-            height = float(np.median([r.height_px for r in recent]))
+            area, height = median(r.area_px for r in recent), median(r.height_px for r in recent)
             self._full_size.learn(colour.name, region.u_px, region.v_px, area, height)
         found.confidence = self._full_size.visible_share(colour.name, region.u_px, region.v_px, region.area_px)
         return found
@@ -162,8 +167,10 @@ class ColourTracker:
     def _stands_still(self, recent: deque[Region]) -> bool:
         if len(recent) < self.STILL_FRAMES:
             return False
-        centres = np.array([(r.u_px, r.v_px) for r in recent])
-        return bool(np.all(np.abs(centres - np.median(centres, axis=0)) < self.STILL_PX))
+        newest = recent[-1]
+        return all(
+            abs(r.u_px - newest.u_px) < self.STILL_PX and abs(r.v_px - newest.v_px) < self.STILL_PX for r in recent
+        )
 
 
 def _hue_and_chroma(image: Image) -> tuple[Image, Image]:
@@ -176,12 +183,13 @@ def _hue_and_chroma(image: Image) -> tuple[Image, Image]:
 def _least_chroma(image: Image, hsv: Image) -> float:
     """Chroma that neither noise nor a grey surface reaches, from this image alone.
 
-    Grows with the scene's brightness (a colour's chroma is proportional to the light) and with the noise (of the
-    difference of neighbours, whose median absolute value is 0.954 sigma; max - min of three channels stays below 5).
+    Grows with the scene's brightness (a colour's chroma is proportional to the light) and with the noise (max - min of
+    three grey channels stays below 5 sigma).
     """
-    bright = float(np.percentile(hsv[::6, ::6, 2], 90))
-    green = image[::3, :, 1].astype(np.int16)
-    noise = float(np.mean(np.abs(np.diff(green, axis=1)) * (np.abs(np.diff(green, axis=1)) < 20))) / 1.13
+    values = np.sort(hsv[::6, ::6, 2], axis=None)
+    bright = float(values[int(0.9 * values.size)])
+    steps = np.abs(np.diff(image[::6, :, 1].astype(np.int16), axis=1))
+    noise = float(np.minimum(steps, 20).mean()) / 1.13  # E|difference of neighbours| = 1.13 sigma
     return max(8.0, 0.09 * bright, 5.0 * noise)
 
 
@@ -191,8 +199,12 @@ def _of_colour(hsv: Image, coloured: Image, colour: Colour) -> Image:
     if low <= high:
         mask: Any = cv2.inRange(hsv, (low, least, 0), (high, 255, 255))
     else:
-        mask = cv2.inRange(hsv, (low, least, 0), (180, 255, 255)) | cv2.inRange(hsv, (0, least, 0), (high, 255, 255))
-    return cv2.bitwise_and(mask, coloured)  # type: ignore[no-any-return]
+        above, below = (
+            cv2.inRange(hsv, (low, least, 0), (180, 255, 255)),
+            cv2.inRange(hsv, (0, least, 0), (high, 255, 255)),
+        )
+        mask = cv2.bitwise_or(above, below)
+    return cv2.bitwise_and(mask, coloured)
 
 
 def _corners(row: NDArray[np.int32]) -> tuple[int, int, int, int]:
@@ -206,26 +218,23 @@ def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Re
     patch = cv2.GaussianBlur(image[top : box[3] + 5, left : box[2] + 5], (3, 3), 0.8)
     hsv, chroma = _hue_and_chroma(patch)
     of_hue = _of_colour(hsv, np.full_like(chroma, 255), Colour(colour.name, colour.hue_deg, 0.6 * colour.saturation))
-    core = chroma[(of_hue > 0) & (chroma >= np.percentile(chroma, 50))]
-    if core.size == 0:
+    of_hue_chroma = np.sort(chroma[(of_hue > 0) & (chroma > 0.25 * chroma.max())])
+    if of_hue_chroma.size == 0:
         return None
     # The 30th percentile is the region's shaded side; half of it is the border between region and grey background.
-    side = float(np.percentile(core, 30))
-    weight = np.clip((chroma - 0.25 * side) / (0.5 * side), 0.0, 1.0) * (of_hue > 0)
-    return _region(weight, left, top)
+    side = float(of_hue_chroma[int(0.3 * of_hue_chroma.size)])
+    weight = np.clip((chroma - 0.25 * side) * (2.0 / side), 0.0, 1.0) * (of_hue > 0)
+    return _region(weight, left, top, outlined=colour.hand)
 
 
-def _region(weight: NDArray[np.float64], left: int, top: int) -> Region | None:
+def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) -> Region | None:
     area = float(weight.sum())
     if area <= 0:
         return None
     columns, rows = weight.sum(axis=0), weight.sum(axis=1)
     left_edge, right_edge = _extent(columns)
     top_edge, bottom_edge = _extent(rows)
-    points = cv2.findNonZero((weight > 0.5).astype(np.uint8))
-    if points is None:
-        return None
-    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
+    outline = _outline(weight, left, top) if outlined else np.zeros((0, 2))
     return Region(
         u_px=left + float(columns @ np.arange(columns.size)) / area,
         v_px=top + float(rows @ np.arange(rows.size)) / area,
@@ -234,13 +243,22 @@ def _region(weight: NDArray[np.float64], left: int, top: int) -> Region | None:
         top_px=top + top_edge,
         width_px=right_edge - left_edge,
         height_px=bottom_edge - top_edge,
-        outline=hull + (left, top),
+        outline=outline,
     )
+
+
+def _outline(weight: NDArray[np.float64], left: int, top: int) -> NDArray[np.float64]:
+    """Convex hull of the pixels that belong to the region by more than a half; [M, 2] px."""
+    points = cv2.findNonZero((weight > 0.5).astype(np.uint8))
+    if points is None:
+        return np.zeros((0, 2))
+    return np.asarray(cv2.convexHull(points).reshape(-1, 2) + np.array([left, top]), dtype=np.float64)
 
 
 def _extent(profile: NDArray[np.float64]) -> tuple[float, float]:
     """Where a profile first and last crosses half of its typical value, to a part of a pixel."""
-    level = 0.5 * float(np.median(profile[profile > 0.2 * profile.max()]))
+    typical = np.sort(profile[profile > 0.2 * profile.max()])
+    level = 0.5 * float(typical[typical.size // 2])
     inside = np.flatnonzero(profile >= level)
     first, last = int(inside[0]), int(inside[-1])
     before = profile[first - 1] if first > 0 else 0.0

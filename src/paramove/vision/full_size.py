@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 PLACE_RADIUS_PX = 24.0
-"""Samples nearer than this belong to one place: about one object's width apart, over which the size changes by < 3 %."""
+"""Nearer samples belong to one place: about one object's width apart, over which the size changes by < 3 %."""
 ACCEPT_RATIO = 0.85
-"""A sample this much below expectation is taken for partly hidden. Depth over the working area changes areas by 13 %."""
+"""A sample below this share of what is expected is partly hidden. Depth over the working area changes areas by 13 %."""
 PLACES_PER_OBJECT = 12
 
 
@@ -74,7 +74,7 @@ class FullSize:
             value[row] = np.log(place.area_px), np.log(place.height_px)
         design[-2, -2] = design[-1, -1] = 0.2  # ridge: without spread of places the size is taken as constant
         solution = np.linalg.lstsq(design, value, rcond=None)[0]
-        self._slope = solution[-2:]
+        self._slope = np.asarray(solution[-2:], dtype=np.float64)
         self._model = {name: (float(solution[i, 0]), float(solution[i, 1])) for i, name in enumerate(names)}
 
 

@@ -1,0 +1,185 @@
+"""The homography between image points and the plane of object centres (thesis 5.2.6, step 2).
+
+"The mapping is a homography between two planes, which can be estimated based on four point correspondences." It holds
+for points of one plane: here the plane of the middles of standing objects, at the height at which the robot put them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration, PlaneCorrespondence
+
+Matrix = NDArray[np.float64]
+
+LEAST_FLATNESS = 0.03
+"""Three points count as collinear below this ratio of the triangle's height to its longest side."""
+
+
+class HomographyError(ValueError):
+    """The correspondences cannot give a homography; the message says why and what would."""
+
+
+@dataclass(frozen=True)
+class PlaneHomography:
+    """Maps image points (u, v), px, to points (x, y), m, of a plane at `plane_z` in `plane_frame`, and back.
+
+    Attributes:
+        plane_from_image_matrix: [3, 3], element (2, 2) is 1.
+        plane_z: height of the plane in `plane_frame`, m.
+        plane_frame, image_frame: names of the frames.
+        correspondences: [M, 4] rows (u_px, v_px, x, y) that it was fitted to.
+    """
+
+    plane_from_image_matrix: Matrix
+    plane_z: float = 0.0
+    plane_frame: str = "right_shoulder"
+    image_frame: str = "camera_optical"
+    correspondences: Matrix | None = None
+
+    @classmethod
+    def fit(cls, image_points: ArrayLike, plane_points: ArrayLike, plane_z: float = 0.0) -> PlaneHomography:
+        """Least-squares homography of >= 4 correspondences by the normalised DLT.
+
+        Args:
+            image_points: [M, 2] px. plane_points: [M, 2] m. plane_z: m, carried along.
+        Raises:
+            HomographyError: fewer than 4, not finite, collinear or coinciding points, or an image that is a mirrored
+                view of the plane (two points were mixed up: a camera above the plane never sees it mirrored).
+        """
+        image, plane = _points(image_points, "image"), _points(plane_points, "plane")
+        if len(image) != len(plane):
+            raise HomographyError(f"{len(image)} image points and {len(plane)} plane points: equal numbers needed")
+        if len(image) < 4:
+            raise HomographyError(
+                f"{len(image)} correspondences: at least 4 needed, such as the working area's corners"
+            )
+        _refuse_collinear(image, "image")
+        _refuse_collinear(plane, "plane")
+        matrix = _direct_linear_transform(image, plane)
+        homography = cls(matrix, plane_z, correspondences=np.hstack([image, plane]))
+        homography._refuse_mirrored(image)
+        return homography
+
+    @classmethod
+    def from_message(cls, message: PlaneCalibration) -> PlaneHomography:
+        """Raises HomographyError unless the message holds nine finite numbers that form an invertible matrix."""
+        matrix = np.array(message.plane_from_image, dtype=np.float64)
+        if matrix.size != 9 or not np.all(np.isfinite(matrix)):
+            raise HomographyError(f"plane_from_image holds {matrix.size} numbers {matrix}: nine finite ones needed")
+        matrix = matrix.reshape(3, 3)
+        if abs(np.linalg.det(matrix)) < 1e-15:
+            raise HomographyError(f"plane_from_image is singular: {matrix.tolist()}")
+        rows = [(c.u_px, c.v_px, c.x, c.y) for c in message.correspondences]
+        known = np.array(rows, dtype=np.float64) if rows else None
+        return cls(matrix, message.plane_z, message.plane_frame, message.image_frame, known)
+
+    def to_message(self, captured_ns: int = 0) -> PlaneCalibration:
+        message = PlaneCalibration(
+            image_frame=self.image_frame,
+            plane_frame=self.plane_frame,
+            plane_z=self.plane_z,
+            plane_from_image=self.plane_from_image_matrix.ravel().tolist(),
+        )
+        message.captured.FromNanoseconds(captured_ns)
+        for u, v, x, y in [] if self.correspondences is None else self.correspondences:
+            message.correspondences.append(PlaneCorrespondence(u_px=u, v_px=v, x=x, y=y))
+        return message
+
+    def plane_from_image(self, u_px: float, v_px: float) -> tuple[float, float]:
+        """(x, y), m. Raises ValueError for a point on the plane's horizon."""
+        return _apply(self.plane_from_image_matrix, u_px, v_px)
+
+    def image_from_plane(self, x: float, y: float) -> tuple[float, float]:
+        """(u, v), px. Raises ValueError for a point that is seen at no finite place."""
+        return _apply(np.asarray(np.linalg.inv(self.plane_from_image_matrix), dtype=np.float64), x, y)
+
+    def residuals(self) -> Matrix:
+        """Distance of each correspondence to its mapped image point, m, [M]. All 0 when there are just four."""
+        if self.correspondences is None:
+            return np.zeros(0)
+        mapped = np.array([self.plane_from_image(u, v) for u, v, _, _ in self.correspondences])
+        return np.asarray(np.linalg.norm(mapped - self.correspondences[:, 2:], axis=1), dtype=np.float64)
+
+    def away_from_camera(self, u_px: float, v_px: float, distance: float) -> tuple[float, float]:
+        """(x, y), m: the plane point under (u, v), moved by `distance`, m, to where the camera looks: up in the image.
+
+        Assumes that image up is away from the camera, which holds for a camera that is not rolled by more than a few
+        degrees: a roll of 6 degrees turns the direction by about 6 degrees.
+        """
+        here = np.array(self.plane_from_image(u_px, v_px))
+        behind = np.array(self.plane_from_image(u_px, v_px - 1.0))
+        moved = here + distance * (behind - here) / np.linalg.norm(behind - here)
+        return float(moved[0]), float(moved[1])
+
+    def _refuse_mirrored(self, image: Matrix) -> None:
+        depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]
+        if np.any(depths <= 0) and np.any(depths >= 0):
+            raise HomographyError("the horizon runs between the points: corners are mixed up, or a point is wrong")
+        # The image's v runs down, so a view from above reverses the sense of rotation: the determinant is negative.
+        if np.linalg.det(self.plane_from_image_matrix) * np.sign(depths[0]) >= 0:
+            raise HomographyError("the image shows the plane mirrored: two correspondences are mixed up")
+
+
+def _points(points: ArrayLike, which: str) -> Matrix:
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 2 or not np.all(np.isfinite(array)):
+        raise HomographyError(f"{which} points have shape {array.shape}: finite numbers of shape [M, 2] needed")
+    return array
+
+
+def _refuse_collinear(points: Matrix, which: str) -> None:
+    """Refuse points among which no four are found of which no three lie on one line."""
+    distances = np.linalg.norm(points[:, None] - points[None], axis=2)
+    i, j = np.unravel_index(int(np.argmax(distances)), distances.shape)
+    a, b = points[i], points[j]  # the farthest apart, then the farthest from their line, then the best fourth
+    c = points[int(np.argmax([_flatness(a, b, p) for p in points]))]
+    best = max(min(_flatness(a, b, c), _flatness(a, b, p), _flatness(a, c, p), _flatness(b, c, p)) for p in points)
+    if best < LEAST_FLATNESS:
+        raise HomographyError(
+            f"{which} points {points.tolist()} are (nearly) collinear or coincide: "
+            "four are needed of which no three lie on one line"
+        )
+
+
+def _flatness(a: Matrix, b: Matrix, c: Matrix) -> float:
+    """Height over longest side of the triangle; 0 for three points of one line."""
+    longest = float(max(np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(a - c)))
+    return abs(_cross(b - a, c - a)) / longest**2 if longest > 0 else 0.0
+
+
+def _cross(a: Matrix, b: Matrix) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+def _direct_linear_transform(image: Matrix, plane: Matrix) -> Matrix:
+    """Hartley and Zisserman, Multiple View Geometry, algorithm 4.2: with both point sets normalised."""
+    to_unit_image, to_unit_plane = _normalising(image), _normalising(plane)
+    u = np.hstack([image, np.ones((len(image), 1))]) @ to_unit_image.T
+    x = np.hstack([plane, np.ones((len(plane), 1))]) @ to_unit_plane.T
+    zero = np.zeros_like(u)
+    rows = np.vstack([np.hstack([u, zero, -x[:, :1] * u]), np.hstack([zero, u, -x[:, 1:2] * u])])
+    solution = np.linalg.svd(rows)[2][-1].reshape(3, 3)
+    matrix = np.linalg.inv(to_unit_plane) @ solution @ to_unit_image
+    if abs(matrix[2, 2]) < 1e-12 * np.abs(matrix).max():
+        raise HomographyError(
+            "the image's first pixel lies on the plane's horizon: the camera does not look at the plane"
+        )
+    return np.asarray(matrix / matrix[2, 2], dtype=np.float64)
+
+
+def _normalising(points: Matrix) -> Matrix:
+    """Similarity [3, 3] that moves the mean to 0 and makes the mean distance to it √2."""
+    mean = points.mean(axis=0)
+    scale = np.sqrt(2.0) / np.linalg.norm(points - mean, axis=1).mean()
+    return np.array([[scale, 0.0, -scale * mean[0]], [0.0, scale, -scale * mean[1]], [0.0, 0.0, 1.0]])
+
+
+def _apply(matrix: Matrix, a: float, b: float) -> tuple[float, float]:
+    x, y, w = matrix @ np.array([a, b, 1.0])
+    if not np.isfinite(w) or abs(w) < 1e-12:
+        raise ValueError(f"point ({a}, {b}) lies on the horizon and has no image")
+    return float(x / w), float(y / w)
