@@ -1,0 +1,138 @@
+"""Frames of a camera: their form, their checks, and how they travel in messages.
+
+Whatever a frame comes from (see `frame_sources`), it takes the same way: `Frame` -> `FrameChecks` -> `encode`.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from numpy.typing import NDArray
+
+Image = NDArray[Any]  # uint8 [H, W, 3], BGR
+
+CAMERA_FRAME = "camera_optical"
+BLACK_LEVEL = 3.0
+"""Mean of 255 below which a frame is black: a lens cap gives 0 to 2, the darkest lit scene of the demo about 25."""
+SATURATED_SHARE = 0.95
+_TO_BGR = {"bgr8": None, "8UC3": None, "rgb8": cv2.COLOR_RGB2BGR}
+
+
+class FrameError(RuntimeError):
+    """A frame that cannot be used, or none; the message says what was expected, what was found and what helps."""
+
+
+class EndOfFrames(FrameError):  # noqa: N818 - an end is no error of the file
+    """A recording has been played to its end."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture: image [H, W, 3] uint8 BGR, capture time in ns of the run's clock, count since the source opened."""
+
+    image_bgr: Image
+    captured_ns: int
+    index: int
+
+
+class FrameChecks:
+    """Refuses frames of the wrong size, black or saturated frames, and a picture that does not change any more.
+
+    Args:
+        width_px, height_px: Expected size.
+        frozen_after: So many equal frames in a row are a frozen camera: sensor noise makes real ones differ. 15 are one
+            second. 0 allows equal frames, for drawn videos.
+    """
+
+    def __init__(self, width_px: int, height_px: int, frozen_after: int = 15) -> None:
+        self._size = (width_px, height_px)
+        self._frozen_after = frozen_after
+        self._last_hash = -1
+        self._equal_frames = 0
+
+    def passed(self, frame: Frame) -> Frame:
+        """The same frame. Raises FrameError if it must not be used."""
+        check_shape(frame.image_bgr)
+        height, width = frame.image_bgr.shape[:2]
+        if (width, height) != self._size:
+            raise FrameError(
+                f"frame {frame.index} has {width} x {height} px, {self._size[0]} x {self._size[1]} expected; "
+                "set the camera's resolution or the node's width and height"
+            )
+        self._check_frozen(frame)
+        self._check_exposure(frame)
+        return frame
+
+    def _check_frozen(self, frame: Frame) -> None:
+        value = zlib.crc32(frame.image_bgr.tobytes())
+        self._equal_frames = self._equal_frames + 1 if value == self._last_hash else 1
+        self._last_hash = value
+        if self._frozen_after and self._equal_frames >= self._frozen_after:
+            raise FrameError(
+                f"the last {self._equal_frames} frames are identical: the camera is frozen or unplugged, replug it"
+            )
+
+    def _check_exposure(self, frame: Frame) -> None:
+        sparse = frame.image_bgr[::8, ::8]
+        if float(sparse.mean()) < BLACK_LEVEL:
+            raise FrameError(
+                f"frame {frame.index} is black (mean {float(sparse.mean()):.1f} of 255, {BLACK_LEVEL} needed): "
+                "take off the lens cap or switch on the light"
+            )
+        saturated = float((sparse.min(axis=2) >= 254).mean())
+        if saturated > SATURATED_SHARE:
+            raise FrameError(
+                f"frame {frame.index} is saturated ({saturated:.0%} of the pixels are white): shorten the exposure"
+            )
+
+
+def check_shape(image: Image) -> None:
+    """Raises FrameError unless the array is [H, W, 3] uint8."""
+    if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+        raise FrameError(f"array of shape {image.shape} and type {image.dtype} found, [H, W, 3] uint8 expected")
+
+
+def image_of_raw(message: RawImage) -> Image:
+    """BGR pixels of an uncompressed image. Raises FrameError for an unknown encoding or inconsistent sizes."""
+    if message.encoding not in _TO_BGR:
+        raise FrameError(f"raw image with encoding {message.encoding!r} found, one of {sorted(_TO_BGR)} expected")
+    step, size = message.step or 3 * message.width, len(message.data)
+    if not message.width or not message.height or step < 3 * message.width or size != step * message.height:
+        raise FrameError(
+            f"raw image of {message.width} x {message.height} px with rows of {step} bytes holds {size} bytes, "
+            f"{max(step, 3 * message.width) * message.height} expected"
+        )
+    rows: Image = np.frombuffer(message.data, np.uint8).reshape(message.height, step)
+    image = rows[:, : 3 * message.width].reshape(message.height, message.width, 3)
+    conversion = _TO_BGR[message.encoding]
+    return image if conversion is None else cv2.cvtColor(image, conversion)
+
+
+def encode(frame: Frame, jpeg_quality: int = 95) -> CompressedImage:
+    """JPEG with full colour resolution: halved colour, JPEG's default, would smear the borders that are measured."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality]
+    options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
+    done, data = cv2.imencode(".jpg", frame.image_bgr, options)
+    if not done:
+        raise FrameError(f"frame {frame.index} of shape {frame.image_bgr.shape} could not be encoded as JPEG")
+    message = CompressedImage(frame_id=CAMERA_FRAME, format="jpeg", data=data.tobytes())
+    message.timestamp.FromNanoseconds(frame.captured_ns)
+    return message
+
+
+def decode(message: CompressedImage) -> Image:
+    """BGR pixels of a compressed image. Raises FrameError for empty or corrupt data."""
+    image = None
+    if message.data:
+        image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        raise FrameError(
+            f"compressed image ({message.format!r}, {len(message.data)} bytes) cannot be decoded: JPEG or PNG expected"
+        )
+    return image
