@@ -1,0 +1,16 @@
+"""Parametric hidden Markov models: one model of a movement for all its parameters (thesis chapter 3)."""
+
+from paramove.phmm.description import MovementDescription
+from paramove.phmm.grid import ParameterGrid
+from paramove.phmm.interpolative import InterpolativePHMM
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.storage import ModelFileError
+
+__all__ = [
+    "InterpolativePHMM",
+    "ModelFileError",
+    "MovementDescription",
+    "ParameterEstimate",
+    "ParameterGrid",
+    "ParametricHMM",
+]

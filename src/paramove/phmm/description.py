@@ -1,0 +1,45 @@
+"""What a movement model is about: action, points, unit, frame, names of the parameters."""
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+
+@dataclass(frozen=True)
+class MovementDescription:
+    """Labels that travel with a model.
+
+    Attributes:
+        action: name of the action.
+        point_names: names of the body points whose x, y, z are stacked in a frame; () if there are none.
+        unit: unit of the frames' components.
+        frame: coordinate frame of the points.
+        parameter_names: one name per component of theta; () for unnamed.
+        duration: mean duration of the demonstrations in seconds; 0 if unknown.
+        arrival: progress tau at which the target is reached, the hand still open; -1 if there is none.
+        grasp: last progress tau at which the object is held; -1 if there is none.
+    """
+
+    action: str = "movement"
+    point_names: tuple[str, ...] = ()
+    unit: str = "m"
+    frame: str = "unspecified"
+    parameter_names: tuple[str, ...] = ()
+    duration: float = 0.0
+    arrival: float = -1.0
+    grasp: float = -1.0
+
+    def as_record(self) -> dict[str, Any]:
+        """Plain values for a file."""
+        return asdict(self)
+
+    @classmethod
+    def from_record(cls, record: dict[str, Any]) -> Self:
+        """From plain values. Raises ValueError for names that do not belong to a description."""
+        known = {field.name for field in fields(cls)}
+        unknown = sorted(set(record) - known)
+        if unknown:
+            raise ValueError(f"a description has {sorted(known)}, found also {unknown}")
+        values: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in record.items()
+        }
+        return cls(**values)

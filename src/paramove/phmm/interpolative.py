@@ -1,0 +1,191 @@
+"""The interpolative parametric HMM: multilinear interpolation of synchronised local HMMs on a grid (thesis 3.4)."""
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
+from paramove.hmm.estimation import Evaluator
+from paramove.hmm.sequences import check_length, checked_sequence
+from paramove.phmm.description import MovementDescription
+from paramove.phmm.grid import ParameterGrid
+from paramove.phmm.maximisation import curvature_covariance, maximum_over_cells
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.synchronisation import synchronised
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class InterpolativePHMM(ParametricHMM):
+    """Local HMMs at the points of a grid of any size and dimension, interpolated in between (3.6), (3.8)-(3.10).
+
+    Outside the grid the means extrapolate; the weights of covariances and durations are clamped (corrected). (3.6) is
+    applied to the duration distributions p_i(d), which for d_max = d_min + 1 is the same as interpolating transitions.
+
+    Args:
+        n_states, d_min, d_max, options, resampled_frames, description: as in `ParametricHMM`.
+        corners: for a cuboid that is not axis-parallel: theta of (0, 0, ..), (1, 0, ..), (0, 1, ..), ..; (P + 1, P).
+        shape: grid lines per dimension; with `corners` only. Without them the grid is found from theta.
+        local_iterations: EM steps of the local models, the first with the global responsibilities.
+        search_margin: how far outside the grid `estimate` looks, as a share of the grid.
+        covariance_inflation: factor on the covariance of `estimate`; above 1 since frames are not independent.
+
+    Attributes:
+        grid_: the ParameterGrid.
+        means_: shape (G, N, D), grid points with the last dimension fastest.
+        covariances_: shape (G, N, D, D).
+        durations_: shape (G, N, d_max).
+    """
+
+    def __init__(
+        self,
+        n_states: int = 20,
+        d_min: int = 4,
+        d_max: int = 6,
+        *,
+        options: TrainingOptions | None = None,
+        resampled_frames: int | None = None,
+        description: MovementDescription | None = None,
+        corners: tuple[tuple[float, ...], ...] | None = None,
+        shape: tuple[int, ...] | None = None,
+        local_iterations: int = 4,
+        search_margin: float = 0.25,
+        covariance_inflation: float = 1.0,
+    ) -> None:
+        super().__init__(
+            n_states, d_min, d_max, options=options, resampled_frames=resampled_frames, description=description
+        )
+        self.corners = corners
+        self.shape = shape
+        self.local_iterations = local_iterations
+        self.search_margin = search_margin
+        self.covariance_inflation = covariance_inflation
+
+    def _fit(self, sequences: list[Floats], theta: Floats) -> None:
+        grid = self._grid_for(theta)
+        groups = grouped(sequences, theta, grid)
+        options = self._training_options()
+        everything = LeftRightHMM(self.n_states, self.d_min, self.d_max, options=options).fit(sequences)
+        local = synchronised(everything.parameters, groups, options, self.local_iterations)
+        self.training_ = everything.training_
+        self._set_local(grid, local)
+
+    def _grid_for(self, theta: Floats) -> ParameterGrid:
+        if self.corners is None:
+            return ParameterGrid.from_theta(theta)
+        return ParameterGrid.from_corners(self.corners, self.shape or (2,) * theta.shape[1])
+
+    def _set_local(self, grid: ParameterGrid, local: list[Parameters]) -> None:
+        self.grid_ = grid
+        self.means_ = np.stack([one.means for one in local])
+        self.covariances_ = np.stack([one.covariances for one in local])
+        self.durations_ = np.stack([one.durations for one in local])
+
+    def at(self, theta: ArrayLike) -> LeftRightHMM:
+        """The interpolated HMM for theta (P,)."""
+        return LeftRightHMM.from_parameters(self._interpolated(self._coordinates(theta)), self.options)
+
+    def state_means(self, theta: ArrayLike) -> Floats:
+        """Means of all states for one theta (P,) or many (M, P) (5.2)-(5.4, corrected). Shape (N, D) or (M, N, D)."""
+        coordinates = self._coordinates(theta)
+        indices, weights = self.grid_.weights(np.atleast_2d(coordinates), clamped=False)
+        means = np.einsum("mc,mcnd->mnd", weights, self.means_[indices])
+        return cast(Floats, means[0] if coordinates.ndim == 1 else means)
+
+    def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
+        """Mean pose at progress tau (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
+        return self._at_progress(self.means_, theta, tau, clamped=False)
+
+    def progress_covariance(self, theta: ArrayLike, tau: float | Floats) -> Floats:
+        """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
+        return self._at_progress(self.covariances_, theta, tau, clamped=True)
+
+    def estimate(self, sequence: ArrayLike) -> ParameterEstimate:
+        """Maximum likelihood theta, searched per grid cell; covariance from the curvature of the log-likelihood."""
+        checked = self._resampled(checked_sequence(sequence, self.means_.shape[-1]))
+        check_length(len(checked), self.n_states, self.d_min, self.d_max)
+
+        def log_likelihood(coordinates: Floats) -> float:
+            return Evaluator.of(self._interpolated(coordinates)).log_likelihood(checked)
+
+        best, value = maximum_over_cells(log_likelihood, self.grid_.knots, self.search_margin, most_cells=4)
+        covariance = curvature_covariance(log_likelihood, best, widest=1.0 + 2.0 * self.search_margin)
+        edges = self.grid_.edges
+        spread = self.covariance_inflation * (edges.T @ covariance @ edges)
+        return ParameterEstimate(self.grid_.theta(best), spread, value)
+
+    def _coordinates(self, theta: ArrayLike) -> Floats:
+        values = np.asarray(theta, dtype=np.float64)
+        if not hasattr(self, "grid_"):
+            raise RuntimeError("this model is not trained yet: call fit, or load a file")
+        if values.shape[-1:] != (self.grid_.dimension,) or values.ndim > 2 or not np.isfinite(values).all():
+            raise ValueError(
+                f"theta has {self.grid_.dimension} finite components, found shape {values.shape}: {values}"
+            )
+        return self.grid_.coordinates(values)
+
+    def _interpolated(self, coordinates: Floats) -> Parameters:
+        indices, weights = self.grid_.weights(coordinates[None, :], clamped=False)
+        means = np.tensordot(weights[0], self.means_[indices[0]], axes=1)
+        indices, weights = self.grid_.weights(coordinates[None, :], clamped=True)
+        covariances = np.tensordot(weights[0], self.covariances_[indices[0]], axes=1)
+        durations = np.tensordot(weights[0], self.durations_[indices[0]], axes=1)
+        return Parameters(means, covariances, durations, self.d_min)
+
+    def _at_progress(self, values: Floats, theta: ArrayLike, tau: float | Floats, clamped: bool) -> Floats:
+        coordinates = self._coordinates(theta)
+        progress = np.asarray(tau, dtype=np.float64)
+        if not ((progress >= 0.0) & (progress <= 1.0)).all():
+            raise ValueError(f"progress lies in [0, 1], found {progress.min():.3g} to {progress.max():.3g}")
+        rows, progress = np.atleast_2d(coordinates), np.atleast_1d(progress)
+        n_rows = max(len(rows), len(progress))
+        rows, progress = np.broadcast_to(rows, (n_rows, rows.shape[1])), np.broadcast_to(progress, n_rows)
+        position = progress * (self.n_states - 1)
+        lower, upper = np.floor(position).astype(np.int64), np.ceil(position).astype(np.int64)
+        indices, weights = self.grid_.weights(rows, clamped)
+        share = (position - lower)[:, None]
+        result = np.einsum("mc,mc...->m...", weights * (1.0 - share), values[indices, lower[:, None]])
+        result += np.einsum("mc,mc...->m...", weights * share, values[indices, upper[:, None]])
+        single = coordinates.ndim == 1 and np.ndim(tau) == 0
+        return cast(Floats, result[0] if single else result)
+
+    def _arrays(self) -> dict[str, Floats]:
+        knots = {f"knots_{number}": line for number, line in enumerate(self.grid_.knots)}
+        grid = {"grid_origin": self.grid_.origin, "grid_edges": self.grid_.edges, **knots}
+        return {"means": self.means_, "covariances": self.covariances_, "durations": self.durations_, **grid}
+
+    def _set_arrays(self, arrays: dict[str, Floats]) -> None:
+        knots = tuple(arrays[f"knots_{number}"] for number in range(len(arrays["grid_origin"])))
+        self.grid_ = ParameterGrid(arrays["grid_origin"], arrays["grid_edges"], knots)
+        self.means_, self.covariances_ = arrays["means"], arrays["covariances"]
+        self.durations_ = arrays["durations"]
+        dim = self.means_.shape[-1]
+        states = (self.grid_.size, self.n_states)
+        expected = {"means": (*states, dim), "covariances": (*states, dim, dim), "durations": (*states, self.d_max)}
+        for name, shape in expected.items():
+            if arrays[name].shape != shape:
+                raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
+
+
+def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list[list[Floats]]:
+    """Sequences per grid point. Raises ValueError naming labels off the grid and grid points without sequences."""
+    if theta.shape[1] != grid.dimension:
+        raise ValueError(f"theta has {theta.shape[1]} components, the grid has {grid.dimension}")
+    index, distance = grid.nearest(theta)
+    if (distance > 0.1).any():
+        worst = int(distance.argmax())
+        nearest = np.round(grid.points()[index[worst]], 4).tolist()
+        raise ValueError(
+            f"{int((distance > 0.1).sum())} sequences are not at a grid point; sequence {worst} has theta "
+            f"{np.round(theta[worst], 4).tolist()}, its nearest point is {nearest}"
+        )
+    groups: list[list[Floats]] = [[] for _ in range(grid.size)]
+    for number, sequence in zip(index, sequences, strict=True):
+        groups[number].append(sequence)
+    empty = [np.round(grid.points()[number], 4).tolist() for number, group in enumerate(groups) if not group]
+    if empty:
+        shape = " x ".join(map(str, grid.shape))
+        raise ValueError(f"no training sequences at {len(empty)} of {grid.size} points of the {shape} grid: {empty}")
+    return groups

@@ -1,0 +1,197 @@
+"""The interface of all parametric HMMs: trained on labelled movements, evaluated at any parameter."""
+
+import inspect
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
+from paramove.hmm.sequences import check_length, checked_sequence, checked_sequences
+from paramove.hmm.synthesis import Timing, at_progress
+from paramove.phmm.description import MovementDescription
+from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
+
+Floats = NDArray[np.float64]
+
+
+class ParameterEstimate(NamedTuple):
+    """Maximum likelihood theta (P,), its covariance (P, P) and the log-likelihood there."""
+
+    theta: Floats
+    covariance: Floats
+    log_likelihood: float
+
+
+class ParametricHMM(ABC):
+    """A family of left-right HMMs lambda^theta (thesis chapter 3); theta in the user's unit, shape (P,).
+
+    Args:
+        n_states, d_min, d_max: as in `LeftRightHMM`.
+        options: training options.
+        resampled_frames: if given, every sequence is first brought to this many frames (thesis 4.1.2.1).
+        description: labels that are saved with the model.
+
+    Attributes:
+        parameter_bounds_: least and greatest theta of the training, shape (2, P).
+        training_: what training did.
+    """
+
+    def __init__(
+        self,
+        n_states: int = 20,
+        d_min: int = 4,
+        d_max: int = 6,
+        *,
+        options: TrainingOptions | None = None,
+        resampled_frames: int | None = None,
+        description: MovementDescription | None = None,
+    ) -> None:
+        self.n_states = n_states
+        self.d_min = d_min
+        self.d_max = d_max
+        self.options = options
+        self.resampled_frames = resampled_frames
+        self.description = description
+        self.parameter_bounds_: Floats | None = None
+        self.training_: TrainingSummary | None = None
+
+    @abstractmethod
+    def at(self, theta: ArrayLike) -> LeftRightHMM:
+        """The HMM for one parameter."""
+
+    @abstractmethod
+    def estimate(self, sequence: ArrayLike) -> ParameterEstimate:
+        """The parameter that makes a sequence most likely (thesis 4.1.2.3)."""
+
+    @abstractmethod
+    def state_means(self, theta: ArrayLike) -> Floats:
+        """Means of all states for one theta (P,) or many (M, P). Shape (N, D) or (M, N, D)."""
+
+    @abstractmethod
+    def _fit(self, sequences: list[Floats], theta: Floats) -> None:
+        """Train on checked sequences and theta of shape (K, P)."""
+
+    @abstractmethod
+    def _arrays(self) -> dict[str, Floats]:
+        """Everything learned, for a file."""
+
+    @abstractmethod
+    def _set_arrays(self, arrays: dict[str, Floats]) -> None:
+        """Take over what was learned from a file. Raises ValueError for shapes that do not fit."""
+
+    def fit(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
+        """Train on sequences (T_k, D) labelled with theta (K, P).
+
+        Raises SequenceLengthError for impossible lengths, ValueError for labels or values that do not fit.
+        """
+        checked = [self._resampled(sequence) for sequence in checked_sequences(sequences)]
+        labels = np.asarray(theta, dtype=np.float64)
+        labels = labels[:, None] if labels.ndim == 1 else labels
+        if labels.ndim != 2 or len(labels) != len(checked) or not np.isfinite(labels).all():
+            raise ValueError(
+                f"theta has one finite row per sequence: expected shape ({len(checked)}, P), found {labels.shape}"
+            )
+        for sequence in checked:
+            check_length(len(sequence), self.n_states, self.d_min, self.d_max)
+        self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
+        self._fit(checked, labels)
+        return self
+
+    def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:
+        """ln p(X | lambda^theta)."""
+        return self.at(theta).log_likelihood(self._resampled(checked_sequence(sequence)))
+
+    def score(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> float:
+        """Mean log-likelihood per sequence, for model selection."""
+        labels = np.asarray(theta, dtype=np.float64)
+        return float(np.mean([self.log_likelihood(x, label) for x, label in zip(sequences, labels, strict=True)]))
+
+    def synthesize(
+        self, theta: ArrayLike, n_samples: int | None = None, *, duration: float | None = None,
+        sample_rate: float = 60.0, timing: Timing = "uniform"
+    ) -> Floats:  # fmt: skip
+        """The prototype movement for theta (thesis 4.1.2.2), by number of samples or by duration in s. Shape (n, D)."""
+        if duration is not None:
+            if n_samples is not None:
+                raise ValueError("give n_samples or duration, not both")
+            n_samples = max(2, round(duration * sample_rate) + 1)
+        return self.at(theta).synthesize(n_samples, timing)
+
+    def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
+        """Mean pose at progress tau in [0, 1] (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
+        parameters = np.asarray(theta, dtype=np.float64)
+        if parameters.ndim == 1:
+            return at_progress(self.state_means(parameters), tau)
+        progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(parameters))
+        return np.stack([self.progress_mean(one, float(at)) for one, at in zip(parameters, progress, strict=True)])
+
+    def progress_covariance(self, theta: ArrayLike, tau: float | Floats) -> Floats:
+        """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
+        parameters = np.asarray(theta, dtype=np.float64)
+        if parameters.ndim == 1:
+            return at_progress(self.at(parameters).covariances_, tau)
+        progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(parameters))
+        return np.stack(
+            [self.progress_covariance(one, float(at)) for one, at in zip(parameters, progress, strict=True)]
+        )
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Constructor arguments, as scikit-learn expects."""
+        return {name: getattr(self, name) for name in self._parameter_names()}
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Change constructor arguments. Raises ValueError for an unknown name."""
+        known = self._parameter_names()
+        for name, value in parameters.items():
+            if name not in known:
+                raise ValueError(f"{type(self).__name__} has the parameters {known}, found {name!r}")
+            setattr(self, name, value)
+        return self
+
+    def save(self, path: str | Path) -> None:
+        """Write the trained model to one .npz file. Raises RuntimeError before training."""
+        if self.parameter_bounds_ is None:
+            raise RuntimeError("this model has nothing to save yet: call fit first")
+        arrays = {"parameter_bounds": self.parameter_bounds_, **self._arrays()}
+        write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a model of this class, or of any class when called on ParametricHMM.
+
+        Raises ModelFileError for a wrong version, class, shape or value, with what was expected and found.
+        """
+        record = read_record(Path(path))
+        known = {name: kind for name, kind in _CLASSES.items() if issubclass(kind, cls)}
+        if record.class_name not in known:
+            raise ModelFileError(f"{path}: expected one of {sorted(known)}, found a {record.class_name}")
+        try:
+            model = known[record.class_name](**record.parameters)
+            arrays = dict(record.arrays)
+            model.parameter_bounds_ = arrays.pop("parameter_bounds")
+            model._set_arrays(arrays)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ModelFileError(f"{path}: {error}") from error
+        model.training_ = record.training
+        return model
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        _CLASSES[cls.__name__] = cls
+
+    @classmethod
+    def _parameter_names(cls) -> list[str]:
+        return [name for name in inspect.signature(cls.__init__).parameters if name != "self"]
+
+    def _training_options(self) -> TrainingOptions:
+        return self.options if self.options is not None else TrainingOptions()
+
+    def _resampled(self, sequence: Floats) -> Floats:
+        return sequence if self.resampled_frames is None else resample(sequence, self.resampled_frames)
+
+
+_CLASSES: dict[str, type[ParametricHMM]] = {}  # what a file may name; filled as the classes are defined
