@@ -109,7 +109,7 @@ class _File(_Part):
     arms: dict[str, _Arm]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Arm:
     """One arm of a robot.
 
@@ -122,7 +122,7 @@ class Arm:
     """
 
     joints: tuple[str, ...]
-    indices: tuple[int, ...]
+    indices: NDArray[np.intp]
     fingers: str
     fingers_index: int
     fingers_open: float
@@ -137,7 +137,7 @@ class Arm:
         return self.fingers_closed + xi * (self.fingers_open - self.fingers_closed)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RobotDescription:
     """A robot's joints, limits, units and arms. Joint vectors are in the order of `joint_names`.
 
@@ -189,9 +189,9 @@ class RobotDescription:
             raise DescriptionError(f"{self.name} has no joint {joint!r}{hint}")
         return place
 
-    def indices(self, joints: Iterable[str]) -> tuple[int, ...]:
-        """Places of several joints."""
-        return tuple(self.index(joint) for joint in joints)
+    def indices(self, joints: Iterable[str]) -> NDArray[np.intp]:
+        """Places of several joints, ready to index a joint vector."""
+        return np.array([self.index(joint) for joint in joints], dtype=np.intp)
 
     @classmethod
     def load(cls, path: str | Path) -> RobotDescription:
@@ -277,7 +277,7 @@ def _assemble(path: Path, file: _File) -> RobotDescription:
 def _arm(names: tuple[str, ...], arm: _Arm) -> Arm:
     return Arm(
         joints=arm.joints,
-        indices=tuple(names.index(joint) for joint in arm.joints),
+        indices=np.array([names.index(joint) for joint in arm.joints], dtype=np.intp),
         fingers=arm.fingers.joint,
         fingers_index=names.index(arm.fingers.joint),
         fingers_open=float(np.deg2rad(arm.fingers.open_deg)),

@@ -1,0 +1,245 @@
+"""The one gate between a commanded movement and a motor: a pure function of time and inputs.
+
+No clock, no input or output, no threads. Not armed by default, and it never arms itself: only an arm word that a person
+(in simulation the operator node) said after this gate began, and after its last fault, arms it.
+
+Each step takes the rows proposed for the stream and gives the rows that may be sent. Whatever it gives ends at rest:
+the rows are followed by their own stop ramp, so a sender that dies leaves a robot that stops by itself.
+
+Gates, in order: 1 names, length and finite values; 2 epoch and age; 3 continuity with what was accepted; 4 soft position
+range; 5 jump; 6 velocity and acceleration with the nominal period. A violation is answered by a controlled stop along
+the path, then HOLD with the fault latched.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.safety.gate_io import (
+    ArmWord,
+    Fault,
+    Inputs,
+    Measured,
+    Proposal,
+    SafetySettings,
+    State,
+    Targets,
+)
+from paramove.safety.limits import SPAN, MotionLimits
+from paramove.safety.stop_ramp import stop_ramp
+
+FloatArray = NDArray[np.float64]
+
+
+class SafetyCore:
+    """The gate's state machine for one robot.
+
+    Args:
+        limits: Of all joints of the robot.
+        mechanical: Lower and upper mechanical limits, each [J], rad, for the check of the pose at arming.
+        epoch: Of the stream that this gate serves.
+        start_ns: Arm words captured at or before this time are another life's and are not heard.
+    """
+
+    def __init__(
+        self,
+        limits: MotionLimits,
+        mechanical: tuple[FloatArray, FloatArray],
+        epoch: int,
+        start_ns: int,
+        settings: SafetySettings | None = None,
+    ) -> None:
+        self.limits = limits
+        self.settings = settings or SafetySettings()
+        self.state = State.DISCONNECTED
+        self.faults: tuple[Fault, ...] = ()
+        self._mechanical = mechanical
+        self._epoch = epoch
+        self._heard_ns = start_ns  # only later arm words count
+        self._sent: Targets | None = None
+        self._disarm_after_stop = False
+        self._stopping_since_ns = 0
+
+    def step(self, now_ns: int, inputs: Inputs) -> tuple[Targets | None, State, tuple[Fault, ...]]:
+        """Advance to `now_ns`; returns the rows that may be sent (None: send nothing), the state and the faults."""
+        if not self._connected(now_ns, inputs.measured):
+            return None, self.state, self.faults
+        measured = inputs.measured
+        assert measured is not None  # _connected
+        if inputs.word is not None:
+            self._hear(inputs.word, measured)
+        targets: Targets | None = None
+        if self.state is State.ARMED:
+            targets = self._armed(now_ns, measured, inputs)
+        if self.state is State.STOPPING and targets is None:
+            self._rest(now_ns, measured)
+        return targets, self.state, self.faults
+
+    def _connected(self, now_ns: int, measured: Measured | None) -> bool:
+        if measured is None:
+            return False
+        age_ms = (now_ns - measured.captured_ns) * 1e-6
+        if age_ms > self.settings.measured_timeout_ms:
+            if self.state is not State.DISCONNECTED:
+                allowed = f"{self.settings.measured_timeout_ms:.0f} ms"
+                sentence = (
+                    f"the robot was last heard {age_ms:.0f} ms ago, allowed {allowed}; it comes to rest by itself; "
+                    "arm again once it is back"
+                )
+                self._disconnect(Fault("robot_silent", "", sentence))
+            return False
+        if self.state is State.DISCONNECTED:
+            self.state = State.DISARMED
+        return True
+
+    def _disconnect(self, fault: Fault) -> None:
+        self.state = State.DISCONNECTED
+        self.faults = (fault,)
+        self._sent = None
+
+    def _hear(self, word: ArmWord, measured: Measured) -> None:
+        if word.captured_ns <= self._heard_ns:
+            return
+        self._heard_ns = word.captured_ns
+        if not word.armed:
+            if self.state is State.ARMED and not measured.at_rest:
+                self.state = State.STOPPING
+                self._stopping_since_ns = word.captured_ns
+                self._disarm_after_stop = True
+            elif self.state is not State.STOPPING:
+                self.state = State.DISARMED
+            else:
+                self._disarm_after_stop = True
+            return
+        if self.state in (State.DISARMED, State.HOLD):
+            refusals = self.arming_faults(word, measured)
+            self.faults = refusals
+            if not refusals:
+                self.state = State.ARMED
+                self._sent = None
+
+    def arming_faults(self, word: ArmWord, measured: Measured) -> tuple[Fault, ...]:
+        """Every check that fails; none means that the gate may be armed."""
+        faults = []
+        if not word.source:
+            faults.append(Fault("arming_source", "", "the arm word names no source; say who arms"))
+        if not measured.at_rest:
+            faults.append(Fault("arming_moving", "", "the robot is moving; arm it at rest"))
+        lower, upper = self._mechanical
+        tolerance = self.settings.pose_tolerance
+        pairs = (("measured", measured.positions), ("commanded", measured.commanded))
+        for what, pose in pairs:
+            if pose.shape != lower.shape or not np.isfinite(pose).all():
+                faults.append(Fault("arming_pose_unknown", "", f"the {what} pose is not known: {pose}"))
+                continue
+            for joint in np.flatnonzero((pose < lower - tolerance) | (pose > upper + tolerance)):
+                sentence = (
+                    f"joint {self.limits.names[joint]} is {what} at {np.rad2deg(pose[joint]):.2f} deg, allowed "
+                    f"{np.rad2deg(lower[joint]):.2f} to {np.rad2deg(upper[joint]):.2f} deg; move it inside by hand"
+                )
+                faults.append(Fault("arming_pose_outside", self.limits.names[joint], sentence))
+        return tuple(faults)
+
+    def _armed(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
+        proposal = inputs.proposal
+        if inputs.stop is not None:
+            return self._stop(now_ns, inputs.stop, proposal, measured)
+        if proposal is None:
+            return None
+        fault, good_rows = self._judge(now_ns, proposal, measured)
+        if fault is not None:
+            return self._stop(now_ns, fault, proposal, measured, good_rows)
+        return self._accept(proposal.first_index, proposal.rows, proposal.ahead, measured)
+
+    def _judge(self, now_ns: int, proposal: Proposal, measured: Measured) -> tuple[Fault | None, int]:
+        """The first gate that refuses, and how many rows before the refused one are good."""
+        fault = self._judge_form(now_ns, proposal) or self._judge_place(proposal, measured)
+        if fault is not None:
+            return fault, 0
+        # The rows ahead are judged too: the stop ramp will run over them.
+        rows = np.concatenate([proposal.rows, proposal.ahead])
+        violation = self.limits.first_violation(rows, self._before(proposal.first_index, measured))
+        if violation is None:
+            return None, len(rows)
+        return Fault(violation.code, violation.joint, violation.sentence), violation.row
+
+    def _judge_form(self, now_ns: int, proposal: Proposal) -> Fault | None:
+        names, n_joints = self.limits.names, len(self.limits.names)
+        if proposal.joint_names != names:
+            return Fault(
+                "names", "", f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
+            )
+        for rows in (proposal.rows, proposal.ahead):
+            if rows.ndim != 2 or rows.shape[1] != n_joints:
+                return Fault("length", "", f"rows have shape {rows.shape}, allowed [N, {n_joints}]")
+        if not len(proposal.rows):
+            return Fault("length", "", "the proposal is empty, at least one row is needed")
+        if proposal.epoch != self._epoch:
+            return Fault("epoch", "", f"rows of epoch {proposal.epoch}, allowed {self._epoch}: of an earlier life")
+        age_ms = (now_ns - proposal.captured_ns) * 1e-6
+        if not 0.0 <= age_ms <= self.settings.proposal_age_ms:
+            allowed = f"0 to {self.settings.proposal_age_ms:.0f} ms"
+            return Fault("stale", "", f"rows were made {age_ms:.0f} ms ago, allowed {allowed}")
+        return None
+
+    def _judge_place(self, proposal: Proposal, measured: Measured) -> Fault | None:
+        first = proposal.first_index
+        if first < measured.next_index:
+            sentence = f"rows from index {first}, allowed from {measured.next_index}: earlier ones are played"
+            return Fault("played", "", sentence)
+        if self._sent is not None and first > self._sent.end_index:
+            return Fault("gap", "", f"rows from index {first}, allowed up to {self._sent.end_index}: no gap")
+        return None
+
+    def _before(self, first_index: int, measured: Measured) -> FloatArray:
+        """The rows already accepted just before `first_index`; the commanded pose where there are none."""
+        sent = self._sent
+        if sent is None or first_index <= sent.first_index:
+            return measured.commanded[None]
+        upto = first_index - sent.first_index
+        return sent.rows[max(0, upto - 2 * SPAN) : upto]
+
+    def _accept(self, first_index: int, rows: FloatArray, ahead: FloatArray, measured: Measured) -> Targets:
+        ramp = stop_ramp(rows[-1], ahead, self.limits) if len(ahead) else np.empty((0, rows.shape[1]))
+        targets = Targets(first_index, np.concatenate([rows, ramp]), len(ramp))
+        self._remember(targets, measured)
+        return targets
+
+    def _remember(self, targets: Targets, measured: Measured) -> None:
+        """Keep what the robot will play: rows accepted earlier up to the new ones, then the new ones."""
+        kept = self._before(targets.first_index, measured)
+        self._sent = Targets(targets.first_index - len(kept), np.concatenate([kept, targets.rows]), targets.ramp_rows)
+
+    def _stop(
+        self, now_ns: int, fault: Fault, proposal: Proposal | None, measured: Measured, good_rows: int | None = None
+    ) -> Targets | None:
+        """Latch the fault; give the rows of a stop that begins as early as the stream allows."""
+        self.faults = (*self.faults, fault)
+        self.state = State.STOPPING
+        self._stopping_since_ns = now_ns
+        if proposal is None or (good_rows is not None and good_rows < 1) or self._judge_place(proposal, measured):
+            return None  # what was sent before ends in its own ramp
+        path = np.concatenate([proposal.rows, proposal.ahead])[:good_rows]
+        before = self._before(proposal.first_index, measured)
+        ramp = stop_ramp(before[-1], path, self.limits)
+        if not len(ramp):
+            return None
+        targets = Targets(proposal.first_index, ramp, len(ramp))
+        self._remember(targets, measured)
+        return targets
+
+    def _rest(self, now_ns: int, measured: Measured) -> None:
+        """Leave STOPPING once the robot says that it rests."""
+        if not measured.at_rest:
+            return
+        played = self._sent is None or measured.next_index >= self._sent.end_index
+        # A report of rest can be older than the rows just sent; rows that were lost are waited for no longer than this.
+        if not played and now_ns - self._stopping_since_ns < self.settings.lost_rows_ms * 1e6:
+            return
+        self._sent = None
+        self._heard_ns = max(self._heard_ns, now_ns)  # a new arm word must be said after the stop
+        self.state = State.HOLD if self.faults else State.DISARMED
+        if self._disarm_after_stop:
+            self.state = State.DISARMED
+        self._disarm_after_stop = False

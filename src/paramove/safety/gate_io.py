@@ -1,0 +1,96 @@
+"""What the safety gate is told at each step and what it answers."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class State(enum.Enum):
+    """What the gate lets pass: rows only in ARMED, a stop ramp in STOPPING."""
+
+    DISCONNECTED = "disconnected"  # the robot is not heard
+    DISARMED = "disarmed"
+    ARMED = "armed"
+    STOPPING = "stopping"
+    HOLD = "hold"  # at rest after a fault, which stays until a new arm word
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why the gate does not let pass. `joint` is "" where no single joint is at fault."""
+
+    code: str
+    joint: str
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What the robot said of itself. Arrays [J], rad; `next_index` counts the stream's rows."""
+
+    captured_ns: int
+    positions: FloatArray
+    commanded: FloatArray
+    at_rest: bool
+    next_index: int
+
+
+@dataclass(frozen=True)
+class ArmWord:
+    """A word from outside to arm or disarm."""
+
+    captured_ns: int
+    source: str
+    armed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Rows to be streamed from `first_index`, [N, J], rad; `ahead` [M, J] follow them and serve the stop ramp only."""
+
+    captured_ns: int
+    epoch: int
+    joint_names: tuple[str, ...]
+    first_index: int
+    rows: FloatArray
+    ahead: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """All that a step may know. `stop` is a fault that the driver has found."""
+
+    measured: Measured | None = None
+    word: ArmWord | None = None
+    proposal: Proposal | None = None
+    stop: Fault | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Rows that may be sent, [N, J], rad, the last `ramp_rows` of which are the stop ramp."""
+
+    first_index: int
+    rows: FloatArray
+    ramp_rows: int
+
+    @property
+    def end_index(self) -> int:
+        """Index after the last row."""
+        return self.first_index + len(self.rows)
+
+
+@dataclass(frozen=True)
+class SafetySettings:
+    """Ages in ms, angles in rad."""
+
+    measured_timeout_ms: float = 500.0
+    proposal_age_ms: float = 250.0
+    lost_rows_ms: float = 500.0
+    pose_tolerance: float = float(np.deg2rad(0.5))

@@ -1,0 +1,176 @@
+"""A whole trajectory, judged before any of it is streamed, and the rows that will be streamed if it passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.safety.limits import MotionLimits
+from paramove.safety.path_sampling import largest_detour, sample_path
+
+FloatArray = NDArray[np.float64]
+
+MAX_DURATION_S = 120.0
+MAX_DETOUR = np.deg2rad(1.0)
+FADE_S = 0.5
+
+
+class TrajectoryRefusedError(ValueError):
+    """A trajectory that will not be played.
+
+    Attributes:
+        code: "joints", "times", "not_finite", "joint_limit", "start", "detour", "jump", "velocity" or "acceleration".
+        index: Point of the trajectory, from 0; -1 where no single point is at fault.
+        joint: Name of the joint; "" where no single joint is at fault.
+        asked, allowed: What was found and what would have passed.
+    """
+
+    def __init__(self, code: str, index: int, joint: str, asked: str, allowed: str) -> None:
+        where = f" at point {index}" if index >= 0 else ""
+        who = f", joint {joint}" if joint else ""
+        super().__init__(f"trajectory refused ({code}){where}{who}: asked {asked}, allowed {allowed}")
+        self.code = code
+        self.index = index
+        self.joint = joint
+        self.asked = asked
+        self.allowed = allowed
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedPath:
+    """Rows [N, J] of all joints, rad, one every `dt_s`; row 0 is the commanded pose, both ends are at rest."""
+
+    rows: FloatArray
+    dt_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """From the first row to the last."""
+        return (len(self.rows) - 1) * self.dt_s
+
+
+def check_trajectory(
+    joints: Sequence[str],
+    times_s: ArrayLike,
+    positions: Sequence[Sequence[float]],
+    commanded: FloatArray,
+    limits: MotionLimits,
+    start_tolerance: float,
+) -> CheckedPath:
+    """Check a trajectory and expand it to rows at the stream's period.
+
+    Args:
+        joints: Names of the joints that move; the others stay at `commanded`.
+        times_s: Shape [P], s, strictly increasing, the first 0.
+        positions: P lists of angles in rad, each as long as `joints`.
+        commanded: The pose that the robot is commanded to hold now, [J], rad.
+        limits: Of all J joints.
+        start_tolerance: How far the first point may lie from `commanded`, rad. The difference is faded out.
+
+    Raises:
+        TrajectoryRefusedError: With the point, the joint, what was asked and what is allowed.
+    """
+    places = _places(joints, limits)
+    points = _points(joints, positions)
+    times = _times(times_s, len(points))
+    _check_points(joints, points, places, commanded, limits, start_tolerance)
+    segment, column, detour = largest_detour(times, points)
+    if detour > MAX_DETOUR:
+        allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
+        raise TrajectoryRefusedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
+    moving = sample_path(times, points, limits.dt_s)
+    moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[places] - points[0])
+    rows = np.repeat(commanded[None], len(moving), axis=0)
+    rows[:, places] = moving
+    _check_rows(rows, places, times, commanded, limits)
+    return CheckedPath(rows, limits.dt_s)
+
+
+def _places(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
+    if not joints:
+        raise TrajectoryRefusedError("joints", -1, "", "no joints", "at least one")
+    for joint in joints:
+        if joint not in limits.names:
+            raise TrajectoryRefusedError("joints", -1, joint, "an unknown joint", ", ".join(limits.names))
+        if list(joints).count(joint) > 1:
+            raise TrajectoryRefusedError("joints", -1, joint, "the joint twice", "once")
+    return np.array([limits.names.index(joint) for joint in joints], dtype=np.intp)
+
+
+def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> FloatArray:
+    if len(positions) < 2:
+        raise TrajectoryRefusedError("times", -1, "", f"{len(positions)} points", "at least 2")
+    for index, point in enumerate(positions):
+        if len(point) != len(joints):
+            raise TrajectoryRefusedError("joints", index, "", f"{len(point)} angles", f"{len(joints)}")
+    points = np.array([list(point) for point in positions], dtype=np.float64)
+    bad = np.argwhere(~np.isfinite(points))
+    if len(bad):
+        index, column = (int(i) for i in bad[0])
+        raise TrajectoryRefusedError("not_finite", index, joints[column], f"{points[index, column]}", "finite angles")
+    return points
+
+
+def _times(times_s: ArrayLike, n_points: int) -> FloatArray:
+    times = np.asarray(times_s, dtype=np.float64)
+    if times.shape != (n_points,):
+        raise TrajectoryRefusedError("times", -1, "", f"{times.size} times", f"{n_points}, one a point")
+    if not np.isfinite(times).all():
+        index = int(np.argmin(np.isfinite(times)))
+        raise TrajectoryRefusedError("not_finite", index, "", f"time {times[index]} s", "finite times")
+    if times[0] != 0.0:
+        raise TrajectoryRefusedError("times", 0, "", f"{times[0]:.6g} s", "0 s at the first point")
+    steps = np.diff(times)
+    if (steps <= 0).any():
+        index = int(np.argmax(steps <= 0)) + 1
+        asked = f"{times[index]:.6g} s after {times[index - 1]:.6g} s"
+        raise TrajectoryRefusedError("times", index, "", asked, "times that increase strictly")
+    if times[-1] > MAX_DURATION_S:
+        raise TrajectoryRefusedError("times", n_points - 1, "", f"{times[-1]:.6g} s", f"up to {MAX_DURATION_S:g} s")
+    return times
+
+
+def _check_points(
+    joints: Sequence[str],
+    points: FloatArray,
+    places: NDArray[np.intp],
+    commanded: FloatArray,
+    limits: MotionLimits,
+    start_tolerance: float,
+) -> None:
+    lower, upper = np.rad2deg(limits.lower[places]), np.rad2deg(limits.upper[places])
+    degrees = np.rad2deg(points)
+    outside = np.argwhere((degrees < lower - 1e-6) | (degrees > upper + 1e-6))
+    if len(outside):
+        index, column = (int(i) for i in outside[0])
+        allowed = f"{lower[column]:.4g} to {upper[column]:.4g} deg"
+        raise TrajectoryRefusedError("joint_limit", index, joints[column], f"{degrees[index, column]:.4g} deg", allowed)
+    away = np.abs(points[0] - commanded[places])
+    if (away > start_tolerance).any():
+        column = int(np.argmax(away))
+        allowed = f"within {np.rad2deg(start_tolerance):.3g} deg of the commanded {_deg(commanded[places][column])}"
+        raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
+
+
+def _check_rows(
+    rows: FloatArray, places: NDArray[np.intp], times: FloatArray, commanded: FloatArray, limits: MotionLimits
+) -> None:
+    found = limits.first_violation(rows, commanded[None], rest_at_end=True)
+    if found is None:
+        return
+    row_time = min(found.row * limits.dt_s, times[-1])
+    index = int(np.searchsorted(times, row_time, side="left"))
+    raise TrajectoryRefusedError(found.code, index, found.joint, f"{found.asked:.4g} {found.unit}", found.allowed)
+
+
+def _fade(n_rows: int, dt_s: float) -> FloatArray:
+    """From 1 at the first row to 0 after `FADE_S` or at the last row, at rest at both ends, [N]."""
+    u = np.clip(np.arange(n_rows) * dt_s / min(FADE_S, (n_rows - 1) * dt_s), 0.0, 1.0)
+    return np.asarray(1.0 - (10 * u**3 - 15 * u**4 + 6 * u**5))
+
+
+def _deg(angle: float) -> str:
+    return f"{np.rad2deg(angle):.4g} deg"
