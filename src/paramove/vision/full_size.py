@@ -50,8 +50,11 @@ class FullSize:
 
     def learn(self, name: str, u_px: float, v_px: float, area_px: float, height_px: float) -> None:
         """Take in one sample of an object that stands still."""
-        if self.visible_share(name, u_px, v_px, area_px) < ACCEPT_RATIO:
+        full = self.expected(name, u_px, v_px)
+        if full is not None and area_px < ACCEPT_RATIO * full[0]:
             return
+        if full is not None and area_px > full[0] / ACCEPT_RATIO:
+            self._places[name] = []  # what was learned of it was partly hidden
         places = self._places.setdefault(name, [])
         near = min(places, key=lambda place: _distance(place, u_px, v_px), default=None)
         if near is None or _distance(near, u_px, v_px) > PLACE_RADIUS_PX:

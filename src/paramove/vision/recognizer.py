@@ -1,0 +1,151 @@
+"""From tracked objects to gestures: appeared, moved, rested, vanished, pointed at (thesis 5.2.6, steps 3 and 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
+from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
+from paramove.vision.full_size import FullSize
+from paramove.vision.homography import PlaneHomography
+from paramove.vision.object_motion import Happening, MotionThresholds, ObjectMotion, State
+from paramove.vision.pointing import Pointing, PointingThresholds
+from paramove.vision.sinking import Sample
+
+HAND_SEEN_S = 0.18
+HAND_GONE_S = 0.5
+
+
+@dataclass(frozen=True)
+class RecognizerOptions:
+    """Thresholds, and what is known of the tool box.
+
+    Attributes:
+        rim_clearance: Horizontal gap of a standing object's side and an opening's near rim, m: 10 mm for a cylinder of
+            20 mm in an opening of 28 mm with a chamfer of 6 mm. A sinking object is first cut off by that rim, so it
+            is seen this much nearer to the camera than it is.
+    """
+
+    motion: MotionThresholds = field(default_factory=MotionThresholds)
+    pointing: PointingThresholds = field(default_factory=PointingThresholds)
+    rim_clearance: float = 0.010
+
+
+class Recognizer:
+    """Keeps a small state per object and says what happens to it, in the order of names, objects before the hand."""
+
+    def __init__(self, options: RecognizerOptions | None = None) -> None:
+        self._options = options or RecognizerOptions()
+        self._full_size = FullSize()
+        self._objects: dict[str, ObjectMotion] = {}
+        self._last_seen: dict[str, Sample] = {}
+        self._pointing = Pointing(self._options.pointing)
+        self._hand = _HandPresence()
+        self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
+        self._newest_s = float("-inf")
+
+    def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
+        """What happens in this image. An image not newer than the one before is ignored.
+
+        Raises HomographyError if the calibration holds no homography.
+        """
+        now_s = tracked.captured.ToNanoseconds() * 1e-9
+        if now_s <= self._newest_s:
+            return []
+        self._newest_s = now_s
+        homography = self._homography(calibration)
+        hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
+        said: list[Gesture] = []
+        for name, happening in self._follow_objects(tracked, hand, now_s):
+            said.append(self._gesture(tracked, name, happening, homography))
+        said += [self._gesture(tracked, "", moment, homography) for moment in self._hand.update(hand, now_s)]
+        pointed_at = self._pointed_at(hand, now_s, homography)
+        if pointed_at is not None:
+            said.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
+        return said
+
+    def _follow_objects(
+        self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float
+    ) -> list[tuple[str, Happening]]:
+        seen = {s.name: Sample.of(s, now_s) for s in tracked.objects if s.kind == TrackedObject.KIND_OBJECT}
+        self._last_seen |= seen
+        happened: list[tuple[str, Happening]] = []
+        for name in sorted(self._last_seen):
+            if name not in self._objects:
+                self._objects[name] = ObjectMotion(name, self._full_size, self._options.motion)
+            near = hand is not None and _touch(hand, self._last_seen[name])
+            happened += [(name, moment) for moment in self._objects[name].update(seen.get(name), now_s, near)]
+        return happened
+
+    def _pointed_at(
+        self, hand: TrackedObject | None, now_s: float, homography: PlaneHomography | None
+    ) -> tuple[str, Happening] | None:
+        resting = {
+            name: motion.place
+            for name, motion in self._objects.items()
+            if motion.state is State.RESTING and motion.place is not None
+        }
+        any_moving = any(motion.state is State.MOVING for motion in self._objects.values())
+        name = self._pointing.update(now_s, hand, resting, any_moving, homography)
+        if name is None:
+            return None
+        place = resting[name]
+        return name, Happening(Gesture.KIND_POINTED_AT, place.u_px, place.v_px, self._objects[name].share(place))
+
+    def _homography(self, calibration: PlaneCalibration | None) -> PlaneHomography | None:
+        if calibration is None:
+            return None
+        if self._calibrated is None or self._calibrated[0] != calibration:
+            self._calibrated = (calibration, PlaneHomography.from_message(calibration))
+        return self._calibrated[1]
+
+    def _gesture(
+        self, tracked: TrackedObjects, name: str, happening: Happening, homography: PlaneHomography | None
+    ) -> Gesture:
+        gesture = Gesture(
+            captured=tracked.captured,
+            kind=happening.kind,
+            object=name,
+            u_px=happening.u_px,
+            v_px=happening.v_px,
+            confidence=happening.confidence,
+        )
+        if homography is not None and name:
+            clearance = self._options.rim_clearance if happening.sunk else 0.0
+            gesture.located, gesture.frame = True, homography.plane_frame
+            gesture.x, gesture.y = homography.away_from_camera(happening.u_px, happening.v_px, clearance)
+        return gesture
+
+
+class _HandPresence:
+    """Says once when the hand comes and once when it has gone."""
+
+    def __init__(self) -> None:
+        self._present = False
+        self._change_s: float | None = None
+        self._place = (0.0, 0.0)
+
+    def update(self, hand: TrackedObject | None, now_s: float) -> list[Happening]:
+        if hand is not None:
+            self._place = (hand.u_px, hand.v_px)
+        if (hand is not None) == self._present:
+            self._change_s = None
+            return []
+        self._change_s = now_s if self._change_s is None else self._change_s
+        if now_s - self._change_s + 1e-6 < (HAND_GONE_S if self._present else HAND_SEEN_S):
+            return []
+        self._present, self._change_s = not self._present, None
+        kind = Gesture.KIND_HAND_APPEARED if self._present else Gesture.KIND_HAND_VANISHED
+        return [Happening(kind, *self._place, confidence=1.0)]
+
+
+def _touch(hand: TrackedObject, place: Sample) -> bool:
+    """Whether the hand's box, widened by half an object, overlaps the object's."""
+    margin = 0.5 * place.width_px
+    return (
+        hand.left_px - margin < place.right_px
+        and hand.left_px + hand.width_px + margin > place.left_px
+        and hand.top_px - margin < place.bottom_px
+        and hand.top_px + hand.height_px + margin > place.top_px
+    )
