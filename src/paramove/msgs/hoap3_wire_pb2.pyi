@@ -26,7 +26,7 @@ class StreamBatch(_message.Message):
     def __init__(self, epoch: _Optional[int] = ..., first_index: _Optional[int] = ..., period_us: _Optional[int] = ..., joint_count: _Optional[int] = ..., stop_ramp_frames: _Optional[int] = ..., frames: _Optional[bytes] = ..., crc: _Optional[int] = ...) -> None: ...
 
 class Hoap3State(_message.Message):
-    __slots__ = ("captured", "epoch", "next_index", "depth", "playing", "counts", "refused_batches", "refusal")
+    __slots__ = ("captured", "epoch", "next_index", "depth", "playing", "counts", "refused_batches", "refusal", "target_counts")
     class Playing(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         PLAYING_UNSPECIFIED: _ClassVar[Hoap3State.Playing]
@@ -47,6 +47,7 @@ class Hoap3State(_message.Message):
     COUNTS_FIELD_NUMBER: _ClassVar[int]
     REFUSED_BATCHES_FIELD_NUMBER: _ClassVar[int]
     REFUSAL_FIELD_NUMBER: _ClassVar[int]
+    TARGET_COUNTS_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     epoch: int
     next_index: int
@@ -55,4 +56,5 @@ class Hoap3State(_message.Message):
     counts: _containers.RepeatedScalarFieldContainer[int]
     refused_batches: int
     refusal: str
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., epoch: _Optional[int] = ..., next_index: _Optional[int] = ..., depth: _Optional[int] = ..., playing: _Optional[_Union[Hoap3State.Playing, str]] = ..., counts: _Optional[_Iterable[int]] = ..., refused_batches: _Optional[int] = ..., refusal: _Optional[str] = ...) -> None: ...
+    target_counts: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., epoch: _Optional[int] = ..., next_index: _Optional[int] = ..., depth: _Optional[int] = ..., playing: _Optional[_Union[Hoap3State.Playing, str]] = ..., counts: _Optional[_Iterable[int]] = ..., refused_batches: _Optional[int] = ..., refusal: _Optional[str] = ..., target_counts: _Optional[_Iterable[int]] = ...) -> None: ...

@@ -6,7 +6,7 @@ No clock, no input or output, no threads. Not armed by default, and it never arm
 Each step takes the rows proposed for the stream and gives the rows that may be sent. Whatever it gives ends at rest:
 the rows are followed by their own stop ramp, so a sender that dies leaves a robot that stops by itself.
 
-Gates, in order: 1 names, length and finite values; 2 epoch and age; 3 continuity with what was accepted; 4 soft position
+Gates, in order: 1 names, length, finite values; 2 epoch and age; 3 continuity with what was accepted; 4 soft position
 range; 5 jump; 6 velocity and acceleration with the nominal period. A violation is answered by a controlled stop along
 the path, then HOLD with the fault latched.
 """
