@@ -60,7 +60,7 @@ class Subscriber:
         self.name = name or topic.name
         self.counter = SequenceCounter()
         self.connected = False
-        self.rebuilt = 0
+        self.reopened = 0
         self._context = context
         self._endpoint = f"ipc://{socket_path(folder, self.name)}"
         self._frame = self.name.encode() + b"\0"
@@ -103,11 +103,11 @@ class Subscriber:
             if self.counter.accept(envelope) is Arrival.NEW:
                 return envelope, frames[2]
 
-    def watch(self) -> None:
-        """Notices a lost connection and opens the socket anew if libzmq has given it up.
+    def is_deaf(self) -> bool:
+        """Whether libzmq has given the connection up for good, so that only `reopen` helps.
 
-        To be called a few times a second. libzmq drops a connection for good when a message exceeds MAXMSGSIZE or the
-        other side does not speak its protocol: the socket would stay deaf.
+        To be asked a few times a second. libzmq drops a connection for ever when a message exceeds MAXMSGSIZE or the
+        other side does not speak its protocol. Also keeps `connected` up to date.
         """
         while self._monitor.poll(0):
             event = parse_monitor_message(self._monitor.recv_multipart(zmq.NOBLOCK))["event"]
@@ -117,11 +117,14 @@ class Subscriber:
                 self.connected, self._disconnected_s = True, None
             else:  # it tries again
                 self._disconnected_s = None
-        if self._disconnected_s is not None and time.monotonic() - self._disconnected_s > DEAF_AFTER_S:
-            _log.warning("topic %s: connection given up by libzmq, opened anew", self.name)
-            self.close()
-            self._open()
-            self.rebuilt += 1
+        return self._disconnected_s is not None and time.monotonic() - self._disconnected_s > DEAF_AFTER_S
+
+    def reopen(self) -> None:
+        """Closes the socket and opens another. Counts go on: what is missed meanwhile is a loss."""
+        self.close()
+        self.connected = False
+        self._open()
+        self.reopened += 1
 
     def close(self) -> None:
         """Closes the socket; messages not yet received are gone."""

@@ -1,0 +1,217 @@
+"""Lockstep, the simulator's side: says the clock and waits for the members.
+
+barrier = LockstepBarrier(bus)
+if barrier.wait_for_members():
+    while not bus.stopped:
+        bus.publish(...)                            # what the world shows at this time
+        for heard in barrier.advance(now_ns): ...   # says the beat; what the members said in it
+        # step the world by one period
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from typing import Any
+
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.bus import Bus
+from paramove.bus.endpoint import Ownership, prepare_folder, socket_path
+from paramove.bus.envelope import RefusedError, unpack
+from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
+from paramove.bus.schema_hash import schema_hash
+from paramove.bus.subscriber import Heard
+from paramove.bus.turns import TICK_PERIOD_NS
+from paramove.msgs.clock_pb2 import Clock, TickDone
+
+_log = logging.getLogger(__name__)
+
+COMPLAINT_PERIOD_S = 5.0
+
+
+class LockstepBarrier:
+    """The one who says the clock.
+
+    With `bus.settings.lockstep` a beat ends when every member has said DONE. A member whose process ends or that says
+    LEAVE is waited for no more and is named in `lost`; when it is started again it joins at the next beat. There is no
+    time limit: a member that hangs is named in the log every 5 s, and the supervisor decides what becomes of it.
+    Without lockstep the clock is only said, and its caller paces it.
+
+    Args:
+        bus: A bus that says `clock`.
+        members: Names of the nodes to wait for; default `bus.settings.members`.
+
+    Attributes:
+        members: Nodes that time waits for at present.
+        lost: Nodes that have left, in order.
+        tick: Number of the newest beat. 0 is the handshake.
+    """
+
+    def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:
+        self._bus = bus
+        self._exchange = bus.exchange
+        self._lockstep = bus.settings.lockstep
+        self._expected = (
+            frozenset(bus.settings.members if members is None else members) if self._lockstep else frozenset()
+        )
+        self._marks: dict[str, dict[str, tuple[int, int]]] = {}  # by member
+        self._pidfds: dict[str, int] = {}
+        self._answered: set[str] = set()
+        self._newcomers: dict[str, TickDone] = {}
+        self.lost: list[str] = []
+        self.tick = 0
+        if self._lockstep:
+            bus.hold()
+            self._open()
+
+    @property
+    def members(self) -> frozenset[str]:
+        """Nodes that time waits for at present."""
+        return frozenset(self._marks)
+
+    def wait_for_members(self) -> bool:
+        """Waits until every expected member has joined and everybody hears everybody; False if the bus was stopped.
+
+        What the simulator says before is kept and goes out afterwards, so that nobody misses it.
+        """
+        if not self._lockstep:
+            return not self._exchange.stopped
+        while not self._exchange.stopped and self._expected - self._newcomers.keys():
+            self._wait(self._expected - self._newcomers.keys(), "join")
+        self._beat(self._bus.now_ns)
+        self._bus.read_up_to(self._all_marks(), keep=True)
+        self._bus.release()
+        return not self._exchange.stopped
+
+    def advance(self, now_ns: int) -> list[Heard]:
+        """Says the next beat and, in lockstep, waits until all members are done with it.
+
+        Args:
+            now_ns: Simulated time of the beat, not before the last one.
+
+        Returns:
+            What was said to this bus in the beat, in an order that is the same in every run.
+        """
+        self.tick += 1
+        self._beat(now_ns)
+        return self._bus.read_up_to(self._all_marks())
+
+    def _beat(self, now_ns: int) -> None:
+        self._admit()
+        self._bus.keep_time(now_ns)
+        self._answered.clear()
+        beat = Clock(time_ns=now_ns, tick=self.tick, period_ns=TICK_PERIOD_NS, lockstep=self._lockstep)
+        beat.said.extend(from_marks(self._all_marks()))
+        self._bus.say_at_once(topics.CLOCK, beat)
+        while not self._exchange.stopped and (missing := self._marks.keys() - self._answered):
+            self._wait(missing, f"be done with tick {self.tick}")
+
+    def _all_marks(self) -> dict[str, tuple[int, int]]:
+        marks = self._exchange.marks()
+        for said in self._marks.values():
+            marks |= said
+        return marks
+
+    def _open(self) -> None:
+        folder = self._exchange.settings.folder
+        prepare_folder(folder)
+        path = socket_path(folder, SERVICE)
+        ownership = Ownership(path, self._bus.node)
+        self._socket: zmq.Socket[Any] = self._exchange.context.socket(zmq.ROUTER)
+        self._socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a restarted member comes with the name of the dead one
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.bind(f"ipc://{path}")
+        self._exchange.add_socket(self._socket, ownership)
+
+    def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
+        """Reads answers until there is one or a member ended; complains about whom it waits for."""
+        complaint_s = time.monotonic() + COMPLAINT_PERIOD_S
+        while not self._exchange.stopped:
+            if self._read_answers() or self._bury_the_dead():
+                return
+            self._exchange.wait(COMPLAINT_PERIOD_S)
+            if time.monotonic() > complaint_s:
+                complaint_s += COMPLAINT_PERIOD_S
+                _log.warning("lockstep: time waits for %s to %s", ", ".join(sorted(missing)), what)
+
+    def _read_answers(self) -> bool:
+        changed = False
+        while self._socket.poll(0):
+            frames = self._socket.recv_multipart(zmq.NOBLOCK)
+            try:
+                if len(frames) != 3:
+                    continue
+                unpack(frames[1], frames[2], schema_hash(TickDone), 2**20)
+            except RefusedError as error:
+                _log.warning("lockstep: answer refused: %s", error)
+                continue
+            changed |= self._take(TickDone.FromString(frames[2]))
+        return changed
+
+    def _take(self, answer: TickDone) -> bool:
+        node = answer.node
+        if answer.kind == TickDone.KIND_JOIN:
+            if node in self._marks:
+                self._remove(node, "was started again")
+            if self._watch_process(node, answer.pid):
+                self._newcomers[node] = answer
+            return True
+        if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:
+            return False  # of a process that is no member any more
+        self._marks[node] = to_marks(answer.said)
+        if answer.kind == TickDone.KIND_LEAVE:
+            self._remove(node, "left")
+        elif answer.tick == self.tick:
+            self._answered.add(node)
+        return True
+
+    def _admit(self) -> None:
+        """Takes newcomers in; done between beats only, so that each beat has one set of members."""
+        for node, greeting in sorted(self._newcomers.items()):
+            self._marks[node] = to_marks(greeting.said)
+            if self.tick > 0:
+                _log.warning("lockstep: %s joins at tick %d", node, self.tick)
+        self._newcomers.clear()
+
+    def _watch_process(self, node: str, pid: int) -> bool:
+        """Begins to watch for the end of a process; False if it has ended already."""
+        self._unwatch(node)
+        try:
+            self._pidfds[node] = os.pidfd_open(pid)
+        except ProcessLookupError:
+            return False
+        self._exchange.watch_descriptor(self._pidfds[node])
+        return True
+
+    def _unwatch(self, node: str) -> None:
+        descriptor = self._pidfds.pop(node, None)
+        if descriptor is not None:
+            self._exchange.watch_descriptor(descriptor, watched=False)
+            os.close(descriptor)
+
+    def _bury_the_dead(self) -> bool:
+        """Removes members whose process has ended; whether there was one."""
+        poller = zmq.Poller()
+        for descriptor in self._pidfds.values():
+            poller.register(descriptor, zmq.POLLIN)
+        ended = dict(poller.poll(0)) if self._pidfds else {}
+        names = [node for node, descriptor in self._pidfds.items() if descriptor in ended]
+        for node in names:
+            self._newcomers.pop(node, None)
+            self._remove(node, "ended")
+        return bool(names)
+
+    def _remove(self, node: str, what: str) -> None:
+        self._unwatch(node)
+        self._answered.discard(node)
+        if self._marks.pop(node, None) is not None:
+            self.lost.append(node)
+            _log.warning("lockstep: member %s %s at tick %d; time no longer waits for it", node, what, self.tick)
+
+    def close(self) -> None:
+        """Forgets the members; the sockets are the bus's."""
+        for node in list(self._pidfds):
+            self._unwatch(node)

@@ -1,0 +1,301 @@
+"""The bus as a node sees it."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import os
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, overload
+
+from paramove.bus import topics
+from paramove.bus.exchange import Exchange, Marks
+from paramove.bus.lockstep import LockstepTurns, read_up_to
+from paramove.bus.settings import BusSettings
+from paramove.bus.status import StatusReporter
+from paramove.bus.subscriber import Heard
+from paramove.bus.topics import Topic
+from paramove.bus.turns import KeptTime, RealTimeTurns, SimulatedTurns, Tick, Turns
+from paramove.msgs.node_status_pb2 import NodeStatus
+
+_log = logging.getLogger(__name__)
+
+
+class Bus:
+    """What a node hears and says, and its time.
+
+    Everything happens in the thread that uses the bus: sockets are read and the status is said once a second while the
+    node waits for its next message. A bus that says `clock` keeps the time itself (see `paramove.bus.barrier`).
+
+    Args:
+        node: Name of the node.
+        settings: What the supervisor tells every node of the bus.
+        hears: Topics to hear.
+        says: Topics to say; the status topic is added.
+        run_folder: Where the node may write files.
+
+    Attributes:
+        settings: As given.
+        run_folder: As given.
+        dropped: By topic, messages that no loop asked for and that grew too many to keep.
+
+    Raises:
+        TopicTakenError, BusFolderError: see `paramove.bus.endpoint`.
+        ValueError: a topic of ground truth without `truth_folder`.
+    """
+
+    def __init__(
+        self,
+        node: str,
+        settings: BusSettings,
+        hears: Iterable[Topic] = (),
+        says: Iterable[Topic] = (),
+        run_folder: Path | None = None,
+    ) -> None:
+        self.node = node
+        self.settings = settings
+        self.run_folder = run_folder or Path()
+        self.dropped: Counter[str] = Counter()
+        self.exchange = Exchange(node, settings)
+        self._pid = os.getpid()
+        self._heard: list[str] = []
+        self._backlog: list[Heard] = []
+        self._held: list[tuple[Topic, Any, int | None]] = []
+        self._tick: Tick | None = None
+        self._frozen = False
+        try:
+            says = tuple(says)
+            self._status = StatusReporter(self.exchange, node)
+            for topic in says:
+                self.exchange.say(topic)
+            for topic in hears:
+                self.hear(topic)
+            self._turns = self._source_of_time(topics.CLOCK in says)
+        except BaseException:
+            self.exchange.close()
+            raise
+        self.exchange.every_second = lambda: self._status.say(self.now_ns)
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the bus clock: monotonic time of the machine, or simulated time since the start of the run."""
+        return self._turns.now_ns
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the newest state said is `failed`."""
+        return self._status.state == NodeStatus.STATE_FAILED
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the node was asked to end."""
+        return self.exchange.stopped
+
+    def hear(self, topic: Topic) -> None:
+        """Begins to hear one more topic."""
+        self.exchange.hear(topic)
+        if topic.name not in self._heard:
+            self._heard.append(topic.name)
+
+    def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
+        """Says `message`. Never waits.
+
+        In lockstep, what is said before the first tick goes out with it: only then does everybody listen.
+
+        Args:
+            topic: One of those the node says.
+            message: Of the topic's type.
+            captured_ns: When what it tells of was so, ns of the bus clock; default now.
+
+        Raises:
+            KeyError: the node does not say this topic.
+            TypeError, ValueError: see `Publisher.publish`.
+        """
+        if os.getpid() != self._pid:
+            raise RuntimeError(
+                f"the bus of {self.node} was made in process {self._pid} and cannot be used after a fork"
+            )
+        if topic.name not in self.exchange.publishers:
+            said = ", ".join(sorted(self.exchange.publishers))
+            raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to SAYS")
+        if self._turns.may_say:
+            self.say_at_once(topic, message, captured_ns)
+        else:
+            self._held.append((topic, message, captured_ns))
+
+    @overload
+    def events(self, *wanted: Topic, tick: Literal[False] = False) -> Iterator[Heard]: ...
+    @overload
+    def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Heard | Tick]: ...
+
+    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
+        """Every message of these topics (default: of all heard), oldest first, until the bus is stopped.
+
+        Messages of other topics are kept for a later loop, as many as the topic's high water mark.
+
+        Args:
+            wanted: Topics.
+            tick: Also yield a `Tick` once a camera period, after the messages of that period.
+        """
+        return self._events(wanted, tick, conflate=False)
+
+    def latest(self, *wanted: Topic) -> Iterator[Heard]:
+        """Like `events`, but of each topic only the newest message that has arrived."""
+        for event in self._events(wanted, tick=False, conflate=True):
+            assert isinstance(event, Heard)
+            yield event
+
+    def starting(self, sentence: str) -> None:
+        """Says what the node is doing before it is ready."""
+        self._status.change(NodeStatus.STATE_STARTING, sentence, self.now_ns)
+
+    def ready(self, sentence: str) -> None:
+        """Says that the node does its work, and how."""
+        if not self._frozen:  # what lives now lives on: the collector need not look at it again
+            self._frozen = True
+            gc.collect()
+            gc.freeze()
+        self._status.change(NodeStatus.STATE_READY, sentence, self.now_ns)
+
+    def degraded(self, sentence: str) -> None:
+        """Says that the node works with less than it should, and what is missing."""
+        self._status.change(NodeStatus.STATE_DEGRADED, sentence, self.now_ns)
+
+    def failed(self, sentence: str) -> None:
+        """Says that the node cannot do its work, and why."""
+        self._status.change(NodeStatus.STATE_FAILED, sentence, self.now_ns)
+
+    def ended(self, sentence: str) -> None:
+        """Says that the node is about to end well."""
+        self._status.change(NodeStatus.STATE_STOPPED, sentence, self.now_ns)
+
+    def stop(self) -> None:
+        """Ends every loop over events. May be called from a signal handler; saying still works until `close`."""
+        self.exchange.stop()
+
+    def close(self) -> None:
+        """Leaves the bus. Messages said just before still arrive."""
+        self.exchange.stop()
+        if isinstance(self._turns, LockstepTurns):
+            self._turns.leave()
+        self.exchange.close()
+
+    def read_up_to(self, marks: Marks, keep: bool = False) -> list[Heard]:
+        """Waits for everything heard up to the marks; returns it in the order of publish time, then of HEARS.
+
+        Args:
+            marks: Topic name on the bus -> epoch and sequence.
+            keep: Only wait, and leave the messages for the next call.
+        """
+        self.exchange.drain(self._heard)
+        read_up_to(self.exchange, marks, self._heard)
+        return [] if keep else self.exchange.take_up_to(marks, self._heard)
+
+    def keep_time(self, now_ns: int) -> None:
+        """Sets the time, on the bus that says `clock`; raises RuntimeError on others or if time ran backwards."""
+        if not isinstance(self._turns, KeptTime):
+            raise RuntimeError(f"{self.node} does not say {topics.CLOCK.name}, so it cannot set the time")
+        if now_ns < self._turns.now_ns:
+            raise RuntimeError(f"time would run back from {self._turns.now_ns} ns to {now_ns} ns")
+        self._turns.now_ns = now_ns
+
+    def hold(self) -> None:
+        """Keeps what is said from now on until `release`, on the bus that says `clock`."""
+        assert isinstance(self._turns, KeptTime)
+        self._turns.may_say = False
+
+    def release(self) -> None:
+        """Says what was kept, and everything at once from now on."""
+        if isinstance(self._turns, KeptTime):
+            self._turns.may_say = True
+        held, self._held = self._held, []
+        for topic, message, captured_ns in held:
+            self.say_at_once(topic, message, captured_ns)
+
+    def say_at_once(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
+        """Like `publish`, but never kept back."""
+        now_ns = self.now_ns
+        captured_ns = now_ns if captured_ns is None else captured_ns
+        self.exchange.publishers[topic.name].publish(message, captured_ns, now_ns)
+
+    def __enter__(self) -> Bus:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _source_of_time(self, says_clock: bool) -> Turns:
+        if says_clock:
+            return KeptTime()
+        if self.settings.clock == "monotonic":
+            return RealTimeTurns(self.exchange)
+        return LockstepTurns(self.exchange, self.node) if self.settings.lockstep else SimulatedTurns(self.exchange)
+
+    def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Heard | Tick]:
+        names = {topic.name for topic in wanted} or set(self._heard)
+        if unheard := names - set(self._heard):
+            raise KeyError(f"{self.node} does not hear {', '.join(sorted(unheard))}; add the topic to HEARS")
+        while not self.stopped:
+            while not self.stopped and (heard := self._next_of(names, conflate)) is not None:
+                yield from self._timed(heard)
+            if tick and self._tick is not None and not self.stopped:
+                now, self._tick = self._tick, None
+                yield from self._timed(now)
+            if not self._next_turn():
+                return
+
+    def _timed(self, event: Heard | Tick) -> Iterator[Heard | Tick]:
+        """Yields one event and accounts for the time until the node comes back."""
+        started_ns = time.perf_counter_ns()
+        try:
+            yield event
+        finally:
+            self._status.processing_ns += time.perf_counter_ns() - started_ns
+            self._status.processed += 1
+
+    def _next_of(self, names: set[str], conflate: bool) -> Heard | None:
+        """Takes the oldest message of these topics out of the backlog; with `conflate` also all others of its topic."""
+        for index, heard in enumerate(self._backlog):
+            if heard.topic.name not in names:
+                continue
+            if conflate and any(later.topic.name == heard.topic.name for later in self._backlog[index + 1 :]):
+                continue
+            name = heard.topic.name
+            if conflate:
+                self._backlog = [item for item in self._backlog if item.topic.name != name]
+            else:
+                del self._backlog[index]
+            return heard
+        return None
+
+    def _next_turn(self) -> bool:
+        """Waits for the next turn; False once the bus was stopped."""
+        self._trim_backlog()
+        turn = self._turns.next(self._heard)
+        if turn is None:
+            return False
+        self._backlog += turn.messages
+        self._tick = turn.tick
+        if self._held and self._turns.may_say:
+            self.release()
+        return True
+
+    def _trim_backlog(self) -> None:
+        """Drops the oldest messages that no loop asked for, beyond what may wait of a topic."""
+        if not self._backlog:
+            return
+        waiting = Counter(heard.topic.name for heard in self._backlog)
+        kept = []
+        for heard in self._backlog:
+            if waiting[heard.topic.name] > heard.topic.high_water_mark:
+                waiting[heard.topic.name] -= 1
+                self.dropped[heard.topic.name] += 1
+            else:
+                kept.append(heard)
+        self._backlog = kept

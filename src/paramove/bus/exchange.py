@@ -1,0 +1,202 @@
+"""All sockets of one process: who it says what to, what it hears, and the one place where it waits."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import zmq
+
+from paramove.bus.endpoint import Ownership
+from paramove.bus.publisher import Publisher
+from paramove.bus.settings import BusSettings
+from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus.topics import Topic
+from paramove.msgs.clock_pb2 import Clock
+from paramove.msgs.node_status_pb2 import NodeStatus
+
+_log = logging.getLogger(__name__)
+
+Marks = Mapping[str, tuple[int, int]]
+"""Topic name on the bus -> epoch and sequence of the newest message said."""
+
+WATCH_PERIOD_S = 0.25
+DRAIN_LIMIT = 10_000
+"""Messages taken from one topic at once, so that a flood on it cannot keep the process from everything else."""
+
+
+class Exchange:
+    """Publishers and subscribers of a process.
+
+    There is no thread: sockets are read, subscriptions answered and lost connections noticed in `wait` and `drain`,
+    which the process's loop calls. Use it in the thread and process that made it.
+    """
+
+    def __init__(self, node: str, settings: BusSettings) -> None:
+        self.node = node
+        self.settings = settings
+        self.stopped = False
+        self.publishers: dict[str, Publisher] = {}
+        self.subscribers: dict[str, Subscriber] = {}
+        self.every_second: Callable[[], None] = lambda: None
+        self.context: zmq.Context[Any] = zmq.Context()
+        self._owned: list[Ownership] = []
+        self._pending: dict[str, deque[tuple[int, Heard]]] = {}
+        self._poller = zmq.Poller()
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._poller.register(self._wake, zmq.POLLIN)
+        self._others: list[zmq.Socket[Any]] = []
+        self._watch_due_s = 0.0
+        self._second_due_s = 0.0
+        self._closed = False
+
+    def say(self, topic: Topic) -> Publisher:
+        """Becomes the speaker of a topic."""
+        settings = self.settings
+        publisher = Publisher(self.context, settings.folder_of(topic), topic, self.node, settings.name_of(topic))
+        self._owned.append(publisher.ownership)
+        self.publishers[topic.name] = publisher
+        self._poller.register(publisher.socket, zmq.POLLIN)
+        return publisher
+
+    def hear(self, topic: Topic) -> Subscriber:
+        """Begins to hear a topic; to ask for it again changes nothing."""
+        if topic.name not in self.subscribers:
+            settings = self.settings
+            subscriber = Subscriber(self.context, settings.folder_of(topic), topic, settings.name_of(topic))
+            self.subscribers[topic.name] = subscriber
+            self._pending[topic.name] = deque()
+            self._poller.register(subscriber.socket, zmq.POLLIN)
+        return self.subscribers[topic.name]
+
+    def add_socket(self, socket: zmq.Socket[Any], ownership: Ownership | None = None) -> None:
+        """Lets `wait` return when `socket` can be read; it is closed with the others."""
+        self._others.append(socket)
+        self._poller.register(socket, zmq.POLLIN)
+        if ownership is not None:
+            self._owned.append(ownership)
+
+    def watch_descriptor(self, descriptor: int, watched: bool = True) -> None:
+        """Lets `wait` return when a file descriptor can be read, or no longer."""
+        if watched:
+            self._poller.register(descriptor, zmq.POLLIN)
+        else:
+            self._poller.unregister(descriptor)
+
+    def wait(self, timeout_s: float) -> None:
+        """Waits until something can be read, at most `timeout_s`; answers subscriptions meanwhile."""
+        self._housekeeping()
+        until_due_s = min(self._watch_due_s, self._second_due_s) - time.monotonic()
+        ready = dict(self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s)))))
+        for publisher in self.publishers.values():
+            if publisher.socket in ready:
+                publisher.serve()
+
+    def drain(self, topics: Iterable[str] | None = None) -> None:
+        """Takes what has arrived out of the sockets, without waiting."""
+        for name in self.subscribers if topics is None else topics:
+            subscriber, pending = self.subscribers[name], self._pending[name]
+            for _ in range(DRAIN_LIMIT):
+                heard = subscriber.receive()
+                if heard is None:
+                    break
+                pending.append((subscriber.counter.epoch or 0, heard))
+
+    def take(self, topics: Iterable[str]) -> list[Heard]:
+        """Everything drained of these topics, in the order of publish time, then of the topics."""
+        found: list[Heard] = []
+        for name in topics:
+            pending = self._pending[name]
+            found += [heard for _, heard in pending]
+            pending.clear()
+        return sorted(found, key=_published)
+
+    def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Heard]:
+        """Like `take`, but leaves what was said after the marks. A topic without a mark is taken whole."""
+        found: list[Heard] = []
+        for name in topics:
+            pending = self._pending[name]
+            subscriber = self.subscribers[name]
+            mark = marks.get(subscriber.name)
+            while pending:
+                epoch, heard = pending[0]
+                present = epoch == subscriber.counter.epoch
+                # Of the present speaker and said after the mark, or by a new start of it that has no mark yet.
+                if mark is not None and present and (epoch != mark[0] or heard.sequence > mark[1]):
+                    break
+                found.append(heard)
+                pending.popleft()
+        return sorted(found, key=_published)
+
+    def missing(self, marks: Marks, topics: Iterable[str]) -> list[str]:
+        """Those of the topics that have not been heard up to their marks."""
+        absent = []
+        for name in topics:
+            subscriber = self.subscribers[name]
+            mark = marks.get(subscriber.name)
+            if mark is not None and not subscriber.counter.has_reached(*mark):
+                absent.append(name)
+        return absent
+
+    def marks(self) -> dict[str, tuple[int, int]]:
+        """The newest message of every topic said here, but the clock and the status, which follow other rules."""
+        return {
+            item.name: (item.epoch, item.sequence)
+            for item in self.publishers.values()
+            if item.topic.type not in (Clock, NodeStatus)
+        }
+
+    def pop(self, topic: Topic) -> Heard | None:
+        """The oldest drained message of a topic."""
+        pending = self._pending[topic.name]
+        return pending.popleft()[1] if pending else None
+
+    def reopen(self, name: str) -> None:
+        """Subscribes to a heard topic anew: the speaker's welcome then shows what was lost."""
+        self._poller.unregister(self.subscribers[name].socket)
+        self.subscribers[name].reopen()
+        self._poller.register(self.subscribers[name].socket, zmq.POLLIN)
+
+    def stop(self) -> None:
+        """Makes `wait` return at once and for good. May be called from a signal handler."""
+        self.stopped = True
+        if not self._closed:
+            os.eventfd_write(self._wake, 1)
+
+    def close(self) -> None:
+        """Closes everything. Messages said just before still arrive, for `publisher.LINGER_MS` at most."""
+        if self._closed:
+            return
+        self.stopped = self._closed = True
+        for subscriber in self.subscribers.values():
+            subscriber.close()
+        for publisher in self.publishers.values():
+            publisher.close()
+        for socket in self._others:
+            socket.close()
+        self.context.term()
+        # Only now are the sockets' files gone: a successor that binds earlier would lose its own to libzmq's clean-up.
+        for ownership in self._owned:
+            ownership.release()
+        os.close(self._wake)
+
+    def _housekeeping(self) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._watch_due_s:
+            self._watch_due_s = now_s + WATCH_PERIOD_S
+            for name, subscriber in self.subscribers.items():
+                if subscriber.is_deaf():
+                    _log.warning("topic %s: connection given up by libzmq, opened anew", subscriber.name)
+                    self.reopen(name)
+        if now_s >= self._second_due_s:
+            self._second_due_s = now_s + 1.0
+            self.every_second()
+
+
+def _published(heard: Heard) -> int:
+    return heard.published_ns

@@ -1,0 +1,160 @@
+"""Lockstep, the member's side: time waits until this process is done with a tick.
+
+1. The member connects to `<bus folder>/lockstep` and greets (JOIN) once the clock's speaker has welcomed it.
+2. The first beat whose marks name the member is a handshake: it only waits until the speaker of every topic it hears
+   and that has a mark has welcomed it. So nothing said later is missed. Nothing is said in it.
+3. At every later beat it reads each topic up to the beat's mark, which is what had been said when the beat began. What
+   has arrived beyond is kept for the next turn. So a turn holds the same messages on any machine.
+4. When the node comes back for the next turn it answers DONE with the marks of what it has said itself.
+
+A topic without a mark has a speaker that time does not wait for (a person's page, a node with `lockstep: false`), and
+status topics follow wall time; their messages are handed over at the beat after they arrived.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.endpoint import socket_path
+from paramove.bus.envelope import Envelope, pack, publisher_id
+from paramove.bus.exchange import Exchange, Marks
+from paramove.bus.schema_hash import schema_hash
+from paramove.bus.turns import LONGEST_WAIT_S, Tick, Turn
+from paramove.msgs.clock_pb2 import Clock, TickDone, TopicMark
+
+_log = logging.getLogger(__name__)
+
+SERVICE = "lockstep"
+"""Name of the barrier's socket in the bus folder."""
+HEALING_PERIOD_S = 2.0
+"""After so long a message that should be here is asked for again, or given up if its speaker is gone."""
+
+
+def to_marks(said: Iterable[TopicMark]) -> dict[str, tuple[int, int]]:
+    """Marks of a message as a dictionary."""
+    return {mark.topic: (mark.epoch, mark.sequence) for mark in said}
+
+
+def from_marks(marks: Marks) -> list[TopicMark]:
+    """Marks as a message's list, sorted by topic."""
+    return [TopicMark(topic=name, epoch=marks[name][0], sequence=marks[name][1]) for name in sorted(marks)]
+
+
+def member_mark(node: str) -> str:
+    """Name of the mark by which a member sees that the barrier counts on it; its epoch is the process id."""
+    return f"{SERVICE}/{node}"
+
+
+def read_up_to(exchange: Exchange, marks: Marks, heard: list[str]) -> None:
+    """Waits until everything up to the marks has been drained.
+
+    A message that does not come although its speaker lives is asked for again, so that it is counted as lost; if the
+    speaker is gone it is given up. Both are logged: from there on the run may differ from another one.
+    """
+    started_s = healed_s = time.monotonic()
+    while not exchange.stopped:
+        exchange.drain(heard)
+        absent = exchange.missing(marks, heard)
+        if not absent:
+            return
+        now_s = time.monotonic()
+        if now_s - healed_s > HEALING_PERIOD_S:
+            healed_s = now_s
+            for name in absent:
+                connected = exchange.subscribers[name].connected
+                _log.warning(
+                    "lockstep: topic %s not heard up to its mark after %.0f s; %s; this run may differ from others",
+                    name,
+                    now_s - started_s,
+                    "asking again" if connected else "its speaker is gone",
+                )
+                if connected:
+                    exchange.reopen(name)
+            if not any(exchange.subscribers[name].connected for name in absent):
+                return
+        exchange.wait(HEALING_PERIOD_S)
+
+
+class LockstepTurns:
+    """Turns of a member."""
+
+    def __init__(self, exchange: Exchange, node: str) -> None:
+        self._exchange = exchange
+        self._node = node
+        self.now_ns = 0
+        self.may_say = False
+        self._clock = exchange.hear(topics.CLOCK)
+        self._socket: zmq.Socket[Any] = exchange.context.socket(zmq.DEALER)
+        self._socket.setsockopt(zmq.IDENTITY, node.encode())
+        self._socket.setsockopt(zmq.LINGER, 200)
+        self._socket.setsockopt(zmq.RECONNECT_IVL, 20)
+        self._socket.connect(f"ipc://{socket_path(exchange.settings.folder, SERVICE)}")
+        exchange.add_socket(self._socket)
+        self._schema = schema_hash(TickDone)
+        self._joined = False
+        self._shaken = False
+        self._tick: int | None = None
+
+    def next(self, heard: list[str]) -> Turn | None:
+        if self._tick is not None:
+            self._answer(TickDone.KIND_DONE, self._tick)
+            self._tick = None
+        while not self._exchange.stopped:
+            if not self._joined:
+                self._join()
+                continue
+            beat = self._next_beat()
+            if beat is None:
+                continue
+            self.now_ns = beat.time_ns
+            marks = to_marks(beat.said)
+            if marks.get(member_mark(self._node), (0, 0))[0] != os.getpid():
+                continue  # the barrier has not read our greeting yet
+            read_up_to(self._exchange, marks, heard)
+            if not self._shaken:
+                self._shaken = True
+                self._answer(TickDone.KIND_DONE, beat.tick)
+                continue
+            self.may_say = True
+            self._tick = beat.tick
+            return Turn(self._exchange.take_up_to(marks, heard), Tick(beat.tick, beat.time_ns))
+        return None
+
+    def leave(self) -> None:
+        """Tells the barrier not to wait for this process any more."""
+        if self._joined:
+            self._answer(TickDone.KIND_LEAVE, self._tick or 0)
+            self._joined = False
+
+    def _join(self) -> None:
+        self._exchange.drain([topics.CLOCK.name])
+        if self._clock.welcomed:
+            self._joined = True
+            self._answer(TickDone.KIND_JOIN, 0)
+        else:
+            self._exchange.wait(LONGEST_WAIT_S)
+
+    def _next_beat(self) -> Clock | None:
+        beat = self._exchange.pop(topics.CLOCK)
+        if beat is None:
+            self._exchange.drain([topics.CLOCK.name])
+            beat = self._exchange.pop(topics.CLOCK)
+        if beat is None:
+            self._exchange.wait(LONGEST_WAIT_S)
+            return None
+        message: Clock = beat.message
+        return message
+
+    def _answer(self, kind: TickDone.Kind, tick: int) -> None:
+        marks = self._exchange.marks() | {member_mark(self._node): (os.getpid(), 0)}
+        answer = TickDone(node=self._node, pid=os.getpid(), kind=kind, tick=tick, said=from_marks(marks))
+        payload = answer.SerializeToString()
+        envelope = Envelope(self._schema, publisher_id(self._node), 0, tick, self.now_ns, self.now_ns)
+        self._socket.send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)

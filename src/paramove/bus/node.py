@@ -1,0 +1,144 @@
+"""The entry of every node: `main(run, HEARS, SAYS, Config)`.
+
+The supervisor starts a node as `python -m nodes.<name> --config FILE`. The file is YAML:
+
+    node: colour_tracker
+    bus: {folder: /run/user/1000/paramove/default, clock: simulated, lockstep: true}
+    parameters: {…}              # what the node's Config holds
+    run_folder: runs/2026-11-21_10-00-00
+
+Exit codes: 0 ended well or by SIGTERM or SIGINT; 2 wrong arguments; 70 the node raised an exception or ended after it
+had said that it failed; 75 a topic or the bus folder is held by somebody else; 78 the configuration is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from paramove.bus.bus import Bus
+from paramove.bus.endpoint import BusFolderError, TopicTakenError
+from paramove.bus.settings import BusSettings
+from paramove.bus.subscriber import Heard
+from paramove.bus.topics import Topic
+from paramove.bus.turns import Tick
+
+__all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "read_node_file"]
+
+_log = logging.getLogger(__name__)
+
+EXIT_OK = 0
+EXIT_FAILED = 70
+EXIT_TAKEN = 75
+EXIT_CONFIGURATION = 78
+
+
+class NodeConfig(BaseModel):
+    """Parameters of a node; each node derives its own. Unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class NodeFile(BaseModel):
+    """The file behind `--config`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    node: str
+    bus: BusSettings
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    run_folder: Path = Path()
+
+
+Config = TypeVar("Config", bound=NodeConfig)
+
+
+class ConfigurationError(Exception):
+    """The node's file is missing or wrong; the text is for people."""
+
+
+def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Config]:
+    """Reads and checks the file behind `--config`; raises ConfigurationError with every wrong key named."""
+    try:
+        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        file = NodeFile.model_validate(content)
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error.strerror}") from error
+    except YAMLError as error:
+        raise ConfigurationError(f"{path}: {error}") from error
+    except ValidationError as error:
+        raise ConfigurationError(_sentence(path, error)) from error
+    try:
+        return file, config_type.model_validate(file.parameters)
+    except ValidationError as error:
+        raise ConfigurationError(_sentence(path, error, "parameters.")) from error
+
+
+def main(
+    run: Callable[[Bus, Config], None],
+    hears: Sequence[Topic],
+    says: Sequence[Topic],
+    config_type: type[Config],
+) -> None:
+    """Runs a node and exits the process.
+
+    Args:
+        run: Loops over `bus.events` or `bus.latest` and returns when they end.
+        hears: Topics that the node hears.
+        says: Topics that it says.
+        config_type: Its parameters.
+    """
+    parser = argparse.ArgumentParser(description=sys.modules[run.__module__].__doc__)
+    parser.add_argument("--config", type=Path, required=True, help="YAML file written by the supervisor")
+    arguments = parser.parse_args()
+    try:
+        file, config = read_node_file(arguments.config, config_type)
+    except ConfigurationError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(EXIT_CONFIGURATION)
+    logging.basicConfig(level=logging.INFO, format=f"%(levelname)s {file.node}: %(message)s", stream=sys.stderr)
+    try:
+        bus = Bus(file.node, file.bus, hears, says, file.run_folder)
+    except (TopicTakenError, BusFolderError) as error:
+        _log.error("%s", error)
+        sys.exit(EXIT_TAKEN)
+    except ValueError as error:
+        _log.error("%s", error)
+        sys.exit(EXIT_CONFIGURATION)
+    with bus:
+        sys.exit(_run(run, bus, config))
+
+
+def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
+    """Calls `run` with the signals tied to the bus; returns the exit code."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: bus.stop())
+    try:
+        bus.starting("starting")
+        run(bus, config)
+    except Exception as error:
+        _log.exception("the node raised an exception")
+        bus.failed(f"{type(error).__name__}: {error}")
+        return EXIT_FAILED
+    if bus.has_failed:
+        return EXIT_FAILED
+    bus.ended("stopped on request" if bus.stopped else "finished")
+    return EXIT_OK
+
+
+def _sentence(path: Path, error: ValidationError, prefix: str = "") -> str:
+    """One line per wrong key: where, what was found, what would have worked."""
+    lines = [
+        f"{path}: {prefix}{'.'.join(map(str, item['loc']))}: {item['msg']} (found {item['input']!r:.80})"
+        for item in error.errors()
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,61 @@
+"""What a process is told about the bus it joins."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from paramove.bus.topics import Topic
+
+
+def default_folder(domain: str | None = None) -> Path:
+    """Bus folder of a domain: `$XDG_RUNTIME_DIR/paramove/<domain>`, else `/tmp/paramove-<uid>/<domain>`.
+
+    Args:
+        domain: Default: $PARAMOVE_DOMAIN, else "default".
+    """
+    domain = domain or os.environ.get("PARAMOVE_DOMAIN") or "default"
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if runtime.startswith("/") and os.access(runtime, os.W_OK | os.X_OK):
+        return Path(runtime) / "paramove" / domain
+    return Path(tempfile.gettempdir()) / f"paramove-{os.getuid()}" / domain
+
+
+class BusSettings(BaseModel):
+    """One process's view of the bus.
+
+    Attributes:
+        folder: Of the sockets.
+        clock: `monotonic`: real time. `simulated`: what the topic `clock` says.
+        lockstep: The simulator waits for this process at every tick. Only with the simulated clock.
+        truth_folder: Of the sockets of topics under `truth/`; given to the simulator and evaluators only.
+        remaps: Topic name in the node -> topic name on the bus.
+        members: Names of all nodes that time waits for in lockstep. Read by the simulator only.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    folder: Path
+    clock: Literal["monotonic", "simulated"] = "monotonic"
+    lockstep: bool = False
+    truth_folder: Path | None = None
+    remaps: dict[str, str] = Field(default_factory=dict)
+    members: tuple[str, ...] = ()
+
+    def folder_of(self, topic: Topic) -> Path:
+        """Folder of the topic's socket; raises ValueError for ground truth that this process is not told of."""
+        if not topic.truth:
+            return self.folder
+        if self.truth_folder is None:
+            raise ValueError(
+                f"topic {topic.name} is ground truth: only the simulator and evaluators are given bus.truth_folder"
+            )
+        return self.truth_folder
+
+    def name_of(self, topic: Topic) -> str:
+        """Name of the topic on the bus."""
+        return self.remaps.get(topic.name, topic.name)

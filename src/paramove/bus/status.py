@@ -1,0 +1,71 @@
+"""What a node says of itself, once a second."""
+
+from __future__ import annotations
+
+import logging
+import os
+
+from paramove.bus.exchange import Exchange
+from paramove.bus.sequence import SequenceCounter
+from paramove.bus.topics import status
+from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
+
+_log = logging.getLogger(__name__)
+
+
+class StatusReporter:
+    """Says `status/<node>`.
+
+    Attributes:
+        processing_ns: Time the node has spent on messages and ticks, on the wall clock.
+        processed: How many it has handled.
+    """
+
+    def __init__(self, exchange: Exchange, node: str) -> None:
+        self._exchange = exchange
+        self._publisher = exchange.say(status(node))
+        self._node = node
+        self._state: NodeStatus.State = NodeStatus.STATE_STARTING
+        self._sentence = ""
+        self.processing_ns = 0
+        self.processed = 0
+
+    @property
+    def state(self) -> NodeStatus.State:
+        """Newest state said."""
+        return self._state
+
+    def change(self, state: NodeStatus.State, sentence: str, now_ns: int) -> None:
+        """Says a state and a sentence at once, if they are new."""
+        if (state, sentence) == (self._state, self._sentence) and self._publisher.sequence:
+            return
+        self._state, self._sentence = state, sentence
+        _log.info("%s: %s", NodeStatus.State.Name(state).removeprefix("STATE_").lower(), sentence)
+        self.say(now_ns)
+
+    def say(self, now_ns: int) -> None:
+        """Says the present state and counts."""
+        message = NodeStatus(
+            node=self._node,
+            state=self._state,
+            sentence=self._sentence,
+            pid=os.getpid(),
+            processing_seconds=self.processing_ns * 1e-9,
+            processed=self.processed,
+        )
+        message.captured.FromNanoseconds(now_ns)
+        for publisher in self._exchange.publishers.values():
+            message.said.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
+        for subscriber in self._exchange.subscribers.values():
+            message.heard.append(_count(subscriber.name, subscriber.counter))
+        self._publisher.publish(message, now_ns, now_ns)
+
+
+def _count(name: str, counter: SequenceCounter) -> TopicCount:
+    return TopicCount(
+        topic=name,
+        messages=counter.messages,
+        lost=counter.lost,
+        repeated_=counter.repeated,
+        refused=counter.refused.total(),
+    )

@@ -1,0 +1,129 @@
+"""Time, and what a node gets of it: turns of messages and ticks.
+
+The loop of a node goes in turns. A turn is a list of messages and at most one tick, which comes after them. Where time
+comes from decides what a turn is:
+
+    real time     whatever has arrived; ticks are made here, 15 times a second
+    simulated     whatever has arrived; a tick for each beat of the topic `clock`
+    lockstep      exactly what had been said before the beat, then its tick (`paramove.bus.lockstep`)
+    recorded      what a recording holds (`paramove.bus.recorded`)
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+from paramove.bus import topics
+from paramove.bus.exchange import Exchange
+from paramove.bus.subscriber import Heard
+
+TICK_PERIOD_NS = 1_000_000_000 // 15
+"""One camera period."""
+LONGEST_WAIT_S = 1.0
+
+
+@dataclass(frozen=True)
+class Tick:
+    """One camera period has passed.
+
+    Attributes:
+        number: Counts periods since the run began (real time: since this process began).
+        now_ns: Time of the bus clock.
+    """
+
+    number: int
+    now_ns: int
+
+
+@dataclass
+class Turn:
+    """Messages, and the tick after them if there is one."""
+
+    messages: list[Heard]
+    tick: Tick | None = None
+
+
+class Turns(Protocol):
+    """A source of time and turns."""
+
+    @property
+    def now_ns(self) -> int:
+        """Time of the bus clock."""
+
+    @property
+    def may_say(self) -> bool:
+        """Whether messages go out at once; otherwise the bus keeps them until the next turn."""
+
+    def next(self, heard: list[str]) -> Turn | None:
+        """Waits for the next turn with these topics; None once the bus was stopped. Ends the turn before."""
+
+
+class RealTimeTurns:
+    """Turns of the monotonic clock."""
+
+    may_say = True
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+        self._start_ns = time.monotonic_ns()
+        self._number = 0
+
+    @property
+    def now_ns(self) -> int:
+        """Nanoseconds of the machine's monotonic clock."""
+        return time.monotonic_ns()
+
+    def next(self, heard: list[str]) -> Turn | None:
+        exchange = self._exchange
+        while not exchange.stopped:
+            exchange.drain(heard)
+            messages = exchange.take(heard)
+            now_ns = time.monotonic_ns()
+            number = (now_ns - self._start_ns) // TICK_PERIOD_NS
+            if number > self._number:  # ticks that were slept through are skipped
+                self._number = number
+                return Turn(messages, Tick(number, now_ns))
+            if messages:
+                return Turn(messages)
+            due_ns = self._start_ns + (self._number + 1) * TICK_PERIOD_NS
+            exchange.wait(max(0.0, (due_ns - now_ns) * 1e-9))
+        return None
+
+
+class SimulatedTurns:
+    """Turns of the topic `clock`, which is not waited for and does not wait."""
+
+    may_say = True
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+        self.now_ns = 0
+        exchange.hear(topics.CLOCK)
+
+    def next(self, heard: list[str]) -> Turn | None:
+        exchange = self._exchange
+        while not exchange.stopped:
+            exchange.drain([topics.CLOCK.name])  # first: what was said before a beat has then arrived, too
+            exchange.drain(heard)
+            messages = exchange.take(heard)
+            tick = None
+            while (beat := exchange.pop(topics.CLOCK)) is not None:  # beats that were slept through are skipped
+                self.now_ns = beat.message.time_ns
+                tick = Tick(beat.message.tick, self.now_ns)
+            if messages or tick:
+                return Turn(messages, tick)
+            exchange.wait(LONGEST_WAIT_S)
+        return None
+
+
+class KeptTime:
+    """The time of the process that says the clock: it has no turns, it makes them."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.may_say = True
+
+    def next(self, heard: list[str]) -> Turn | None:
+        raise RuntimeError("the process that says the clock hears with LockstepBarrier.advance, not with bus.events")
