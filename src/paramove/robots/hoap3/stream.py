@@ -1,0 +1,202 @@
+"""The wire to HOAP-3: batches of target frames at 1 kHz, each of which ends in its own stop ramp.
+
+The next batch replaces the ramp from an index that is not yet played. So nothing has to be decided when batches stop
+coming: the robot plays the ramp that it already has. `StreamReader` is the robot's side (the simulator uses it); it
+plays one frame a millisecond and refuses, as a whole, every batch that it could not play smoothly.
+"""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.robots.description import RobotDescription
+
+Frames = NDArray[np.int16]
+FloatArray = NDArray[np.float64]
+
+MAX_FRAMES = 5000
+# Accelerations are judged over spans of this many frames: over one, rounding to counts is larger than the limit.
+SPAN = 4
+_FRAME_TYPE = np.dtype("<i2")
+
+
+class StreamWriter:
+    """Makes batches of rows of joint angles.
+
+    Args:
+        description: Of the robot.
+        epoch: Of this sender; new at each of its starts, not 0.
+    """
+
+    def __init__(self, description: RobotDescription, epoch: int) -> None:
+        if not 0 < epoch < 2**32:
+            raise ValueError(f"epoch {epoch} of the stream, allowed 1 to {2**32 - 1}")
+        self.epoch = epoch
+        self._units = description.units
+        self._period_us = description.stream.period_us
+
+    def batch(self, first_index: int, rows: FloatArray, ramp_rows: int) -> StreamBatch:
+        """Encode rows, [N, J] rad, of which the last `ramp_rows` are the stop ramp.
+
+        Raises:
+            JointRangeError: A value that the robot's integer units cannot hold.
+        """
+        frames = self._units.to_counts(rows)
+        content = frames.astype(_FRAME_TYPE).tobytes()
+        return StreamBatch(
+            epoch=self.epoch,
+            first_index=first_index,
+            period_us=self._period_us,
+            joint_count=frames.shape[1],
+            stop_ramp_frames=ramp_rows,
+            frames=content,
+            crc=zlib.crc32(content),
+        )
+
+
+class StreamReader:
+    """The robot's side of the stream: a buffer that is played one frame a millisecond.
+
+    Args:
+        description: Of the robot.
+        held_counts: The frame that the robot holds before any batch, [J].
+
+    Attributes:
+        epoch: Of the stream being played; 0 before any.
+        next_index: Of the frame to be played next.
+        refused_batches: How many batches were refused.
+        refusal: Why the newest of them was.
+    """
+
+    def __init__(self, description: RobotDescription, held_counts: Frames) -> None:
+        self.epoch = 0
+        self.next_index = 0
+        self.refused_batches = 0
+        self.refusal = ""
+        self._units = description.units
+        self._period_us = description.stream.period_us
+        period_s = self._period_us * 1e-6
+        counts_per_rad = np.abs(description.units.counts_per_rad)
+        # Each rounded frame is off by up to half a count, hence +1 for a step and +2 for a second difference.
+        self._step = np.floor(counts_per_rad * description.velocity * period_s) + 1
+        self._bend = np.floor(counts_per_rad * description.stop_acceleration * (SPAN * period_s) ** 2) + 2
+        self._low, self._high = self._units.counts_range()
+        # The last 2 SPAN played frames, then the frames to come.
+        self._played = np.repeat(np.asarray(held_counts, dtype=np.int16)[None], 2 * SPAN, axis=0)
+        self._coming = self._played[:0]
+        self._ramp_frames = 0
+
+    @property
+    def depth(self) -> int:
+        """Frames still to be played, the stop ramp included."""
+        return len(self._coming)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing is left to be played."""
+        return not len(self._coming)
+
+    @property
+    def playing(self) -> Hoap3State.Playing:
+        """What the next frame is part of."""
+        if not self.epoch:
+            return Hoap3State.PLAYING_NOTHING
+        if self.at_rest:
+            return Hoap3State.PLAYING_HELD
+        return Hoap3State.PLAYING_STOP_RAMP if self.depth <= self._ramp_frames else Hoap3State.PLAYING_FRAMES
+
+    @property
+    def target(self) -> Frames:
+        """The frame that was played last or is held, [J]."""
+        target: Frames = self._played[-1]
+        return target
+
+    def play(self) -> Frames:
+        """The frame for the next millisecond, [J]; the held one if nothing is left."""
+        if len(self._coming):
+            frame = self._coming[0]
+            self._coming = self._coming[1:]
+            self._played = np.concatenate([self._played[1:], frame[None]])
+            self.next_index += 1
+        elif (self._played[0] != self._played[-1]).any():
+            self._played = np.concatenate([self._played[1:], self._played[-1:]])
+        return self.target
+
+    def offer(self, batch: StreamBatch) -> bool:
+        """Take a batch, or refuse it as a whole and keep what is buffered. Returns whether it was taken."""
+        refusal = self._refusal_of_form(batch)
+        if not refusal:
+            frames = np.frombuffer(batch.frames, dtype=_FRAME_TYPE).reshape(-1, batch.joint_count).astype(np.int16)
+            refusal = self._refusal_of_place(batch) or self._refusal_of_frames(batch, frames)
+        if refusal:
+            self.refused_batches += 1
+            self.refusal = refusal
+            return False
+        if batch.epoch != self.epoch:
+            self.epoch = batch.epoch
+            self.next_index = batch.first_index
+        kept = batch.first_index - self.next_index
+        self._coming = np.concatenate([self._coming[:kept], frames])
+        self._ramp_frames = batch.stop_ramp_frames
+        return True
+
+    def state(self, measured_counts: Frames, captured_ns: int) -> Hoap3State:
+        """What the robot reports: its stream and its measured joints, [J] counts."""
+        state = Hoap3State(
+            epoch=self.epoch,
+            next_index=self.next_index,
+            depth=self.depth,
+            playing=self.playing,
+            counts=[int(count) for count in measured_counts],
+            target_counts=[int(count) for count in self.target],
+            refused_batches=self.refused_batches,
+            refusal=self.refusal,
+        )
+        state.captured.FromNanoseconds(captured_ns)
+        return state
+
+    def _refusal_of_form(self, batch: StreamBatch) -> str:
+        n_joints = len(self._units.names)
+        if not batch.epoch:
+            return "epoch 0, a sender's epoch is 1 or more"
+        if batch.period_us != self._period_us:
+            return f"period {batch.period_us} us, allowed {self._period_us} us"
+        if batch.joint_count != n_joints:
+            return f"{batch.joint_count} joints, allowed {n_joints}"
+        n_frames, rest = divmod(len(batch.frames), _FRAME_TYPE.itemsize * n_joints)
+        if rest or not 1 <= n_frames <= MAX_FRAMES:
+            return f"{len(batch.frames)} bytes, allowed 1 to {MAX_FRAMES} frames of {n_joints} 16 bit numbers"
+        if batch.stop_ramp_frames > n_frames:
+            return f"a stop ramp of {batch.stop_ramp_frames} frames, the batch has {n_frames}"
+        found = zlib.crc32(batch.frames)
+        return "" if found == batch.crc else f"CRC {found:08x}, the batch says {batch.crc:08x}"
+
+    def _refusal_of_place(self, batch: StreamBatch) -> str:
+        if batch.epoch != self.epoch:
+            return "" if self.at_rest else f"epoch {batch.epoch} while {self.epoch} is played; allowed only at rest"
+        if batch.first_index < self.next_index:
+            return f"first index {batch.first_index}, played up to {self.next_index}: too late"
+        end = self.next_index + self.depth
+        return "" if batch.first_index <= end else f"first index {batch.first_index}, allowed up to {end}: a gap"
+
+    def _refusal_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
+        kept = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
+        before = np.concatenate([self._played, self._coming[:kept]])[-2 * SPAN :]
+        whole = np.concatenate([before, frames, np.repeat(frames[-1:], 2 * SPAN, axis=0)]).astype(np.float64)
+        outside = (frames < self._low) | (frames > self._high)
+        steps = np.abs(np.diff(whole[2 * SPAN - 1 :], axis=0))
+        bends = np.abs(whole[2 * SPAN :] - 2 * whole[SPAN:-SPAN] + whole[: -2 * SPAN])
+        for values, bad, what in (
+            (frames, outside, "{0:.0f} counts, allowed {1:.0f} to {2:.0f}"),
+            (steps, steps > self._step, "a step of {0:.0f} counts, allowed {3:.0f}"),
+            (bends, bends > self._bend, "speed changes by {0:.0f} counts in " + f"{SPAN} frames, allowed {{4:.0f}}"),
+        ):
+            if bad.any():
+                row, joint = (int(i) for i in np.argwhere(bad)[0])
+                limits = (self._low[joint], self._high[joint], self._step[joint], self._bend[joint])
+                return f"frame {row}, joint {self._units.names[joint]}: " + what.format(values[row, joint], *limits)
+        return ""

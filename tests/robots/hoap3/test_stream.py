@@ -1,0 +1,156 @@
+"""The wire to HOAP-3: what the reader refuses, and that it never plays anything but a smooth movement."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.robots.hoap3.stream import StreamReader, StreamWriter
+from paramove.safety.limits import MotionLimits
+from paramove.safety.stop_ramp import stop_ramp
+from tests.robots.hoap3.movements import HOAP3, swing
+
+EPOCH = 7
+LIMITS = MotionLimits.of(HOAP3)
+PATH = swing(HOAP3, duration_s=1.2)
+
+
+def reader() -> StreamReader:
+    return StreamReader(HOAP3, HOAP3.units.to_counts(PATH[0]))
+
+
+def cut(first: int, cover: int, epoch: int = EPOCH) -> StreamBatch:
+    """Rows first … first + cover of the path, then a stop ramp, or the path's end."""
+    rows = PATH[1:][first : first + cover]
+    ahead = PATH[1:][first + cover : first + cover + 400]
+    ramp = stop_ramp(rows[-1], ahead, LIMITS) if len(ahead) else rows[:0]
+    return StreamWriter(HOAP3, epoch).batch(first, np.concatenate([rows, ramp]), len(ramp))
+
+
+def played_to_rest(robot: StreamReader) -> np.ndarray:
+    frames = [robot.target]
+    while not robot.at_rest:
+        frames.append(robot.play())
+    return np.array(frames, dtype=np.float64)
+
+
+def test_a_batch_alone_is_a_movement_that_ends_at_rest() -> None:
+    robot = reader()
+    assert robot.playing == Hoap3State.PLAYING_NOTHING
+    assert robot.offer(cut(0, 300))
+    assert robot.playing == Hoap3State.PLAYING_FRAMES
+    frames = played_to_rest(robot)
+    assert robot.playing == Hoap3State.PLAYING_HELD
+    assert len(frames) > 350
+    assert np.abs(np.diff(frames[-4:], axis=0)).max() <= 1  # counts
+
+
+def test_successive_batches_play_the_whole_path_exactly() -> None:
+    robot, frames = reader(), []
+    for start in range(0, len(PATH) - 1, 67):
+        assert robot.offer(cut(max(0, start), 400)), robot.refusal
+        frames += [robot.play() for _ in range(67)]
+    expected = HOAP3.units.to_counts(PATH[1:])
+    np.testing.assert_array_equal(np.array(frames)[: len(expected)], expected)
+
+
+@settings(deadline=None, max_examples=60, derandomize=True)
+@given(stalls=st.lists(st.integers(min_value=0, max_value=450), min_size=1, max_size=12), data=st.data())
+def test_any_pattern_of_stalls_and_losses_stays_within_velocity_and_acceleration(
+    stalls: list[int], data: st.DataObject
+) -> None:
+    """Ticks of random length, some batches lost: the frames that are played keep the limits, the ramps included."""
+    robot, frames = reader(), []
+    for stall in stalls:
+        guard = data.draw(st.integers(min_value=0, max_value=150))
+        first = robot.next_index + guard
+        lost = data.draw(st.integers(min_value=0, max_value=4)) == 0
+        if not lost and first < len(PATH) - 1:
+            robot.offer(cut(first, data.draw(st.integers(min_value=50, max_value=400))))
+        frames += [robot.play() for _ in range(stall)]
+    frames += list(played_to_rest(robot)) + [robot.target] * 8
+    counts = np.array([reader().target] * 8 + frames, dtype=np.float64)
+    per_rad = np.abs(HOAP3.units.counts_per_rad)
+    assert (np.abs(np.diff(counts, axis=0)) <= per_rad * HOAP3.velocity * 1e-3 + 1).all()
+    for span in (4, 16):
+        bend = np.abs(counts[2 * span :] - 2 * counts[span:-span] + counts[: -2 * span])
+        assert (bend <= per_rad * HOAP3.stop_acceleration * (span * 1e-3) ** 2 + 2).all()
+
+
+def changed(**fields: int) -> StreamBatch:
+    batch = cut(0, 300)
+    for name, value in fields.items():
+        setattr(batch, name, value)
+    return batch
+
+
+def recoded(frames: np.ndarray, joints: int = 28) -> StreamBatch:
+    content = frames.astype("<i2").tobytes()
+    return StreamBatch(
+        epoch=EPOCH, first_index=0, period_us=1000, joint_count=joints, frames=content, crc=zlib.crc32(content)
+    )
+
+
+HELD = HOAP3.units.to_counts(PATH[0])
+JUMP = np.repeat(HELD[None], 20, axis=0)
+JUMP[10:, 6] += 424  # 2 deg within one frame, as in a published recording
+RADIANS = np.rint(np.repeat(PATH[:1], 20, axis=0))
+
+
+@pytest.mark.parametrize(
+    ("batch", "reason"),
+    [
+        (changed(period_us=2000), "period 2000 us, allowed 1000 us"),
+        (changed(joint_count=22), "22 joints, allowed 28"),
+        (changed(crc=1), "CRC"),
+        (changed(epoch=0), "epoch 0"),
+        (changed(stop_ramp_frames=10_000), "stop ramp of 10000"),
+        (StreamBatch(epoch=EPOCH, period_us=1000, joint_count=28), "0 bytes"),
+        (recoded(JUMP), "right_shoulder_pitch: a step of 424 counts, allowed 57"),
+        (recoded(RADIANS), "head_tilt: 0 counts, allowed 15 to 75"),
+        (recoded(np.full((10, 28), 32767)), "32767 counts, allowed"),
+        (recoded(np.zeros((10, 20)), 20), "20 joints"),
+    ],
+)
+def test_bad_batches_are_refused_and_nothing_is_played(batch: StreamBatch, reason: str) -> None:
+    robot = reader()
+    assert not robot.offer(batch)
+    assert reason in robot.refusal
+    assert robot.refused_batches == 1
+    assert robot.at_rest
+    np.testing.assert_array_equal(robot.play(), HELD)
+
+
+def test_late_duplicated_and_foreign_batches_are_refused_while_playing() -> None:
+    robot = reader()
+    assert robot.offer(cut(0, 300))
+    for _ in range(10):
+        robot.play()
+    late, foreign, gap = cut(0, 300), cut(20, 300, epoch=8), cut(900, 100)
+    for batch, reason in ((late, "too late"), (foreign, "allowed only at rest"), (gap, "a gap")):
+        assert not robot.offer(batch)
+        assert reason in robot.refusal
+    assert robot.playing == Hoap3State.PLAYING_FRAMES
+    played_to_rest(robot)
+    assert robot.offer(StreamWriter(HOAP3, 8).batch(0, HOAP3.units.to_radians(robot.target)[None], 0))
+
+
+def test_a_movement_that_ends_without_a_ramp_is_refused() -> None:
+    robot = reader()
+    assert not robot.offer(StreamWriter(HOAP3, EPOCH).batch(0, PATH[1:500], 0))
+    assert "speed changes" in robot.refusal
+
+
+def test_state_reports_target_and_measured_counts() -> None:
+    robot = reader()
+    robot.offer(cut(0, 300))
+    frame = robot.play()
+    state = robot.state(HELD, captured_ns=1_500_000_000)
+    assert (state.epoch, state.next_index, state.captured.ToNanoseconds()) == (EPOCH, 1, 1_500_000_000)
+    assert list(state.target_counts) == list(frame)
+    assert list(state.counts) == list(HELD)
