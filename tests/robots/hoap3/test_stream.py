@@ -73,7 +73,7 @@ def test_any_pattern_of_stalls_and_losses_stays_within_velocity_and_acceleration
         if not lost and first < len(PATH) - 1:
             robot.offer(cut(first, data.draw(st.integers(min_value=50, max_value=400))))
         frames += [robot.play() for _ in range(stall)]
-    frames += list(played_to_rest(robot)) + [robot.target] * 8
+    frames += [*played_to_rest(robot)[1:], *([robot.target] * 8)]
     counts = np.array([reader().target] * 8 + frames, dtype=np.float64)
     per_rad = np.abs(HOAP3.units.counts_per_rad)
     assert (np.abs(np.diff(counts, axis=0)) <= per_rad * HOAP3.velocity * 1e-3 + 1).all()
