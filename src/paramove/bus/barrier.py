@@ -19,7 +19,7 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.bus import Bus
-from paramove.bus.endpoint import Ownership, prepare_folder, socket_path
+from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
 from paramove.bus.envelope import RefusedError, unpack
 from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
 from paramove.bus.schema_hash import schema_hash
@@ -129,17 +129,18 @@ class LockstepBarrier:
     def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
         """Reads answers until there is one or a member ended; complains about whom it waits for."""
         complaint_s = time.monotonic() + COMPLAINT_PERIOD_S
+        ready: set[object] = set()
         while not self._exchange.stopped:
-            if self._read_answers() or self._bury_the_dead():
+            if self._read_answers() or self._bury_the_dead(ready):
                 return
-            self._exchange.wait(COMPLAINT_PERIOD_S)
+            ready = self._exchange.wait(COMPLAINT_PERIOD_S)
             if time.monotonic() > complaint_s:
                 complaint_s += COMPLAINT_PERIOD_S
                 _log.warning("lockstep: time waits for %s to %s", ", ".join(sorted(missing)), what)
 
     def _read_answers(self) -> bool:
         changed = False
-        while self._socket.poll(0):
+        while can_read(self._socket):
             frames = self._socket.recv_multipart(zmq.NOBLOCK)
             try:
                 if len(frames) != 3:
@@ -192,13 +193,9 @@ class LockstepBarrier:
             self._exchange.watch_descriptor(descriptor, watched=False)
             os.close(descriptor)
 
-    def _bury_the_dead(self) -> bool:
-        """Removes members whose process has ended; whether there was one."""
-        poller = zmq.Poller()
-        for descriptor in self._pidfds.values():
-            poller.register(descriptor, zmq.POLLIN)
-        ended = dict(poller.poll(0)) if self._pidfds else {}
-        names = [node for node, descriptor in self._pidfds.items() if descriptor in ended]
+    def _bury_the_dead(self, ready: set[object]) -> bool:
+        """Removes members whose process descriptor is ready, which means ended; whether there was one."""
+        names = [node for node, descriptor in self._pidfds.items() if descriptor in ready]
         for node in names:
             self._newcomers.pop(node, None)
             self._remove(node, "ended")

@@ -12,6 +12,9 @@ import socket
 import stat
 from pathlib import Path
 from types import TracebackType
+from typing import Any
+
+import zmq
 
 PATH_BYTES = 107
 """Longest path of a Unix socket on Linux."""
@@ -122,3 +125,10 @@ def is_alive(path: Path) -> bool:
         except OSError:
             return False
     return True
+
+
+def can_read(socket: zmq.Socket[Any]) -> bool:
+    """Whether a message is waiting. Cheaper than to receive and catch `zmq.Again`."""
+    events = socket.getsockopt(zmq.EVENTS)
+    assert isinstance(events, int)
+    return bool(events & 1)  # POLLIN; as an enum it would cost more than the question

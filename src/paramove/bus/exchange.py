@@ -88,18 +88,28 @@ class Exchange:
         else:
             self._poller.unregister(descriptor)
 
-    def wait(self, timeout_s: float) -> None:
-        """Waits until something can be read, at most `timeout_s`; answers subscriptions meanwhile."""
+    def wait(self, timeout_s: float) -> set[object]:
+        """Waits until something can be read, at most `timeout_s`.
+
+        Drains what can be read of the heard topics and answers subscriptions.
+
+        Returns:
+            The sockets and descriptors that could be read.
+        """
         self._housekeeping()
         until_due_s = min(self._watch_due_s, self._second_due_s) - time.monotonic()
-        ready = dict(self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s)))))
-        for publisher in self.publishers.values():
-            if publisher.socket in ready:
-                publisher.serve()
+        found = self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s))))
+        ready: set[object] = {item for item, _ in found}
+        if ready:
+            for publisher in self.publishers.values():
+                if publisher.socket in ready:
+                    publisher.serve()
+            self.drain(name for name, subscriber in self.subscribers.items() if subscriber.socket in ready)
+        return ready
 
-    def drain(self, topics: Iterable[str] | None = None) -> None:
-        """Takes what has arrived out of the sockets, without waiting."""
-        for name in self.subscribers if topics is None else topics:
+    def drain(self, topics: Iterable[str]) -> None:
+        """Takes what has arrived of these topics out of the sockets, without waiting."""
+        for name in topics:
             subscriber, pending = self.subscribers[name], self._pending[name]
             for _ in range(DRAIN_LIMIT):
                 heard = subscriber.receive()

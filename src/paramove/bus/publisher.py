@@ -8,7 +8,7 @@ from typing import Any
 
 import zmq
 
-from paramove.bus.endpoint import Ownership, prepare_folder, socket_path
+from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
 from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_WELCOME, Envelope, pack, publisher_id
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.topics import Profile, Topic
@@ -83,7 +83,7 @@ class Publisher:
     def serve(self) -> None:
         """Answers the subscriptions that have come in since the last call."""
         welcome = False
-        while self.socket.poll(0):
+        while can_read(self.socket):
             event = self.socket.recv(zmq.NOBLOCK)
             welcome |= event[:1] == b"\x01"
         if welcome:

@@ -12,7 +12,7 @@ import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 from zmq.utils.monitor import parse_monitor_message
 
-from paramove.bus.endpoint import socket_path
+from paramove.bus.endpoint import can_read, socket_path
 from paramove.bus.envelope import SIZE, Envelope, Reason, RefusedError, unpack
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
@@ -90,11 +90,8 @@ class Subscriber:
 
     def receive_raw(self) -> tuple[Envelope, bytes] | None:
         """Like `receive`, with the payload left encoded."""
-        while True:
-            try:
-                frames = self.socket.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
-                return None
+        while can_read(self.socket):
+            frames = self.socket.recv_multipart(zmq.NOBLOCK)
             try:
                 envelope = self._check(frames)
             except RefusedError as error:
@@ -102,6 +99,7 @@ class Subscriber:
                 continue
             if self.counter.accept(envelope) is Arrival.NEW:
                 return envelope, frames[2]
+        return None
 
     def is_deaf(self) -> bool:
         """Whether libzmq has given the connection up for good, so that only `reopen` helps.

@@ -1,0 +1,143 @@
+"""A bus that hands out what was recorded or made up, and keeps what the node says. For replay tests of nodes.
+
+bus = RecordedBus([Heard(topics.CAMERA_IMAGE, image, 0, 0, 1), Tick(1, 66_666_667)])
+run(bus, Config())
+assert [said.message for said in bus.said_on(topics.OBJECTS_TRACKED)] == [...]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from paramove.bus.settings import BusSettings
+from paramove.bus.subscriber import Heard
+from paramove.bus.topics import Topic
+from paramove.bus.turns import TICK_PERIOD_NS, Tick
+
+
+@dataclass(frozen=True)
+class Said:
+    """One message that the node said."""
+
+    topic: Topic
+    message: Any
+    captured_ns: int
+    published_ns: int
+
+
+def with_ticks(messages: Iterable[Heard], period_ns: int = TICK_PERIOD_NS) -> Iterator[Heard | Tick]:
+    """Messages in the order of publish time, and a tick at the end of every period up to the last message.
+
+    Args:
+        messages: In any order.
+        period_ns: Of the ticks; a message published exactly at a tick comes before it.
+    """
+    number = 0
+    for heard in sorted(messages, key=lambda item: item.published_ns):
+        if number == 0:
+            number = -(-heard.published_ns // period_ns)
+        while heard.published_ns > number * period_ns:
+            yield Tick(number, number * period_ns)
+            number += 1
+        yield heard
+    yield Tick(number, number * period_ns)
+
+
+class RecordedBus:
+    """Has the methods of `Bus` that nodes use, without sockets, processes and real time.
+
+    Args:
+        recorded: Messages and ticks, in the order in which the node gets them.
+        node: Name of the node.
+        run_folder: Where the node may write files.
+
+    Attributes:
+        said: Everything the node said, in order.
+        states: States and sentences in order, such as ("ready", "tracking 4 colours").
+        now_ns: Publish time of the newest message or time of the newest tick.
+    """
+
+    def __init__(
+        self, recorded: Iterable[Heard | Tick] = (), node: str = "node", run_folder: Path | None = None
+    ) -> None:
+        self.node = node
+        self.run_folder = run_folder or Path()
+        self.settings = BusSettings(folder=self.run_folder, clock="simulated")
+        self.said: list[Said] = []
+        self.states: list[tuple[str, str]] = []
+        self.now_ns = 0
+        self.stopped = False
+        self._waiting = list(recorded)
+
+    def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
+        """Keeps the message, as it is now; raises TypeError if the topic carries another type."""
+        if type(message) is not topic.type:
+            raise TypeError(f"topic {topic.name} carries {topic.type_name}, not {type(message).__name__}")
+        kept = topic.type()
+        kept.CopyFrom(message)
+        self.said.append(Said(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
+
+    def said_on(self, topic: Topic) -> list[Said]:
+        """What the node said on one topic."""
+        return [said for said in self.said if said.topic.name == topic.name]
+
+    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
+        """As `Bus.events`; ends with the recording. Messages of other topics stay for a later loop."""
+        return self._events({topic.name for topic in wanted}, tick)
+
+    def latest(self, *wanted: Topic) -> Iterator[Heard]:
+        """As `Bus.latest`; the messages between two ticks are one turn, without ticks each message is its own."""
+        names = {topic.name for topic in wanted}
+        turn: dict[str, Heard] = {}
+        has_ticks = any(isinstance(event, Tick) for event in self._waiting)
+        for event in self._events(names, tick=True):
+            if isinstance(event, Heard):
+                turn.pop(event.topic.name, None)
+                turn[event.topic.name] = event
+                if has_ticks:
+                    continue
+            yield from turn.values()
+            turn.clear()
+        yield from turn.values()
+
+    def hear(self, topic: Topic) -> None:
+        """Every topic of the recording is heard anyway."""
+
+    def starting(self, sentence: str) -> None:
+        """Keeps the state."""
+        self.states.append(("starting", sentence))
+
+    def ready(self, sentence: str) -> None:
+        """Keeps the state."""
+        self.states.append(("ready", sentence))
+
+    def degraded(self, sentence: str) -> None:
+        """Keeps the state."""
+        self.states.append(("degraded", sentence))
+
+    def failed(self, sentence: str) -> None:
+        """Keeps the state."""
+        self.states.append(("failed", sentence))
+
+    def stop(self) -> None:
+        """Ends every loop over events."""
+        self.stopped = True
+
+    def close(self) -> None:
+        """Ends every loop over events."""
+        self.stopped = True
+
+    def _events(self, names: set[str], tick: bool) -> Iterator[Heard | Tick]:
+        index = 0
+        while not self.stopped and index < len(self._waiting):
+            event = self._waiting[index]
+            if isinstance(event, Heard) and names and event.topic.name not in names:
+                index += 1
+                continue
+            del self._waiting[index]
+            self.now_ns = event.now_ns if isinstance(event, Tick) else event.published_ns
+            if tick or isinstance(event, Heard):
+                yield event
