@@ -1,0 +1,1 @@
+"""Launch files, and the supervision of the processes that they name."""

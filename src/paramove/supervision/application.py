@@ -1,0 +1,101 @@
+"""From the name of a launch file to the outcome of its run."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from paramove.supervision.domain import held_domain
+from paramove.supervision.interfaces import Interface
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.run_folder import RunFolder
+from paramove.supervision.supervisor import Outcome, Supervisor, View
+from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+
+DEFAULT_DOMAIN = "default"
+
+
+def find_workspace(start: Path) -> Path:
+    """The nearest folder at or above `start` that holds `launch/` and `nodes/`; raises FileNotFoundError."""
+    for folder in (start, *start.parents):
+        if (folder / "launch").is_dir() and (folder / "nodes").is_dir():
+            return folder
+    raise FileNotFoundError(
+        f"{start} lies in no paramove workspace (a folder with launch/ and nodes/); change into your clone first"
+    )
+
+
+def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
+    """Checks all that can be known before a process starts; returns the interfaces; raises LaunchFileError."""
+    interfaces = read_interfaces(launch, workspace)
+    check_wiring(launch, interfaces)
+    return interfaces
+
+
+def run(launch: Launch, workspace: Path, make_view: Callable[[RunFolder], View]) -> tuple[Outcome, RunFolder]:
+    """Checks the launch file, makes the run folder and runs to the end.
+
+    Args:
+        launch: From `launch_file.load`.
+        workspace: Root of the workspace; the run folder is made in its `runs`.
+        make_view: Gets the run folder, so that it can be shown.
+
+    Raises LaunchFileError, DomainError (another run holds the domain) or OSError (run folder).
+    """
+    interfaces = check(launch, workspace)
+    name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
+    with held_domain(name, f"paramove launch {launch.name}") as domain:
+        begun = datetime.datetime.now().astimezone()
+        folder = RunFolder.create(workspace / "runs", begun)
+        folder.write_effective(launch)
+        folder.write_configs(launch, domain.folder, domain.truth_folder, clock_speaker(interfaces))
+        facts = _facts(launch, workspace, domain.name, begun)
+        folder.write_run(facts)
+        supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder))
+        outcome = supervisor.run()
+        ended = datetime.datetime.now().astimezone()
+        facts["outcome"] = {
+            "exit_code": outcome.code,
+            "reason": outcome.reason,
+            "ended": ended.isoformat(timespec="seconds"),
+            "duration_s": round((ended - begun).total_seconds(), 1),
+            "nodes": {
+                node.name: {"state": node.state.value, "exit_code": node.exit_code, "restarts": node.restarts}
+                for node in supervisor.nodes.values()
+            },
+        }
+        folder.write_run(facts)
+    return outcome, folder
+
+
+def _facts(launch: Launch, workspace: Path, domain: str, begun: datetime.datetime) -> dict[str, Any]:
+    return {
+        "launch": launch.name,
+        "overlays": list(launch.overlays),
+        "seed": launch.seed,
+        "domain": domain,
+        "begun": begun.isoformat(timespec="seconds"),
+        "version": importlib.metadata.version("paramove"),
+        "commit": _commit(workspace),
+    }
+
+
+def _commit(workspace: Path) -> str | None:
+    """Commit of the workspace, with `+` if files differ from it; None where git or its history is not there."""
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"],
+            cwd=workspace,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return answer.stdout.strip() or None

@@ -1,0 +1,87 @@
+"""The folder in which the sockets of one run lie: one run per domain at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from paramove.bus.settings import default_folder
+
+LONGEST_FOLDER = 70
+"""Bytes of a folder's path; a socket's path may have 107 and the longest topic name needs the rest."""
+
+
+class DomainError(RuntimeError):
+    """The domain cannot be used: its name, its folder, or another run in it."""
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Folders of sockets.
+
+    Attributes:
+        name: Of the domain, `default` unless PARAMOVE_DOMAIN says otherwise.
+        folder: Sockets of the bus.
+        truth_folder: Sockets of the ground truth, in a place that the bus folder does not tell.
+    """
+
+    name: str
+    folder: Path
+    truth_folder: Path
+
+
+def _made(folder: Path) -> Path:
+    """The folder above the domains, made with mode 0700; raises DomainError if it belongs to somebody else."""
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
+        raise DomainError(f"{folder} is no folder of yours; remove it or set XDG_RUNTIME_DIR to a folder of your own")
+    return folder
+
+
+@contextlib.contextmanager
+def held_domain(name: str, holder: str) -> Iterator[Domain]:
+    """Makes the folders of a domain and holds them until the block ends.
+
+    Args:
+        name: Lower-case letters, digits, `_` and `-`.
+        holder: Who holds it, for the error that another run in the same domain gets.
+
+    Raises DomainError if another run holds it.
+    """
+    if not re.fullmatch(r"[a-z0-9_-]{1,40}", name):
+        raise DomainError(f"domain {name!r}: expected up to 40 lower-case letters, digits, '_' or '-'")
+    folder = default_folder(name)
+    runtime = _made(folder.parent)
+    if len(os.fsencode(folder)) > LONGEST_FOLDER:
+        raise DomainError(f"{folder} is too long for sockets; set XDG_RUNTIME_DIR to a shorter path, such as /tmp/r")
+    with (runtime / f"{name}.lock").open("a+", encoding="utf-8") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            lock.seek(0)
+            found = lock.read().strip() or "another process"
+            raise DomainError(
+                f"domain '{name}' is held by {found}; end that run or choose another domain with PARAMOVE_DOMAIN=..."
+            ) from error
+        lock.truncate(0)
+        lock.write(f"pid {os.getpid()} ({holder})")
+        lock.flush()
+        for old in (folder, *runtime.glob(f"truth-{name}-*")):
+            shutil.rmtree(old, ignore_errors=True)  # sockets of a run that was killed
+        folder.mkdir(mode=0o700)
+        truth = Path(tempfile.mkdtemp(prefix=f"truth-{name}-", dir=runtime))
+        try:
+            yield Domain(name, folder, truth)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            shutil.rmtree(truth, ignore_errors=True)
+            lock.truncate(0)

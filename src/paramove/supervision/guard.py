@@ -1,0 +1,51 @@
+"""Ends the nodes of a launcher that died without ending them. Run as a file by the launcher, with nothing imported.
+
+Each node gets SIGTERM from the kernel when the launcher dies (PR_SET_PDEATHSIG); this process sends SIGKILL to the
+process groups that outlive it. It reads lines `+<group>` and `-<group>` from a pipe whose other end the launcher holds,
+and acts when that end closes, which the kernel does however the launcher ended.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import time
+
+GRACE_S = 5.0
+
+
+def main() -> None:
+    """Follows the pipe on standard input to its end, then ends what is left."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # a closed terminal must not end the guard before the nodes
+    groups: set[int] = set()
+    for line in sys.stdin:
+        if line.startswith("+"):
+            groups.add(int(line[1:]))
+        elif line.startswith("-"):
+            groups.discard(int(line[1:]))
+    end_groups(groups, GRACE_S)
+
+
+def end_groups(groups: set[int], grace_s: float) -> None:
+    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`."""
+    deadline_s = time.monotonic() + grace_s
+    left = {group for group in groups if _send(group, signal.SIGTERM)}
+    while left and time.monotonic() < deadline_s:
+        time.sleep(0.02)
+        left = {group for group in left if _send(group, 0)}
+    for group in left:
+        _send(group, signal.SIGKILL)
+
+
+def _send(group: int, number: int) -> bool:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(group, number)
+        return True
+    return False
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,146 @@
+"""What a node hears, says and takes, read from its source without running it."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from paramove.bus import topics
+from paramove.bus.topics import Topic
+
+
+class InterfaceError(ValueError):
+    """A node's module is missing or its HEARS or SAYS cannot be read."""
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A node as the others see it.
+
+    Attributes:
+        path: Source file of the module.
+        hears: Topics that it subscribes to.
+        says: Topics that it publishes, without its status.
+        parameters: Names of its parameters; None where they cannot be read from the source.
+    """
+
+    path: Path
+    hears: tuple[Topic, ...]
+    says: tuple[Topic, ...]
+    parameters: tuple[str, ...] | None
+
+
+def source_of(module: str, workspace: Path) -> Path:
+    """Source file of a module of the workspace or of the installed library; raises InterfaceError."""
+    relative = Path(*module.split("."))
+    for candidate in (workspace / relative.with_suffix(".py"), workspace / relative / "__main__.py"):
+        if candidate.is_file():
+            return candidate
+    if module.startswith("paramove."):
+        found = _installed(module)
+        if found is not None:
+            return found
+    folder = workspace / relative.parent
+    known = sorted(file.stem for file in folder.glob("*.py") if not file.stem.startswith("_"))
+    neighbours = f"; {relative.parent} has: {', '.join(known)}" if known else ""
+    raise InterfaceError(f"there is no module '{module}' ({relative.with_suffix('.py')}) in {workspace}{neighbours}")
+
+
+def _installed(module: str) -> Path | None:
+    try:
+        found = importlib.util.find_spec(module)
+    except ModuleNotFoundError:
+        return None
+    return Path(found.origin) if found is not None and found.origin else None
+
+
+def read_interface(module: str, workspace: Path) -> Interface:
+    """Interface of a node's module.
+
+    HEARS and SAYS are read from the source as long as they are written as `topics.NAME`, tuples and sums of these;
+    otherwise the module is imported once in a process of its own, because nodes import heavy libraries.
+
+    Raises InterfaceError.
+    """
+    path = source_of(module, workspace)
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+    except SyntaxError as error:
+        raise InterfaceError(f"{path}:{error.lineno}: {error.msg}") from error
+    parameters = _parameters(tree)
+    try:
+        return Interface(path, _constant(tree, "HEARS", path), _constant(tree, "SAYS", path), parameters)
+    except _NotPlainError:
+        hears, says = _imported(module, workspace)
+        return Interface(path, hears, says, parameters)
+
+
+class _NotPlainError(Exception):
+    """The expression is more than names of topics."""
+
+
+def _constant(tree: ast.Module, name: str, path: Path) -> tuple[Topic, ...]:
+    assigned = {}
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
+            assigned[statement.targets[0].id] = statement.value
+        elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name) and statement.value:
+            assigned[statement.target.id] = statement.value
+    if name not in assigned:
+        raise InterfaceError(f"{path}: a node says what it hears and says, but {name} is missing")
+    return _topics(assigned[name], assigned, path)
+
+
+def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> tuple[Topic, ...]:
+    match expression:
+        case ast.Tuple(elts=elements) | ast.List(elts=elements):
+            return tuple(topic for element in elements for topic in _topics(element, assigned, path))
+        case ast.Starred(value=value):
+            return _topics(value, assigned, path)
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return _topics(left, assigned, path) + _topics(right, assigned, path)
+        case ast.Name(id=name) if name in assigned:
+            return _topics(assigned[name], assigned, path)
+        case ast.Attribute(value=ast.Name(id="topics"), attr=name):
+            found = getattr(topics, name, None)
+            if isinstance(found, Topic):
+                return (found,)
+            if isinstance(found, tuple) and all(isinstance(topic, Topic) for topic in found):
+                return found
+            raise InterfaceError(f"{path}:{expression.lineno}: there is no topic topics.{name} in paramove.bus.topics")
+    raise _NotPlainError
+
+
+def _parameters(tree: ast.Module) -> tuple[str, ...] | None:
+    for statement in tree.body:
+        if isinstance(statement, ast.ClassDef) and statement.name == "Config":
+            if [ast.unparse(base) for base in statement.bases] != ["NodeConfig"]:
+                return None
+            fields = [line for line in statement.body if isinstance(line, ast.AnnAssign)]
+            return tuple(field.target.id for field in fields if isinstance(field.target, ast.Name))
+    return None
+
+
+_ASK = (
+    "import importlib, json, sys; module = importlib.import_module(sys.argv[1]);"
+    "sys.stdout.write('\\n' + json.dumps([[t.name for t in topics] for topics in (module.HEARS, module.SAYS)]))"
+)
+
+
+def _imported(module: str, workspace: Path) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
+    try:
+        answer = subprocess.run(
+            [sys.executable, "-c", _ASK, module], cwd=workspace, capture_output=True, text=True, timeout=60, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise InterfaceError(f"importing '{module}' took more than 60 s") from error
+    if answer.returncode != 0:
+        last = answer.stderr.strip().splitlines()[-1:] or ["no message"]
+        raise InterfaceError(f"'{module}' cannot be imported: {last[0]}")
+    hears, says = json.loads(answer.stdout.splitlines()[-1])
+    return tuple(map(topics.by_name, hears)), tuple(map(topics.by_name, says))

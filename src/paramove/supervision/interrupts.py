@@ -1,0 +1,46 @@
+"""Ctrl-C, SIGTERM and a closed terminal, as facts that a loop can look at."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+_HANDLED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupts:
+    """While the block lasts, the signals that end a run are counted instead of ending the process.
+
+    Attributes:
+        first: The first of these signals, None before.
+        urgent: Whether SIGINT or SIGTERM came once more: end everything at once. A closed terminal may send several
+            SIGHUP, so these do not count.
+        wake_fd: Readable after a signal.
+    """
+
+    def __init__(self) -> None:
+        self.first: signal.Signals | None = None
+        self.urgent = False
+        self.wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in _HANDLED:
+            self._before[number] = signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        os.close(self.wake_fd)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.first is None:
+            self.first = signal.Signals(number)
+        elif number != signal.SIGHUP:
+            self.urgent = True
+        os.eventfd_write(self.wake_fd, 1)

@@ -1,0 +1,68 @@
+"""What a launch file may say, as pydantic models."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+Module = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)*$", max_length=200)]
+Seconds = Annotated[float, Field(ge=0.0, le=86_400.0)]
+
+
+class _Checked(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class BusSettings(_Checked):
+    """The bus of a run."""
+
+    clock: Literal["simulated", "monotonic"] = Field(default="monotonic", description="what the time of the run is")
+    lockstep: bool = Field(
+        default=False, description="simulated time advances only when all members are done with a tick"
+    )
+
+
+class RestartBudget(_Checked):
+    """So many restarts within so many seconds; one more and the node is given up."""
+
+    restarts: int = Field(default=5, ge=0, le=1000)
+    window_s: Seconds = 300.0
+
+
+class NodeSettings(_Checked):
+    """One process of the run."""
+
+    module: Module = Field(description="Python module that is started, such as nodes.camera")
+    parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
+    remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
+    restart: Literal["never", "on-failure", "always"] = "never"
+    backoff_s: Seconds = Field(default=1.0, description="wait before the first restart; doubles up to 30 s")
+    budget: RestartBudget = RestartBudget()
+    required: bool = Field(default=True, description="the run fails when this node ends before the run does")
+    after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
+    ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 30.0
+    ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
+    lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
+    observer: bool = Field(default=False, description="hears whatever is said: a topic without a speaker is no error")
+    truth: bool = Field(
+        default=False, description="gets the folder of ground truth; for the simulator and the judge only"
+    )
+    stop: Literal["first", "in-order", "last"] = Field(default="in-order", description="when it is stopped")
+
+
+class LaunchFile(_Checked):
+    """One application: its nodes and how they are kept running."""
+
+    description: str = ""
+    bus: BusSettings = BusSettings()
+    nodes: dict[Name, NodeSettings] = Field(min_length=1)
+    default_overlays: list[str] = Field(default_factory=list, description="laid over it where --with is not given")
+    seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
+    after_run: Module | None = Field(
+        default=None, description="module called with the run folder when all nodes have ended"
+    )
+    time_limit_s: Annotated[float, Field(gt=0.0)] | None = Field(
+        default=None, description="wall-clock limit of the run"
+    )

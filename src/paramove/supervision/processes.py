@@ -1,0 +1,153 @@
+"""Starts, watches and ends one process with everything that it starts; no process outlives the launcher."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+_HERE = Path(__file__).parent
+_NO_SITE = ("-I", "-S")  # these two files need the standard library only, and start faster so
+
+
+class Guard:
+    """The process that ends the nodes of a launcher that was killed (see `guard.py`)."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, *_NO_SITE, str(_HERE / "guard.py")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            start_new_session=True,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Lets the guard end what is still watched, and waits for it."""
+        if self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):
+                self._process.stdin.close()
+        self._process.wait()
+
+    def watch(self, group: int) -> None:
+        """From now on the process group ends with the launcher."""
+        self._say(f"+{group}")
+
+    def forget(self, group: int) -> None:
+        """The process group has ended."""
+        self._say(f"-{group}")
+
+    def _say(self, line: str) -> None:
+        if self._process.stdin is not None:
+            with contextlib.suppress(BrokenPipeError):  # the guard was killed: the kernel's SIGTERM remains
+                self._process.stdin.write(line + "\n")
+                self._process.stdin.flush()
+
+
+class SupervisedProcess:
+    """One started command: leader of its own session and process group, tied to the launcher's life.
+
+    Attributes:
+        pid: Process id, which is also the id of its process group.
+        pidfd: Readable as soon as the process has ended.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        *,
+        folder: Path,
+        environment: Mapping[str, str],
+        guard: Guard,
+        log: Path | None = None,
+    ) -> None:
+        """Starts `command` in `folder`; its output goes to the end of the file `log`, or where the launcher's goes.
+
+        Raises RuntimeError outside the main thread: the kernel ties a process to the thread that started it.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            raise RuntimeError("processes are started from the main thread, whose end is the launcher's end")
+        tied = [sys.executable, *_NO_SITE, str(_HERE / "tied.py"), str(os.getpid()), *command]
+        with _output(log) as output:
+            self._process = subprocess.Popen(
+                tied,
+                cwd=folder,
+                env=dict(environment),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT if log else None,
+                start_new_session=True,
+            )
+        self.pid = self._process.pid
+        self.pidfd = os.pidfd_open(self.pid)
+        self._guard = guard
+        guard.watch(self.pid)
+
+    def ended(self) -> int | None:
+        """Exit code (negative: number of the signal) once the process has ended, else None.
+
+        What it started and left behind is killed with it.
+        """
+        code = self._process.poll()
+        if code is not None and self.pidfd >= 0:
+            self._signal(signal.SIGKILL)
+            os.close(self.pidfd)
+            self.pidfd = -1
+            self._guard.forget(self.pid)
+        return code
+
+    def terminate(self) -> None:
+        """Asks the process to end. It alone is asked: it knows in which order its own children end."""
+        if self._process.poll() is None:
+            self._process.terminate()
+
+    def kill(self) -> None:
+        """Ends the process and all of its group at once."""
+        self._signal(signal.SIGKILL)
+
+    def _signal(self, number: signal.Signals) -> None:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, number)
+
+
+@contextlib.contextmanager
+def _output(log: Path | None):  # type: ignore[no-untyped-def]
+    if log is None:
+        yield None
+        return
+    with log.open("ab") as file:
+        yield file
+
+
+def last_lines(file: Path, count: int) -> list[str]:
+    """The last `count` lines of a text file, with control characters written out; [] if it cannot be read."""
+    try:
+        with file.open("rb") as opened:
+            return [printable(line) for line in deque(_decoded(opened), maxlen=count)]
+    except OSError:
+        return []
+
+
+def _decoded(opened: IO[bytes]) -> list[str]:
+    opened.seek(0, os.SEEK_END)
+    opened.seek(max(0, opened.tell() - 100_000))
+    return opened.read().decode("utf-8", errors="replace").splitlines()
+
+
+def printable(text: str) -> str:
+    """The text without characters that could steer a terminal: they are written as escapes."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

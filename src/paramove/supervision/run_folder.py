@@ -1,0 +1,102 @@
+"""The folder of one run: effective launch file, node configurations, logs, outcome."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from paramove.supervision.launch_file import Launch
+
+
+class RunFolder:
+    """Layout of `runs/<YYYY-MM-DD_HH-MM-SS[-n]>/`.
+
+    Attributes:
+        path: The folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.nodes = path / "nodes"
+        self.logs = path / "logs"
+
+    @classmethod
+    def create(cls, runs: Path, now: datetime.datetime) -> RunFolder:
+        """Makes a new folder below `runs`, named by local time, and points the link `latest` to it.
+
+        Raises OSError if `runs` cannot be written.
+        """
+        stamp = now.strftime("%Y-%m-%d_%H-%M-%S")
+        runs.mkdir(parents=True, exist_ok=True)
+        for number in range(1, 1000):
+            path = runs / (stamp if number == 1 else f"{stamp}-{number}")
+            try:
+                path.mkdir()
+            except FileExistsError:
+                continue
+            folder = cls(path)
+            folder.nodes.mkdir()
+            folder.logs.mkdir()
+            _point_latest(runs, path)
+            return folder
+        raise FileExistsError(f"{runs / stamp} and 998 more exist already")
+
+    def log(self, node: str) -> Path:
+        """File of what the node writes to standard output and standard error."""
+        return self.logs / f"{node}.log"
+
+    def config(self, node: str) -> Path:
+        """File that the node gets as `--config`."""
+        return self.nodes / f"{node}.yaml"
+
+    def write_effective(self, launch: Launch) -> None:
+        """Writes `launch.yaml`: the launch file after overlays, settings and defaults."""
+        _write(self.path / "launch.yaml", launch.file.model_dump(mode="json"))
+
+    def write_configs(self, launch: Launch, bus_folder: Path, truth_folder: Path, clock: str | None = None) -> None:
+        """Writes the configuration of every node.
+
+        Args:
+            launch: Names nodes and parameters.
+            bus_folder: Of the sockets.
+            truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` learn of it.
+            clock: Node that says the clock; in lockstep it is told whom to wait for.
+        """
+        lockstep = launch.file.bus.lockstep
+        for name, node in launch.file.nodes.items():
+            bus: dict[str, Any] = {
+                "folder": str(bus_folder),
+                "clock": launch.file.bus.clock,
+                "lockstep": lockstep and (node.lockstep or name == clock),
+            }
+            if name == clock and lockstep:
+                bus["members"] = [other for other, its in launch.file.nodes.items() if its.lockstep and other != clock]
+            if node.truth:
+                bus["truth_folder"] = str(truth_folder)
+            if node.remaps:
+                bus["remaps"] = dict(node.remaps)
+            config = {"node": name, "bus": bus, "parameters": node.parameters, "run_folder": str(self.path)}
+            _write(self.config(name), config)
+
+    def write_run(self, facts: dict[str, Any]) -> None:
+        """Writes `run.yaml`: what was run, and once it has ended how it ended."""
+        _write(self.path / "run.yaml", facts)
+
+
+def _point_latest(runs: Path, path: Path) -> None:
+    beside = runs / f".latest-{os.getpid()}"
+    beside.unlink(missing_ok=True)
+    beside.symlink_to(path.name)
+    beside.replace(runs / "latest")
+
+
+def _write(path: Path, content: Any) -> None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    with path.open("w", encoding="utf-8") as file:
+        yaml.dump(content, file)

@@ -1,0 +1,249 @@
+"""Starts the nodes of a launch file in order, keeps them running, and ends all of them."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.supervision import exit_codes
+from paramove.supervision.domain import Domain
+from paramove.supervision.interrupts import Interrupts
+from paramove.supervision.launch_file import Launch, start_waves
+from paramove.supervision.launch_schema import LaunchFile
+from paramove.supervision.listener import Listener
+from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
+from paramove.supervision.run_folder import RunFolder
+from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
+
+TURN_S = 0.05
+"""Longest wait between two looks at the bus; the end of a process is seen at once."""
+STOP_S = 5.0
+"""From SIGTERM to SIGKILL for one wave of nodes."""
+STOP_ALL_S = 10.0
+"""For all waves together."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: exit code of the launcher and the reason in words."""
+
+    code: int
+    reason: str
+
+
+class View(Protocol):
+    """Shows a run to a person."""
+
+    def changed(self, node: SupervisedNode) -> None:
+        """A node's state has changed."""
+
+    def story(self, text: str) -> None:
+        """The robot said something, or the application reached a new step."""
+
+    def problem(self, text: str) -> None:
+        """Something went wrong; may have several lines."""
+
+    def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
+        """Called several times a second."""
+
+    def close(self) -> None:
+        """The nodes have ended."""
+
+
+class Supervisor:
+    """Runs a launch file to its end.
+
+    Order of the start: a node starts when all that it comes `after` are ready. Order of the end: nodes with
+    `stop: first`, then the others against the order of their start, then nodes with `stop: last`; each wave gets
+    SIGTERM and after 5 s SIGKILL, all together have 10 s.
+
+    Args:
+        launch: What to run.
+        workspace: Working directory of the nodes.
+        run_folder: Of this run; configurations of the nodes are written there before.
+        domain: Folders of the bus.
+        view: Shows what happens.
+    """
+
+    def __init__(self, launch: Launch, workspace: Path, run_folder: RunFolder, domain: Domain, view: View) -> None:
+        self._file = launch.file
+        self._workspace = workspace
+        self._folder = run_folder
+        self._view = view
+        self._interrupts = Interrupts()
+        self.nodes = {
+            name: SupervisedNode(name, node, self._spawn_node, view.changed) for name, node in self._file.nodes.items()
+        }
+        self._listener_folder = domain.folder
+        self._environment = node_environment(os.environ)
+
+    def run(self) -> Outcome:
+        """Starts, supervises and ends the nodes, then calls `after_run`.
+
+        An interrupted run is not judged: `after_run` is left out.
+        """
+        listener = Listener(self._listener_folder, self.nodes, self._hear, self._view.story)
+        with Guard() as self._guard, self._interrupts:
+            try:
+                outcome = self._supervise(listener)
+                self._stop_all(listener)
+            finally:
+                self._kill_all()
+                listener.close()
+                self._view.close()
+            if self._file.after_run and self._interrupts.first is None:
+                outcome = self._judge(self._file.after_run, outcome)
+        return outcome
+
+    def _supervise(self, listener: Listener) -> Outcome:
+        """Runs until something ends the run; the reason is the outcome."""
+        limit_s = time.monotonic() + (self._file.time_limit_s or float("inf"))
+        while True:
+            self._start_due()
+            for node, code in self._turn(listener):
+                node.conclude(code, time.monotonic())
+                if node.state is State.GIVEN_UP:
+                    self._show_log(node)
+            outcome = self._outcome(limit_s)
+            if outcome is not None:
+                return outcome
+
+    def _start_due(self) -> None:
+        for node in self.nodes.values():
+            if node.state is State.WAITING and all(self.nodes[other].is_up for other in node.settings.after):
+                node.start(time.monotonic())
+
+    def _turn(self, listener: Listener) -> list[tuple[SupervisedNode, int]]:
+        """Waits up to `TURN_S` for an end or a signal, listens, and returns the nodes that ended with exit codes."""
+        poll = select.poll()
+        poll.register(self._interrupts.wake_fd, select.POLLIN)
+        for node in self.nodes.values():
+            if node.process is not None:
+                poll.register(node.process.pidfd, select.POLLIN)
+        poll.poll(TURN_S * 1e3)
+        if not self._interrupts.urgent:
+            _drain(self._interrupts.wake_fd)
+        listener.listen()
+        now_s = time.monotonic()
+        checked = [(node, node.check(now_s)) for node in self.nodes.values()]
+        self._view.refresh(self.nodes.values())
+        return [(node, code) for node, code in checked if code is not None]
+
+    def _outcome(self, limit_s: float) -> Outcome | None:
+        """The outcome if the run has come to its end."""
+        if self._interrupts.first is not None:
+            number = self._interrupts.first
+            return Outcome(exit_codes.by_signal(number), f"interrupted by {number.name}")
+        for node in self.nodes.values():
+            if node.state is State.FINISHED and node.settings.ends_run:
+                return Outcome(exit_codes.OK, f"{node.name} has finished")
+            if node.state in (State.GIVEN_UP, State.FINISHED) and node.settings.required:
+                return Outcome(exit_codes.FAILURE, f"required node {node.name} has ended: {node.sentence}")
+        if all(node.state in ENDED for node in self.nodes.values()):
+            failed = [node.name for node in self.nodes.values() if node.state is State.GIVEN_UP]
+            reason = f"given up: {', '.join(failed)}" if failed else "all nodes have finished"
+            return Outcome(exit_codes.FAILURE if failed else exit_codes.OK, reason)
+        if self._stuck():
+            return Outcome(exit_codes.FAILURE, f"never started: {', '.join(self._stuck())}")
+        if time.monotonic() > limit_s:
+            return Outcome(exit_codes.TIME_LIMIT, f"not at its end within {self._file.time_limit_s:g} s")
+        return None
+
+    def _stuck(self) -> list[str]:
+        """Nodes that wait for one that was given up."""
+        given_up = {node.name for node in self.nodes.values() if node.state is State.GIVEN_UP}
+        waiting = [node for node in self.nodes.values() if node.state is State.WAITING]
+        return [node.name for node in waiting if given_up.intersection(node.settings.after)]
+
+    def _stop_all(self, listener: Listener) -> None:
+        end_s = time.monotonic() + STOP_ALL_S
+        for node in self.nodes.values():
+            if not node.is_running:
+                node.stop()  # it is not started any more
+        for wave in stop_waves(self._file):
+            begun_s = time.monotonic()
+            for name in wave:
+                self.nodes[name].stop()
+            wave_end_s = min(begun_s + STOP_S, end_s)
+            while any(self.nodes[name].is_running for name in wave):
+                if self._interrupts.urgent:
+                    self._kill_all()
+                elif time.monotonic() > wave_end_s:
+                    for name in wave:
+                        self.nodes[name].kill()
+                for node, code in self._turn(listener):
+                    if node.state is not State.STOPPING:  # ended by itself while others were being stopped
+                        self._view.problem(f"{node.name} ended before it was asked: {exit_codes.describe(code)}")
+                    node.stopped(code, time.monotonic() - begun_s)
+
+    def _kill_all(self) -> None:
+        for node in self.nodes.values():
+            node.kill()
+
+    def _judge(self, module: str, outcome: Outcome) -> Outcome:
+        """Calls `after_run` with the run folder; a run that went well succeeds if it says so."""
+        command = [sys.executable, "-m", module, str(self._folder.path)]
+        judge = SupervisedProcess(command, folder=self._workspace, environment=self._environment, guard=self._guard)
+        code = judge.ended()
+        while code is None:
+            if self._interrupts.urgent:
+                judge.kill()
+            elif self._interrupts.first is not None:
+                judge.terminate()
+            select.select([judge.pidfd], [], [], TURN_S)
+            code = judge.ended()
+        if self._interrupts.first is not None:
+            return Outcome(exit_codes.by_signal(self._interrupts.first), f"interrupted during {module}")
+        if outcome.code == exit_codes.OK and code != exit_codes.OK:
+            return Outcome(code if code > 0 else exit_codes.FAILURE, f"{outcome.reason}; {module}: exit code {code}")
+        return outcome
+
+    def _spawn_node(self, name: str) -> SupervisedProcess:
+        command = [sys.executable, "-m", self._file.nodes[name].module, "--config", str(self._folder.config(name))]
+        return SupervisedProcess(
+            command,
+            folder=self._workspace,
+            environment=self._environment,
+            guard=self._guard,
+            log=self._folder.log(name),
+        )
+
+    def _hear(self, status: NodeStatus) -> None:
+        if status.node in self.nodes:
+            self.nodes[status.node].hear(status)
+
+    def _show_log(self, node: SupervisedNode) -> None:
+        path = self._folder.log(node.name)
+        lines = "\n".join(f"    {line}" for line in last_lines(path, 20))
+        self._view.problem(f"{node.name}: {node.sentence}. Last lines of {path}:\n{lines or '    (empty)'}")
+
+
+def stop_waves(file: LaunchFile) -> list[list[str]]:
+    """Nodes in the order of their end."""
+    first = [name for name, node in file.nodes.items() if node.stop == "first"]
+    last = [name for name, node in file.nodes.items() if node.stop == "last"]
+    between = [[name for name in wave if name not in (*first, *last)] for wave in reversed(start_waves(file))]
+    return [wave for wave in (first, *between, last) if wave]
+
+
+def node_environment(own: Mapping[str, str]) -> dict[str, str]:
+    """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set.
+
+    Ten processes with a thread per core each would only hinder one another.
+    """
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    return {**threads, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
+
+
+def _drain(wake_fd: int) -> None:
+    try:
+        os.eventfd_read(wake_fd)
+    except BlockingIOError:
+        return

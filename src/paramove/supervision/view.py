@@ -1,0 +1,156 @@
+"""Shows a run in the terminal: the story as lines, the nodes as a live table or as lines at each change."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+
+import psutil
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from paramove.supervision.processes import printable
+from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
+
+_STYLES = {
+    State.READY: "green",
+    State.FINISHED: "green",
+    State.DEGRADED: "yellow",
+    State.STARTING: "cyan",
+    State.RESTARTING: "yellow",
+    State.FAILED: "red",
+    State.GIVEN_UP: "bold red",
+}
+REFRESH_S = 0.5
+
+
+class LineView:
+    """One line per event, for logs and pipes. A terminal that was closed is no error: the run has to end in order."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._begun_s = time.monotonic()
+        self._closed = False
+
+    def changed(self, node: SupervisedNode) -> None:
+        """`12.3 s  camera  ready  sentence`."""
+        style = _STYLES.get(node.state, "")
+        state = Text(f"{node.state.value:<11}", style=style)
+        self._line(Text.assemble(f"{node.name:<16} ", state, f" {node.sentence}"))
+
+    def story(self, text: str) -> None:
+        """The robot's words or a new stage, set off from the states of nodes."""
+        self._line(Text(printable(text), style="bold"))
+
+    def problem(self, text: str) -> None:
+        """Something went wrong."""
+        self._line(Text(text, style="red"))
+
+    def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
+        """Lines do not change once they are written."""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def _line(self, text: Text) -> None:
+        if self._closed:
+            return
+        stamp = Text(f"{time.monotonic() - self._begun_s:7.1f} s  ", style="dim")
+        try:
+            self._console.print(Text.assemble(stamp, text), soft_wrap=True)
+        except OSError:
+            self._closed = True
+
+
+class TableView(LineView):
+    """The story scrolls above a table of the nodes; states are told in the table only."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(console)
+        self._live = Live(console=console, auto_refresh=False)
+        self._live.start()
+        self._gauges: dict[str, _Gauge] = {}
+        self._refreshed_s = 0.0
+
+    def changed(self, node: SupervisedNode) -> None:
+        """Only what a person should not miss in the table becomes a line."""
+        if node.state in (State.RESTARTING, State.GIVEN_UP, State.FAILED, State.DEGRADED):
+            super().changed(node)
+
+    def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
+        """Draws the table anew, at most twice a second."""
+        now_s = time.monotonic()
+        if self._closed or now_s - self._refreshed_s < REFRESH_S:
+            return
+        self._refreshed_s = now_s
+        try:
+            self._live.update(self._table(nodes, now_s), refresh=True)
+        except OSError:
+            self._closed = True
+
+    def close(self) -> None:
+        """Leaves the last table standing."""
+        try:
+            self._live.stop()
+        except OSError:
+            self._closed = True
+
+    def _table(self, nodes: Iterable[SupervisedNode], now_s: float) -> Table:
+        table = Table(box=None, pad_edge=False, expand=True)
+        for header in ("node", "state"):
+            table.add_column(header, no_wrap=True)
+        for header in ("per s", "lost", "CPU %", "MB", "restarts"):
+            table.add_column(header, justify="right", no_wrap=True)
+        table.add_column("says", ratio=1, no_wrap=True, overflow="ellipsis")
+        for node in nodes:
+            gauge = self._gauges.setdefault(node.name, _Gauge())
+            gauge.read(node, now_s)
+            style = "dim" if node.state in ENDED else _STYLES.get(node.state, "")
+            table.add_row(
+                node.name,
+                Text(node.state.value, style=style),
+                *gauge.cells(),
+                str(node.restarts or ""),
+                Text(node.sentence),
+            )
+        return table
+
+
+class _Gauge:
+    """Rate, loss, CPU and memory of one node."""
+
+    def __init__(self) -> None:
+        self._pid = 0
+        self._process: psutil.Process | None = None
+        self._processed = 0
+        self._read_s = 0.0
+        self._rate_hz = 0.0
+        self._lost = 0
+        self._cpu = self._megabytes = 0.0
+
+    def read(self, node: SupervisedNode, now_s: float) -> None:
+        """Measures anew; the rate is what the node says it handled since the last change of that count."""
+        if node.process is None:
+            self._pid, self._process = 0, None
+            return
+        if node.process.pid != self._pid:
+            self._pid, self._processed, self._read_s, self._rate_hz = node.process.pid, 0, now_s, 0.0
+        if node.status.processed != self._processed:
+            self._rate_hz = (node.status.processed - self._processed) / max(now_s - self._read_s, 1e-3)
+            self._processed, self._read_s = node.status.processed, now_s
+        self._lost = sum(count.lost for count in node.status.heard)
+        try:
+            if self._process is None:
+                self._process = psutil.Process(self._pid)
+            self._cpu = self._process.cpu_percent()
+            self._megabytes = self._process.memory_info().rss / 2**20
+        except psutil.Error:  # it has just ended
+            self._process = None
+
+    def cells(self) -> tuple[str, str, str, str]:
+        """Rate, loss, CPU, memory as text; empty for a node that does not run."""
+        if self._process is None:
+            return ("", "", "", "")
+        return (f"{self._rate_hz:.0f}", str(self._lost), f"{self._cpu:.0f}", f"{self._megabytes:.0f}")

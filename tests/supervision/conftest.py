@@ -1,0 +1,102 @@
+"""A workspace of its own for each test, with the test nodes in it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from paramove.supervision import application
+from paramove.supervision.launch_file import load
+from paramove.supervision.view import LineView
+
+NODES = Path(__file__).parent / "nodes"
+PATIENCE_S = 30.0
+
+
+def until(condition, what):
+    """Looks again and again until `condition()` is true; fails with `what` when patience ends."""
+    end_s = time.monotonic() + PATIENCE_S
+    pause = threading.Event()
+    while not condition():
+        if time.monotonic() > end_s:
+            pytest.fail(f"not within {PATIENCE_S:g} s: {what}")
+        pause.wait(0.02)
+
+
+class Workspace:
+    """A folder with launch/ and nodes/ in which the launcher runs."""
+
+    def __init__(self, root):
+        self.root = root
+        (root / "launch" / "overlays").mkdir(parents=True)
+        shutil.copytree(NODES, root / "nodes", ignore=shutil.ignore_patterns("__pycache__"))
+        self.launchers = []
+
+    def write(self, text, name="test"):
+        (self.root / "launch" / f"{name}.yaml").write_text(text)
+
+    def load(self, *settings, overlays=None, seed=None):
+        return load(self.root / "launch", "test", overlays, settings, seed)
+
+    def run(self, *settings):
+        """Runs in this process; returns outcome, run folder and what was shown."""
+        with (self.root / "shown.txt").open("w+") as file:
+            console = Console(file=file, width=200)
+            outcome, folder = application.run(self.load(*settings), self.root, lambda _: LineView(console))
+            file.seek(0)
+            return outcome, folder, file.read()
+
+    def start(self, *arguments, **options):
+        """Starts the launcher as a process of its own."""
+        command = [sys.executable, "-m", "paramove.cli.launch", "test", *arguments]
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **options}
+        launcher = subprocess.Popen(command, cwd=self.root, **options)
+        self.launchers.append(launcher)
+        return launcher
+
+    @property
+    def events(self):
+        """What the nodes did, in order."""
+        path = self.root / "runs" / "latest" / "events.txt"
+        return path.read_text().splitlines() if path.exists() else []
+
+    def await_event(self, event, launcher):
+        """Waits until a node has written `event` while the launcher lives."""
+        until(lambda: event in self.events or launcher.poll() is not None, event)
+        assert event in self.events, launcher.communicate()[0]
+
+    def processes(self):
+        """Every process that has this workspace as its working directory, as pid: command."""
+        found = {}
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit() and int(entry.name) != os.getpid():
+                try:
+                    if (entry / "cwd").readlink() == self.root and (entry / "stat").read_text().split(")")[1][1] != "Z":
+                        found[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+                except OSError:
+                    continue  # it has just ended
+        return found
+
+
+@pytest.fixture
+def workspace(tmp_path, monkeypatch):
+    runtime = tempfile.mkdtemp(prefix="pm-", dir="/tmp")  # paths of sockets are short
+    monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
+    monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
+    made = Workspace(tmp_path)
+    yield made
+    for launcher in made.launchers:
+        if launcher.poll() is None:
+            launcher.kill()
+        launcher.communicate()
+    for pid in made.processes():
+        os.kill(pid, signal.SIGKILL)
+    shutil.rmtree(runtime)

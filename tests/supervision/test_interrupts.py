@@ -1,0 +1,106 @@
+"""However the launcher ends, no node outlives it."""
+
+import os
+import pty
+import signal
+import subprocess
+
+import pytest
+
+from tests.supervision.conftest import until
+
+TWO = """
+nodes:
+  one: {module: nodes.silent_actor, parameters: {child: true}}
+  two: {module: nodes.silent_actor, after: [one]}
+"""
+STUBBORN = """
+nodes:
+  one: {module: nodes.silent_actor, parameters: {ignores_sigterm: true, child: true}}
+  two: {module: nodes.silent_actor, after: [one]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)], ids=lambda x: str(x)
+)
+def test_signal_ends_the_nodes_in_order(workspace, number, code):
+    workspace.write(TWO)
+    launcher = workspace.start()
+    workspace.await_event("two ready", launcher)
+    launcher.send_signal(number)
+    shown = launcher.communicate(timeout=60)[0]
+    assert launcher.returncode == code, shown
+    assert [event for event in workspace.events if event.endswith(" ended")] == ["two ended", "one ended"]
+    assert f"interrupted by {number.name}" in shown
+    assert workspace.processes() == {}
+
+
+def test_second_interrupt_ends_all_at_once(workspace):
+    workspace.write(STUBBORN)
+    launcher = workspace.start()
+    workspace.await_event("two ready", launcher)
+    launcher.send_signal(signal.SIGINT)
+    until(lambda: "two ended" in workspace.events, "the second node has ended")
+    launcher.send_signal(signal.SIGINT)
+    shown = launcher.communicate(timeout=60)[0]
+    assert launcher.returncode == 130
+    assert "exit -9" in shown
+    assert not any(f"{seconds}.0 s after it was asked" in shown for seconds in (5, 6)), "it waited for the time limit"
+    assert workspace.processes() == {}
+
+
+@pytest.mark.parametrize("text", [TWO, STUBBORN], ids=["obedient", "stubborn"])
+def test_nodes_of_a_killed_launcher_end(workspace, text):
+    workspace.write(text)
+    launcher = workspace.start()
+    workspace.await_event("two ready", launcher)
+    launcher.kill()
+    launcher.wait(timeout=60)
+    until(lambda: workspace.processes() == {}, "no process is left")
+
+
+def test_run_after_a_killed_one_works_in_the_same_domain(workspace):
+    workspace.write(TWO)
+    launcher = workspace.start()
+    workspace.await_event("two ready", launcher)
+    launcher.kill()
+    launcher.wait(timeout=60)
+    until(lambda: workspace.processes() == {}, "no process is left")
+    workspace.write("nodes:\n  main: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0.1}}\n")
+    again = workspace.start()
+    shown = again.communicate(timeout=60)[0]
+    assert again.returncode == 0, shown
+
+
+def test_closed_terminal_ends_the_nodes(workspace):
+    workspace.write(TWO)
+    terminal, end = pty.openpty()
+    launcher = workspace.start(stdin=end, stdout=end, stderr=end, text=False, preexec_fn=lambda: os.login_tty(end))
+    os.close(end)
+    workspace.await_event("two ready", launcher)
+    os.close(terminal)
+    assert launcher.wait(timeout=60) == 129
+    assert workspace.processes() == {}
+
+
+def test_second_run_in_a_domain_is_refused_and_names_the_first(workspace):
+    workspace.write(TWO)
+    launcher = workspace.start()
+    workspace.await_event("two ready", launcher)
+    second = workspace.start()
+    shown = second.communicate(timeout=60)[0]
+    assert second.returncode == 75
+    assert f"domain 'default' is held by pid {launcher.pid} (paramove launch test)" in shown
+    assert "PARAMOVE_DOMAIN" in shown
+    launcher.send_signal(signal.SIGTERM)
+    launcher.communicate(timeout=60)
+
+
+def test_wrong_launch_file_starts_nothing(workspace):
+    workspace.write("nodes:\n  one: {modul: nodes.silent_actor}\n")
+    launcher = workspace.start(stderr=subprocess.PIPE)
+    _, errors = launcher.communicate(timeout=60)
+    assert launcher.returncode == 78
+    assert "test.yaml:2:9: unknown key 'modul'; did you mean 'module'?" in errors
+    assert not (workspace.root / "runs").exists()
