@@ -1,0 +1,52 @@
+"""Dynamic time warping."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from paramove.alignment import movement_distance, warp
+from paramove.alignment.warping import STEPS, StepPattern
+
+PROPERTY = settings(max_examples=25, deadline=None, derandomize=True)
+
+
+@PROPERTY
+@given(st.integers(0, 2**31), st.integers(1, 30), st.sampled_from(["A", "B"]))
+def test_a_sequence_aligns_with_itself(seed: int, length: int, pattern: StepPattern) -> None:
+    sequence = np.random.default_rng(seed).standard_normal((length, 3))
+    alignment = warp(sequence, sequence, pattern)
+    assert alignment.distance == 0.0
+    assert_array_equal(alignment.first, alignment.second)
+
+
+@PROPERTY
+@given(st.integers(0, 2**31), st.sampled_from(["A", "B"]))
+def test_distance_is_the_least_of_all_paths(seed: int, pattern: StepPattern) -> None:
+    rng = np.random.default_rng(seed)
+    p, q = rng.standard_normal((4, 2)), rng.standard_normal((5, 2))
+    cost = np.linalg.norm(p[:, None] - q[None], axis=2)
+    best = np.inf
+    for count in range(1, 9):
+        for steps in itertools.product(STEPS[pattern].tolist(), repeat=count - 1):
+            path = np.cumsum([[0, 0], *steps], axis=0)
+            if tuple(path[-1]) == (3, 4) and (path <= [3, 4]).all():
+                best = min(best, cost[path[:, 0], path[:, 1]].sum())
+    alignment = warp(p, q, pattern)
+    assert_allclose(alignment.distance, best, rtol=1e-12, atol=0.0)
+    assert_allclose(cost[alignment.first, alignment.second].sum(), best, rtol=1e-12, atol=0.0)
+
+
+def test_pattern_b_refuses_lengths_that_no_path_joins() -> None:
+    with pytest.raises(ValueError, match=r"cannot align 10 with 25 frames.*within \[1/2, 2\]"):
+        warp(np.zeros((10, 1)), np.zeros((25, 1)), "B")
+
+
+def test_movement_distance_is_the_offset_of_shifted_points() -> None:
+    time = np.linspace(0.0, 1.0, 100)[:, None]
+    movement = np.tile(np.concatenate([time, time**2, np.zeros_like(time)], axis=1), 7)
+    shifted = movement + np.tile([0.0, 0.0, 0.03], 7)
+    assert_allclose(movement_distance(movement, shifted), 0.03, rtol=1e-9, atol=0.0)
