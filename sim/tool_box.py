@@ -1,0 +1,60 @@
+"""Measures of the tool box and of the places on it, in the frame of the robot's right shoulder (x forward, y left, z up; m).
+
+The upper face of the box is the working plane. One side is closed, the other has four openings with compartments; the
+box turns about the x axis through its centre and is equally high either way up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+SURFACE_Z = -0.134  # the working plane
+X_RANGE = (0.075, 0.240)
+Y_RANGE = (-0.170, 0.130)
+THICKNESS = 0.105
+FLOOR_THICKNESS = 0.005
+COMPARTMENT_DEPTH = THICKNESS - FLOOR_THICKNESS
+
+OPENING_RADIUS = 0.014
+CHAMFER = 0.006  # 45 degrees
+OPENING_X = 0.135
+OPENING_Y = (-0.095, -0.038, 0.019, 0.076)
+
+CYLINDER_RADIUS = 0.010
+CYLINDER_HALF_HEIGHT = 0.025
+CYLINDER_MASS = 0.020
+COLOURS = ("yellow", "green", "blue")
+
+TABLE_Z = SURFACE_Z - THICKNESS
+
+HALF_SIZE = (
+    (X_RANGE[1] - X_RANGE[0]) / 2,
+    (Y_RANGE[1] - Y_RANGE[0]) / 2,
+    THICKNESS / 2,
+)
+CENTRE = (sum(X_RANGE) / 2, sum(Y_RANGE) / 2, SURFACE_Z - THICKNESS / 2)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """One opening: name and centre on the working plane, shoulder frame, m."""
+
+    name: str
+    x: float
+    y: float
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Centre on the working plane, [3], shoulder frame."""
+        return np.array((self.x, self.y, SURFACE_Z))
+
+
+OPENINGS = tuple(Opening(f"opening_{place}", OPENING_X, y) for place, y in enumerate(OPENING_Y))
+
+
+def standing_centre(x: float, y: float) -> NDArray[np.float64]:
+    """Centre of a cylinder that stands on the working plane at (x, y), [3], shoulder frame."""
+    return np.array((x, y, SURFACE_Z + CYLINDER_HALF_HEIGHT))

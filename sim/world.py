@@ -1,0 +1,261 @@
+"""The world in motion: robot, tool box, cylinders and the instructor's hand, 1 ms per step."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.robots.description import RobotDescription
+from sim import places, scene, tool_box
+from sim.contact_watch import ContactRecord, ContactWatch
+from sim.looks import Looks
+
+_log = logging.getLogger(__name__)
+FloatArray = NDArray[np.float64]
+
+STEP_S = 0.001
+CLOSED_UP = (0.0, 1.0, 0.0, 0.0)  # quaternion w x y z: half a turn about x
+OPENINGS_UP = (1.0, 0.0, 0.0, 0.0)
+
+
+class SimulationError(RuntimeError):
+    """The state of the world is no longer to be believed; the text names the degree of freedom."""
+
+
+class World:
+    """Physics of one seed's world.
+
+    Positions that come in and go out are in the frame of the robot's right shoulder unless the name says world.
+
+    Args:
+        looks: How it looks; lights and cameras are part of the model.
+        description: The robot's joints, in the order in which torques come.
+    """
+
+    def __init__(self, looks: Looks, description: RobotDescription) -> None:
+        self.model = scene.build(looks)
+        self.data = mujoco.MjData(self.model)
+        self.description = description
+        model = self.model
+        self.world_from_shoulder: FloatArray = np.array(model.site("right_shoulder").pos, dtype=np.float64)
+        joints = [model.joint(name) for name in description.joint_names]
+        self._qpos_index = np.array([joint.qposadr[0] for joint in joints])
+        self._dof_index = np.array([joint.dofadr[0] for joint in joints])
+        self._actuators = np.array([model.actuator(name).id for name in description.joint_names])
+        self._body = {name: model.body(name).id for name in (*tool_box.COLOURS, "box", "hand")}
+        self._mocap = {name: int(model.body_mocapid[self._body[name]]) for name in ("box", "hand")}
+        self._weld = {name: model.equality(f"hold_{name}").id for name in tool_box.COLOURS}
+        self._gripper = model.site("right_gripper").id
+        self._watch = ContactWatch(model)
+        self._warnings = self.data.warning
+        self.held_by_instructor: str | None = None
+        self.last_touched_by: dict[str, str] = dict.fromkeys(tool_box.COLOURS, "")
+        self._grasped: tuple[FloatArray, FloatArray] | None = None
+        self.steps = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Robot in its base pose, cylinders parked, box closed side up, hand away."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[self._qpos_index] = self.description.base_pose
+        for colour, place in zip(tool_box.COLOURS, places.PARKED, strict=True):
+            self.place(colour, place)
+        self.move_box(np.zeros(3), CLOSED_UP)
+        self.move_hand(places.IDLE_FINGERTIP, np.array((0.2, -0.5, 0.8)))
+        mujoco.mj_forward(self.model, self.data)
+
+    # -- robot ------------------------------------------------------------------------------------------------------
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time since the start."""
+        return self.steps * STEP_S
+
+    def joint_positions(self) -> FloatArray:
+        """[J], rad, in the order of the description."""
+        return np.asarray(self.data.qpos[self._qpos_index])
+
+    def joint_velocities(self) -> FloatArray:
+        """[J], rad/s."""
+        return np.asarray(self.data.qvel[self._dof_index])
+
+    def step(self, torques: FloatArray) -> None:
+        """One millisecond with the given torques of the motors, [J], N m.
+
+        Raises:
+            SimulationError: MuJoCo warns of a state that is not finite or of too many contacts.
+        """
+        self.data.ctrl[self._actuators] = torques
+        mujoco.mj_step(self.model, self.data)
+        self.steps += 1
+        if self._warnings.number.any():
+            raise SimulationError(self._what_is_wrong())
+        touched = self._watch.update(self.data).touched
+        for name in touched:
+            self.last_touched_by[name] = "robot"
+        if self.held_by_instructor is not None and self.held_by_instructor not in touched:
+            self.last_touched_by[self.held_by_instructor] = "instructor"
+
+    @property
+    def contacts(self) -> ContactRecord:
+        """What the robot touched since the start."""
+        return self._watch.record
+
+    def contact_names(self) -> list[str]:
+        """Pairs that the robot is part of, in the newest step."""
+        return [self._watch.name_of(pair) for pair in self.contacts.present]
+
+    def gripper(self) -> tuple[FloatArray, FloatArray]:
+        """Where the gripper is: position [3] and rotation [3, 3] (x along the forearm, y from the pads to the thumb)."""
+        position = self.data.site_xpos[self._gripper] - self.world_from_shoulder
+        return np.asarray(position), self.data.site_xmat[self._gripper].reshape(3, 3).copy()
+
+    # -- objects ----------------------------------------------------------------------------------------------------
+
+    def position(self, name: str) -> FloatArray:
+        """Centre of a cylinder, [3]."""
+        return np.asarray(self.data.xpos[self._body[name]] - self.world_from_shoulder)
+
+    def axis(self, name: str) -> FloatArray:
+        """Direction of a cylinder's axis, [3], pointing up."""
+        axis = self.data.xmat[self._body[name]].reshape(3, 3)[:, 2]
+        return np.asarray(axis * (1.0 if axis[2] >= 0 else -1.0))
+
+    def speed(self, name: str) -> float:
+        """Of a cylinder's centre, m/s."""
+        first = self.model.joint(name).dofadr[0]
+        return float(np.linalg.norm(self.data.qvel[first : first + 3]))
+
+    def quaternion(self, name: str) -> FloatArray:
+        """Of a body, (w, x, y, z)."""
+        return np.asarray(self.data.xquat[self._body[name]].copy())
+
+    def place(self, name: str, centre: FloatArray) -> None:
+        """Put a cylinder upright at `centre`, at rest: to set a scene, not part of any story."""
+        joint = self.model.joint(name)
+        self.data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = (*(centre + self.world_from_shoulder), 1, 0, 0, 0)
+        self.data.qvel[joint.dofadr[0] : joint.dofadr[0] + 6] = 0.0
+
+    # -- instructor -------------------------------------------------------------------------------------------------
+
+    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None:
+        """Bring the instructor's hand: its fingertip [3], and the direction [3] from there to the wrist."""
+        self.data.mocap_pos[self._mocap["hand"]] = fingertip + self.world_from_shoulder
+        self.data.mocap_quat[self._mocap["hand"]] = hand_quaternion(backward)
+
+    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None:
+        """Bring the box to `offset` [3] from its place, turned by the quaternion (w, x, y, z)."""
+        self.data.mocap_pos[self._mocap["box"]] = self.world_from_shoulder + tool_box.CENTRE + offset
+        self.data.mocap_quat[self._mocap["box"]] = quaternion
+
+    def openings_up(self) -> bool:
+        """Which way the box lies."""
+        return bool(abs(self.data.mocap_quat[self._mocap["box"]][0]) > 0.5)
+
+    def grasp(self, name: str) -> None:
+        """The instructor's hand holds the cylinder as it lies now, until `release`."""
+        hand = self._mocap["hand"]
+        back = _conjugate(self.data.mocap_quat[hand])
+        away = self.data.xpos[self._body[name]] - self.data.mocap_pos[hand]
+        self._grasped = (_rotate(back, away), _multiply(back, self.data.xquat[self._body[name]]))
+        self._hold(name, *self._grasped)
+        self.data.eq_active[self._weld[name]] = 1
+        self.held_by_instructor = name
+
+    def straighten(self, share: float) -> None:
+        """Turn the held cylinder upright under the fingertip, by `share` 0 to 1 of the way from how it was grasped."""
+        if self.held_by_instructor is None or self._grasped is None:
+            return
+        back = _conjugate(self.data.mocap_quat[self._mocap["hand"]])
+        offset, turn = self._grasped
+        upright = _upright_near(_multiply(_conjugate(back), turn))
+        goal = _multiply(back, upright)
+        goal_offset = _rotate(back, np.array((0.0, 0.0, -tool_box.CYLINDER_HALF_HEIGHT)))
+        if goal @ turn < 0:
+            goal = -goal
+        between = (1 - share) * turn + share * goal
+        self._hold(
+            self.held_by_instructor, (1 - share) * offset + share * goal_offset, between / np.linalg.norm(between)
+        )
+
+    def release(self) -> None:
+        """The instructor lets go."""
+        if self.held_by_instructor is not None:
+            self.data.eq_active[self._weld[self.held_by_instructor]] = 0
+        self.held_by_instructor = self._grasped = None
+
+    def _hold(self, name: str, offset: FloatArray, turn: FloatArray) -> None:
+        """MuJoCo's weld data: anchor on the object, its position and rotation in the hand, torque scale."""
+        row = self.model.eq_data[self._weld[name]]
+        row[0:3] = 0.0
+        row[3:6] = offset
+        row[6:10] = turn
+
+    def _what_is_wrong(self) -> str:
+        kinds = {
+            mujoco.mjtWarning.mjWARN_BADQPOS: "position",
+            mujoco.mjtWarning.mjWARN_BADQVEL: "velocity",
+            mujoco.mjtWarning.mjWARN_BADQACC: "acceleration",
+            mujoco.mjtWarning.mjWARN_BADCTRL: "torque",
+        }
+        found = []
+        for number in np.flatnonzero(self._warnings.number):
+            kind = mujoco.mjtWarning(int(number))
+            place = int(self._warnings.lastinfo[number])
+            if kind not in kinds:
+                found.append(f"{kind.name.removeprefix('mjWARN_').lower()} ({place})")
+                continue
+            name = self.model.actuator(place).name if kind == mujoco.mjtWarning.mjWARN_BADCTRL else self._dof(kind, place)
+            found.append(f"{kinds[kind]} of {name} is not finite or larger than 1e10")
+        return f"simulation stopped at {self.time_s:.3f} s: {'; '.join(found)}; nothing after it can be believed"
+
+    def _dof(self, kind: mujoco.mjtWarning, place: int) -> str:
+        starts = self.model.jnt_qposadr if kind == mujoco.mjtWarning.mjWARN_BADQPOS else self.model.jnt_dofadr
+        joint = int(np.searchsorted(starts, place, side="right")) - 1
+        within = place - int(starts[joint])
+        kind_name = "qpos" if kind == mujoco.mjtWarning.mjWARN_BADQPOS else "dof"
+        return f"joint {self.model.joint(joint).name} ({kind_name} {place}" + (f", its part {within})" if within else ")")
+
+
+def log_warnings_of_mujoco(say: Callable[[str], None] = _log.warning) -> None:
+    """Send MuJoCo's own warnings to the log instead of a file in the working directory."""
+    mujoco.set_mju_user_warning(say)
+
+
+def hand_quaternion(backward: FloatArray) -> FloatArray:
+    """Rotation (w, x, y, z) of the hand whose z axis is `backward` and whose back looks up."""
+    z = np.asarray(backward, dtype=np.float64) / np.linalg.norm(backward)
+    x = np.array((0.0, 0.0, 1.0)) - z[2] * z
+    if np.linalg.norm(x) < 1e-6:
+        x = np.array((0.0, 1.0, 0.0))
+    x /= np.linalg.norm(x)
+    return scene.quaternion_of(np.column_stack((x, np.cross(z, x), z)))
+
+
+def _upright_near(turn: FloatArray) -> FloatArray:
+    """The upright rotation (either end up) that is reached from `turn` by the smallest one."""
+    axis = _rotate(turn, np.array((0.0, 0.0, 1.0)))
+    goal = np.array((0.0, 0.0, 1.0 if axis[2] >= 0 else -1.0))
+    cross, cosine = np.cross(axis, goal), float(axis @ goal)
+    swing = np.array((1.0 + cosine, *cross))
+    return _multiply(swing / np.linalg.norm(swing), turn)
+
+
+def _multiply(a: FloatArray, b: FloatArray) -> FloatArray:
+    product = np.zeros(4)
+    mujoco.mju_mulQuat(product, a, b)
+    return product
+
+
+def _conjugate(quaternion: FloatArray) -> FloatArray:
+    return np.asarray(quaternion * (1.0, -1.0, -1.0, -1.0))
+
+
+def _rotate(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
+    turned = np.zeros(3)
+    mujoco.mju_rotVecQuat(turned, vector, quaternion)
+    return turned
