@@ -46,15 +46,15 @@ class Look:
         )
 
 
-def _world(opening_half: float | None) -> str:
+def _world(opening_radius: float | None) -> str:
     cylinders = "".join(
         f'<body name="{name}" mocap="true" pos="0 0 -2"><geom type="cylinder" size="{CYLINDER_RADIUS} '
         f'{CYLINDER_HEIGHT / 2}" rgba="{rgba}"/></body>'
         for name, rgba in COLOURS.items()
     )
     top = '<geom type="box" pos="0.155 -0.02 -0.04" size="0.11 0.17 0.04" rgba="0.13 0.13 0.14 1" material="matt"/>'
-    if opening_half is not None:
-        top = _box_with_opening(opening_half)
+    if opening_radius is not None:
+        top = _box_with_opening(opening_radius)
     return f"""<mujoco><visual><global offwidth="{480 + 2 * MARGIN}" offheight="{360 + 2 * MARGIN}"/>
       <headlight ambient="0 0 0" diffuse="0 0 0" specular="0 0 0"/><quality offsamples="4"/><map znear="0.02"/></visual>
       <asset><material name="matt" specular="0.05" shininess="0.1"/></asset>
@@ -72,27 +72,40 @@ def _world(opening_half: float | None) -> str:
       </worldbody></mujoco>"""
 
 
-def _box_with_opening(half: float, x: float = 0.155, y: float = -0.02) -> str:
-    """The box with one square opening at the centre, edges `half` from it, and a floor 7 cm below."""
+def _box_with_opening(radius: float, x: float = 0.155, y: float = -0.02) -> str:
+    """The box with one round opening at the centre (24 flat sides), 8 cm deep."""
+    reach = 0.03  # of the sectors around the opening; four boxes make up the rest of the upper face
+    half = radius + reach - 0.005
     sides = (
         (x + half + (0.11 - half) / 2, y, (0.11 - half) / 2, 0.17),
         (x - half - (0.11 - half) / 2, y, (0.11 - half) / 2, 0.17),
         (x, y + half + (0.17 - half) / 2, half, (0.17 - half) / 2),
         (x, y - half - (0.17 - half) / 2, half, (0.17 - half) / 2),
     )
-    return "".join(
-        f'<geom type="box" pos="{a} {b} -0.04" size="{c} {d} 0.04" rgba="0.13 0.13 0.14 1" material="matt"/>'
-        for a, b, c, d in sides
+    look = 'rgba="0.13 0.13 0.14 1" material="matt"/>'
+    outer = "".join(f'<geom type="box" pos="{a} {b} -0.04" size="{c} {d} 0.04" {look}' for a, b, c, d in sides)
+    sectors = ""
+    for angle in np.arange(24) * 2 * np.pi / 24:
+        away = radius + reach
+        a, b = x + away * np.cos(angle), y + away * np.sin(angle)
+        sectors += (
+            f'<geom type="box" pos="{a} {b} -0.04" size="{reach} 0.012 0.04" euler="0 0 {np.rad2deg(angle)}" {look}'
+        )
+    corner = "".join(
+        f'<geom type="box" pos="{x + i * half} {y + j * half} -0.04" size="0.02 0.02 0.04" {look}'
+        for i in (-1, 1)
+        for j in (-1, 1)
     )
+    return outer + sectors + corner
 
 
 class Scene:
     """Renders the tool box for one look. Positions in world frame, m."""
 
-    def __init__(self, look: Look, seed: int = 0, opening_half: float | None = None) -> None:
+    def __init__(self, look: Look, seed: int = 0, opening_radius: float | None = None) -> None:
         self.look = look
         self._draw = np.random.default_rng(seed)
-        self._model = mujoco.MjModel.from_xml_string(_world(opening_half))
+        self._model = mujoco.MjModel.from_xml_string(_world(opening_radius))
         self._data = mujoco.MjData(self._model)
         self._open_renderer()
         self.focal_px = 560.0 * look.focal_scale

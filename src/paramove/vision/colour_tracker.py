@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.vision.full_size import FullSize
+from paramove.vision.full_size import FullSize, Size
 
 Image = NDArray[Any]  # uint8; cv2's own annotations say only integer or floating
 MOST_PIECES = 6
@@ -160,7 +160,8 @@ class ColourTracker:
         recent.append(region)
         if self._stands_still(recent):
             area, height = median(r.area_px for r in recent), median(r.height_px for r in recent)
-            self._full_size.learn(colour.name, region.u_px, region.v_px, area, height)
+            lower = region.top_px + region.height_px - region.v_px
+            self._full_size.learn(colour.name, region.u_px, region.v_px, Size(area, height, lower))
         found.confidence = self._full_size.visible_share(colour.name, region.u_px, region.v_px, region.area_px)
         return found
 

@@ -14,16 +14,24 @@ ACCEPT_RATIO = 0.85
 PLACES_PER_OBJECT = 12
 
 
+@dataclass(frozen=True)
+class Size:
+    """An object that nothing hides: area, height, and from its centre to its lower border; px."""
+
+    area_px: float
+    height_px: float
+    lower_px: float
+
+
 @dataclass
 class _Place:
     u_px: float
     v_px: float
-    area_px: float
-    height_px: float
+    size: Size
 
 
 class FullSize:
-    """Learns, from objects at rest, their full area and height as a function of the image point.
+    """Learns, from objects at rest, how large they are in the image as a function of the image point.
 
     Perspective makes sizes change smoothly over the image, alike for all objects: log area of object k is modelled as
     c_k + a·u + b·v with a and b shared (least squares with a weak ridge on a and b). The largest steady area seen at a
@@ -32,36 +40,37 @@ class FullSize:
 
     def __init__(self) -> None:
         self._places: dict[str, list[_Place]] = {}
-        self._model: dict[str, tuple[float, float]] = {}
-        self._slope: NDArray[np.float64] = np.zeros((2, 2))
+        self._model: dict[str, NDArray[np.float64]] = {}
+        self._slope: NDArray[np.float64] = np.zeros((2, 3))
 
-    def expected(self, name: str, u_px: float, v_px: float) -> tuple[float, float] | None:
-        """Full area (px) and height (px) of the object at an image point; None before it was first seen at rest."""
+    def expected(self, name: str, u_px: float, v_px: float) -> Size | None:
+        """Full size of the object at an image point; None before it was first seen at rest."""
         if name not in self._model:
             return None
         point = np.array([u_px, v_px]) / 100.0
-        log_area, log_height = np.array(self._model[name]) + point @ self._slope
-        return float(np.exp(log_area)), float(np.exp(log_height))
+        area, height, lower = np.exp(self._model[name] + point @ self._slope)
+        return Size(float(area), float(height), float(lower))
 
     def visible_share(self, name: str, u_px: float, v_px: float, area_px: float) -> float:
         """Area over full area at that image point, 0 to 1; 1 for an object not known yet."""
         full = self.expected(name, u_px, v_px)
-        return 1.0 if full is None else min(1.0, area_px / full[0])
+        return 1.0 if full is None else min(1.0, area_px / full.area_px)
 
-    def learn(self, name: str, u_px: float, v_px: float, area_px: float, height_px: float) -> None:
+    def learn(self, name: str, u_px: float, v_px: float, size: Size) -> None:
         """Take in one sample of an object that stands still."""
+        area_px = size.area_px
         full = self.expected(name, u_px, v_px)
-        if full is not None and area_px < ACCEPT_RATIO * full[0]:
+        if full is not None and area_px < ACCEPT_RATIO * full.area_px:
             return
-        if full is not None and area_px > full[0] / ACCEPT_RATIO:
+        if full is not None and area_px > full.area_px / ACCEPT_RATIO:
             self._places[name] = []  # what was learned of it was partly hidden
         places = self._places.setdefault(name, [])
         near = min(places, key=lambda place: _distance(place, u_px, v_px), default=None)
         if near is None or _distance(near, u_px, v_px) > PLACE_RADIUS_PX:
-            places.append(_Place(u_px, v_px, area_px, height_px))
+            places.append(_Place(u_px, v_px, size))
             del places[:-PLACES_PER_OBJECT]
-        elif area_px > 1.02 * near.area_px:
-            near.u_px, near.v_px, near.area_px, near.height_px = u_px, v_px, area_px, height_px
+        elif area_px > 1.02 * near.size.area_px:
+            near.u_px, near.v_px, near.size = u_px, v_px, size
         else:
             return
         self._fit()
@@ -70,15 +79,15 @@ class FullSize:
         names = sorted(self._places)
         rows = [(index, place) for index, name in enumerate(names) for place in self._places[name]]
         design = np.zeros((len(rows) + 2, len(names) + 2))
-        value = np.zeros((len(rows) + 2, 2))
+        value = np.zeros((len(rows) + 2, 3))
         for row, (index, place) in enumerate(rows):
             design[row, index] = 1.0
             design[row, -2:] = place.u_px / 100.0, place.v_px / 100.0
-            value[row] = np.log(place.area_px), np.log(place.height_px)
+            value[row] = np.log([place.size.area_px, place.size.height_px, place.size.lower_px])
         design[-2, -2] = design[-1, -1] = 0.2  # ridge: without spread of places the size is taken as constant
         solution = np.linalg.lstsq(design, value, rcond=None)[0]
         self._slope = np.asarray(solution[-2:], dtype=np.float64)
-        self._model = {name: (float(solution[i, 0]), float(solution[i, 1])) for i, name in enumerate(names)}
+        self._model = {name: np.asarray(solution[i], dtype=np.float64) for i, name in enumerate(names)}
 
 
 def _distance(place: _Place, u_px: float, v_px: float) -> float:

@@ -27,7 +27,8 @@ class MotionThresholds:
         hidden_s: A resting object not seen for this long is gone; longer, as it is rather hidden by the arm.
         patience_s: Waiting for a hand that covers the object to leave never takes longer.
         clear_share: From this visible share on an object is seen in full.
-        part_share: Below this share it is a remnant: sunk into an opening, or hidden for the most part.
+        part_share: Below this share it is not seen to rest: it is sunk for a good part, or hidden.
+        remnant_share: Below this share a moving object counts as not seen: its top may stay visible in an opening.
         clear_view_s: Waiting for a clear view of an object that has come to rest.
     """
 
@@ -40,6 +41,7 @@ class MotionThresholds:
     patience_s: float = 5.0
     clear_share: float = 0.9
     part_share: float = 0.6
+    remnant_share: float = 0.35
     clear_view_s: float = 2.0
 
 
@@ -76,6 +78,7 @@ class ObjectMotion:
         self._displaced_since: float | None = None
         self._still_since: float | None = None
         self._told_area_px = 0.0
+        self._well_seen_s = 0.0
 
     def update(self, sample: Sample | None, now_s: float, hand_near: bool) -> list[Happening]:
         """Take in one frame: the object's sample in it or None.
@@ -86,7 +89,10 @@ class ObjectMotion:
             self._history.append(sample)
         while self._history and self._history[0].time_s < now_s - self.HISTORY_S - self._limits.patience_s:
             self._history.popleft()
-        if sample is None:
+        remnant = sample is not None and self.share(sample) < self._limits.remnant_share
+        if sample is not None and not remnant:
+            self._well_seen_s = sample.time_s
+        if sample is None or (remnant and self.state is State.MOVING):
             return self._unseen(now_s, hand_near)
         if self.state is State.RESTING:
             return self._while_resting(sample)
@@ -100,7 +106,7 @@ class ObjectMotion:
         self._displaced_since = self._still_since = None
         if self.state is State.UNSEEN or not self._history:
             return []
-        silent_s = now_s - self._history[-1].time_s
+        silent_s = now_s - self._well_seen_s
         needed_s = self._limits.vanish_s if self.state is State.MOVING else self._limits.hidden_s
         if silent_s < needed_s or (hand_near and silent_s < self._limits.patience_s):
             return []
@@ -139,7 +145,7 @@ class ObjectMotion:
             return []
         best = Sample.median(still)
         assert self.place is not None
-        self._full_size.learn(self.name, best.u_px, best.v_px, best.area_px, best.height_px)
+        best.teach(self._full_size, self.name)
         if best.area_px > self.place.area_px:
             self.place = best
         if best.area_px > 1.08 * self._told_area_px and self.share(best) >= self._limits.clear_share:
@@ -185,5 +191,5 @@ class ObjectMotion:
         kind = Gesture.KIND_RESTED if self.state is State.MOVING else Gesture.KIND_APPEARED
         self.state, self.place, self._told_area_px = State.RESTING, place, place.area_px
         self._still_since = None
-        self._full_size.learn(self.name, place.u_px, place.v_px, place.area_px, place.height_px)
+        place.teach(self._full_size, self.name)
         return [Happening(kind, place.u_px, place.v_px, share)]

@@ -22,14 +22,15 @@ class RecognizerOptions:
     """Thresholds, and what is known of the tool box.
 
     Attributes:
-        rim_clearance: Horizontal gap of a standing object's side and an opening's near rim, m: 10 mm for a cylinder of
-            20 mm in an opening of 28 mm with a chamfer of 6 mm. A sinking object is first cut off by that rim, so it
-            is seen this much nearer to the camera than it is.
+        rim_clearance: Horizontal gap between the lower border of a standing object and an opening's near rim, m.
+            A sinking object is first cut off by that rim, so it is seen this much nearer to the camera than it is.
+            For a cylinder of 20 mm in an opening of 28 mm with a chamfer of 6 mm: 20 mm - 10 mm, and 1 mm as borders
+            are measured at half of the width, where the cylinder's front is rounder than the rim.
     """
 
     motion: MotionThresholds = field(default_factory=MotionThresholds)
     pointing: PointingThresholds = field(default_factory=PointingThresholds)
-    rim_clearance: float = 0.010
+    rim_clearance: float = 0.011
 
 
 class Recognizer:

@@ -15,14 +15,16 @@ from typing import Self
 import numpy as np
 
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
-from paramove.vision.full_size import FullSize
+from paramove.vision.full_size import FullSize, Size
 
 BORDER_PX = 2.0
 """The lower border scatters by about 0.3 px; on the rim it stays within this range."""
 SHRUNK_SHARE = 0.8
 """A height below this share of the one before sinking is shrinking, no scatter (3 %)."""
-LEAST_HEIGHT_SHARE = 0.25
-"""Below this only the round upper end is seen, whose border is not the rim's any more."""
+LEAST_HEIGHT_SHARE = 0.1
+"""Below this share of the height before sinking, the border is scatter."""
+LAST_SAMPLES = 20
+"""A second and a half: longer than any lowering into an opening."""
 STEEPEST_AXIS = 0.15
 """Largest du/dv of a standing object's axis: the camera's roll of 6 degrees and the perspective at the image's side."""
 
@@ -58,6 +60,11 @@ class Sample:
     @property
     def bottom_px(self) -> float:
         return self.top_px + self.height_px
+
+    def teach(self, full_size: FullSize, name: str) -> None:
+        """Give this sample of an object at rest to what is known of full sizes."""
+        size = Size(self.area_px, self.height_px, self.bottom_px - self.v_px)
+        full_size.learn(name, self.u_px, self.v_px, size)
 
     def displacement_px(self, other: Sample) -> float:
         """How far the object has moved for certain.
@@ -95,21 +102,19 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> Las
     Args:
         samples: at least one, in the order of time, to the last one seen.
     """
-    full_px = max(sample.height_px for sample in samples)
-    expected = full_size.expected(name, samples[-1].u_px, samples[-1].v_px)
-    full_px = full_px if expected is None else expected[1]
-    seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * full_px] or [samples[-1]]
+    full = full_size.expected(name, samples[-1].u_px, samples[-1].v_px)
+    if full is None:  # never seen at rest: the tallest sample has to do
+        tallest = max(samples, key=lambda sample: sample.height_px)
+        full = Size(tallest.area_px, tallest.height_px, tallest.bottom_px - tallest.v_px)
+    heights = sorted(s.height_px for s in samples[-LAST_SAMPLES:])
+    carried_px = median(heights[len(heights) // 2 :])  # less than the full height where a hand holds the upper end
+    seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * carried_px] or [samples[-1]]
     on_rim = _on_rim(seen)
-    before = [s.height_px for s in seen[-len(on_rim) - 8 :]]
-    sunk = min(s.height_px for s in (*on_rim, samples[-1])) < SHRUNK_SHARE * median(sorted(before)[len(before) // 2 :])
+    sunk = min(samples[-1].height_px, *(s.height_px for s in on_rim)) < SHRUNK_SHARE * carried_px
     bottom_px = median(s.bottom_px for s in on_rim) if sunk else seen[-1].bottom_px
-    if expected is None:
-        middle_px = bottom_px - full_px / 2
-    else:  # the size changes with the place, so look it up where the object was
-        at_place = full_size.expected(name, seen[-1].u_px, bottom_px - full_px / 2)
-        full_px = full_px if at_place is None else at_place[1]
-        middle_px = bottom_px - full_px / 2
-    u_px = _on_axis(seen[-12:], on_rim, middle_px)
+    at_place = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
+    middle_px = bottom_px - at_place.lower_px
+    u_px = _on_axis(seen[-len(on_rim) - 8 :], on_rim, middle_px)
     return LastPlace(u_px, middle_px, sunk, confidence=1.0 if sunk and len(on_rim) > 1 else 0.7)
 
 
