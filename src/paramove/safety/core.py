@@ -67,9 +67,9 @@ class SafetyCore:
             return None, self.state, self.faults
         measured = inputs.measured
         assert measured is not None  # _connected
-        if inputs.word is not None:
-            self._hear(inputs.word, measured)
         targets: Targets | None = None
+        if inputs.word is not None:
+            targets = self._hear(now_ns, inputs.word, measured, inputs.proposal)
         if self.state is State.ARMED:
             targets = self._armed(now_ns, measured, inputs)
         if self.state is State.STOPPING and targets is None:
@@ -98,26 +98,25 @@ class SafetyCore:
         self.faults = (fault,)
         self._sent = None
 
-    def _hear(self, word: ArmWord, measured: Measured) -> None:
+    def _hear(self, now_ns: int, word: ArmWord, measured: Measured, proposal: Proposal | None) -> Targets | None:
         if word.captured_ns <= self._heard_ns:
-            return
+            return None
         self._heard_ns = word.captured_ns
         if not word.armed:
-            if self.state is State.ARMED and not measured.at_rest:
-                self.state = State.STOPPING
-                self._stopping_since_ns = word.captured_ns
+            if self.state is State.STOPPING:
                 self._disarm_after_stop = True
-            elif self.state is not State.STOPPING:
-                self.state = State.DISARMED
+            elif self.state is State.ARMED and self._moving(measured):
+                self._disarm_after_stop = True
+                return self._stop(now_ns, None, proposal, measured)
             else:
-                self._disarm_after_stop = True
-            return
-        if self.state in (State.DISARMED, State.HOLD):
+                self.state = State.DISARMED
+        elif self.state in (State.DISARMED, State.HOLD):
             refusals = self.arming_faults(word, measured)
             self.faults = refusals
             if not refusals:
                 self.state = State.ARMED
                 self._sent = None
+        return None
 
     def arming_faults(self, word: ArmWord, measured: Measured) -> tuple[Fault, ...]:
         """Every check that fails; none means that the gate may be armed."""
@@ -212,10 +211,16 @@ class SafetyCore:
         self._sent = Targets(targets.first_index - len(kept), np.concatenate([kept, targets.rows]), targets.ramp_rows)
 
     def _stop(
-        self, now_ns: int, fault: Fault, proposal: Proposal | None, measured: Measured, good_rows: int | None = None
+        self,
+        now_ns: int,
+        fault: Fault | None,
+        proposal: Proposal | None,
+        measured: Measured,
+        good_rows: int | None = None,
     ) -> Targets | None:
         """Latch the fault; give the rows of a stop that begins as early as the stream allows."""
-        self.faults = (*self.faults, fault)
+        if fault is not None:
+            self.faults = (*self.faults, fault)
         self.state = State.STOPPING
         self._stopping_since_ns = now_ns
         if proposal is None or (good_rows is not None and good_rows < 1) or self._judge_place(proposal, measured):
@@ -229,13 +234,15 @@ class SafetyCore:
         self._remember(targets, measured)
         return targets
 
+    def _moving(self, measured: Measured) -> bool:
+        """Whether rows are played or still to be played: a report of rest can be older than the rows just sent."""
+        return not measured.at_rest or (self._sent is not None and measured.next_index < self._sent.end_index)
+
     def _rest(self, now_ns: int, measured: Measured) -> None:
         """Leave STOPPING once the robot says that it rests."""
-        if not measured.at_rest:
-            return
-        played = self._sent is None or measured.next_index >= self._sent.end_index
-        # A report of rest can be older than the rows just sent; rows that were lost are waited for no longer than this.
-        if not played and now_ns - self._stopping_since_ns < self.settings.lost_rows_ms * 1e6:
+        # Rows that were sent and lost will never be played; they are waited for no longer than this.
+        lost = now_ns - self._stopping_since_ns >= self.settings.lost_rows_ms * 1e6
+        if self._moving(measured) and not (lost and measured.at_rest):
             return
         self._sent = None
         self._heard_ns = max(self._heard_ns, now_ns)  # a new arm word must be said after the stop

@@ -1,0 +1,53 @@
+"""Arm driver: plays trajectories on HOAP-3 through the safety gate, and says where its joints are.
+
+Hears   arm/trajectory         JointTrajectory        events
+        operator/arm           ArmRequest             events, latched
+        wire/hoap3/state       Hoap3State             15 Hz   joint units
+Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
+        arm/joint_states       foxglove.JointStates   15 Hz   rad
+        arm/trajectory_status  TrajectoryStatus       events
+        arm/safety             SafetyState            15 Hz, latched
+"""
+
+from pathlib import Path
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.robots.description import RobotDescription
+from paramove.robots.hoap3.driver import ArmDriver
+
+HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.WIRE_HOAP3_STATE)
+SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
+
+
+class Config(NodeConfig):
+    """`robot`: folder of the robot's description."""
+
+    robot: Path = Path("robot_description/hoap3")
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
+    driver = ArmDriver(RobotDescription.load(config.robot))
+    hear = {
+        topics.ARM_TRAJECTORY: driver.on_trajectory,
+        topics.OPERATOR_ARM: driver.on_arm_request,
+        topics.WIRE_HOAP3_STATE: driver.on_robot_state,
+    }
+    bus.ready("disarmed, waiting for the robot")
+    for event in bus.events(*HEARS, tick=True):
+        if not isinstance(event, Tick):
+            hear[event.topic](event.message, event.captured_ns)
+            continue
+        says = driver.tick(event.now_ns)
+        if says.stream is not None:
+            bus.publish(topics.WIRE_HOAP3_STREAM, says.stream)
+        if says.joint_states is not None:
+            bus.publish(topics.ARM_JOINT_STATES, says.joint_states, says.joint_states.timestamp.ToNanoseconds())
+        for status in says.statuses:
+            bus.publish(topics.ARM_TRAJECTORY_STATUS, status)
+        bus.publish(topics.ARM_SAFETY, says.safety)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

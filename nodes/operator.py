@@ -1,0 +1,42 @@
+"""Operator: in simulation, arms the safety gate once at the start. With `real: true` it refuses to start.
+
+Hears   arm/safety     SafetyState   15 Hz, latched
+Says    operator/arm   ArmRequest    once, latched
+"""
+
+from pydantic import field_validator
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, main
+from paramove.safety.operator import REAL_ROBOT, Operator
+
+HEARS = (topics.ARM_SAFETY,)
+SAYS = (topics.OPERATOR_ARM,)
+
+
+class Config(NodeConfig):
+    """`arms_at_start`: arm in a person's place, for simulation. `real`: the robot is a real one."""
+
+    arms_at_start: bool = False
+    real: bool = False
+
+    @field_validator("real")
+    @classmethod
+    def _a_person_arms_a_real_robot(cls, real: bool) -> bool:
+        if real:
+            raise ValueError(REAL_ROBOT)
+        return real
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes."""
+    operator = Operator(config.arms_at_start)
+    bus.ready("arms once at the start" if config.arms_at_start else "does not arm")
+    for heard in bus.latest(topics.ARM_SAFETY):
+        request = operator.update(heard.message, bus.now_ns)
+        if request is not None:
+            bus.publish(topics.OPERATOR_ARM, request)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

@@ -1,0 +1,214 @@
+"""The arm driver's logic: accepted trajectories to batches for HOAP-3's stream, through the safety gate.
+
+One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it is heard (thesis 5.2.1:
+the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the newest
+known index on, about 300 ms of them, and the gate adds the stop ramp. If ticks or batches stop, the robot rests by
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from numpy.typing import NDArray
+
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState
+from paramove.robots.description import RobotDescription
+from paramove.robots.hoap3.execution import Execution
+from paramove.robots.hoap3.robot_report import RobotReport
+from paramove.robots.hoap3.stream import StreamWriter
+from paramove.safety.core import SafetyCore
+from paramove.safety.gate_io import ArmWord, Fault, Inputs, Proposal, State
+from paramove.safety.limits import MotionLimits
+from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
+
+FloatArray = NDArray[np.float64]
+
+SAFETY_STATES = {
+    State.DISCONNECTED: SafetyState.STATE_DISCONNECTED,
+    State.DISARMED: SafetyState.STATE_DISARMED,
+    State.ARMED: SafetyState.STATE_ARMED,
+    State.STOPPING: SafetyState.STATE_STOPPING,
+    State.HOLD: SafetyState.STATE_HOLD,
+}
+# A trajectory heard later than this after it was made is a replay or comes from a queue that was stuck.
+MAX_TRAJECTORY_AGE_S = 1.0
+# The stop ramp's path ahead of the last row sent; a ramp from the operating limits runs over 0.1 s of it.
+AHEAD_ROWS = 400
+TICKS_PER_PROGRESS = 5
+
+
+@dataclass(frozen=True)
+class DriverSays:
+    """Messages that a tick gives; `stream` and `joint_states` are None where there is nothing new."""
+
+    stream: StreamBatch | None
+    joint_states: JointStates | None
+    statuses: tuple[TrajectoryStatus, ...]
+    safety: SafetyState
+
+
+class ArmDriver:
+    """Drives all joints of HOAP-3. Hear messages with the `on_…` methods, then call `tick`.
+
+    Args:
+        description: Of the robot.
+
+    The driver begins with its first tick. Arm words and trajectories from before it are not heard, so a restarted
+    driver is disarmed; the stream's epoch is made of that tick's time.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._description = description
+        self._limits = MotionLimits.of(description)
+        self._begin_at(0)
+        self._report: RobotReport | None = None
+        self._reported = False
+        self._words: list[ArmWord] = []
+        self._execution: Execution | None = None
+        self._statuses: list[TrajectoryStatus] = []
+        self._last_status: dict[str, TrajectoryStatus] = {}
+        self._ticks = 0
+        self._refused = 0
+
+    def _begin_at(self, start_ns: int) -> None:
+        d = self._description
+        epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
+        self._now_ns = start_ns
+        self._writer = StreamWriter(d, epoch)
+        self._core = SafetyCore(self._limits, (d.lower, d.upper), epoch, start_ns)
+
+    @property
+    def state(self) -> State:
+        """Of the safety gate."""
+        return self._core.state
+
+    def on_robot_state(self, message: Hoap3State, captured_ns: int) -> None:
+        """Hear what the robot says of its stream and joints; a report that cannot be read counts as none."""
+        report = RobotReport.of(message, captured_ns, self._description, self._report)
+        if report is not None:
+            self._report = report
+            self._reported = True
+
+    def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
+        """Hear a person's (in simulation the operator node's) word."""
+        self._words.append(ArmWord(captured_ns, message.source, message.armed))
+
+    def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
+        """Accept or refuse a trajectory. The same id again is answered with its newest status and not played twice."""
+        known = self._last_status.get(message.id)
+        if known is not None:
+            self._statuses.append(known)
+            return
+        try:
+            self._begin(message, captured_ns)
+        except TrajectoryRefusedError as refusal:
+            self._refused += 1
+            self._say(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(refusal))
+
+    def tick(self, now_ns: int) -> DriverSays:
+        """One camera period: what to send to the robot and what to say of it."""
+        if not self._ticks:
+            self._begin_at(now_ns)
+        self._now_ns = now_ns
+        self._ticks += 1
+        words: list[ArmWord | None] = [*self._words] or [None]
+        self._words.clear()
+        measured = self._report.measured(self._writer.epoch) if self._report else None
+        stop = self._fault_of_stream(now_ns)
+        proposal = self._proposal(now_ns)
+        targets = None
+        for word in words:
+            given, _, _ = self._core.step(now_ns, Inputs(measured, word, proposal, stop))
+            targets = given or targets
+        stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
+        self._follow(now_ns)
+        statuses, self._statuses = tuple(self._statuses), []
+        joint_states = self._report.joint_states() if self._report and self._reported else None
+        self._reported = False
+        return DriverSays(stream, joint_states, statuses, self._safety_state(now_ns))
+
+    def _begin(self, message: JointTrajectory, captured_ns: int) -> None:
+        report = self._report
+        if self._core.state is not State.ARMED or report is None:
+            state = self._core.state.value
+            raise TrajectoryRefusedError("not_armed", -1, "", f"a movement while {state}", "only while armed")
+        if not message.id:
+            raise TrajectoryRefusedError("id", -1, "", "an empty id", "a name for the trajectory")
+        if self._execution is not None:
+            busy = self._execution.trajectory_id
+            raise TrajectoryRefusedError("busy", -1, "", "a second trajectory", f"one at a time; {busy} is executed")
+        age_s = (self._now_ns - captured_ns) * 1e-9
+        if age_s > MAX_TRAJECTORY_AGE_S:
+            raise TrajectoryRefusedError("stale", -1, "", f"age {age_s:.2f} s", f"up to {MAX_TRAJECTORY_AGE_S:g} s")
+        path = check_trajectory(
+            list(message.joints),
+            [point.time_s for point in message.points],
+            [list(point.position_rad) for point in message.points],
+            report.commanded,
+            self._limits,
+            float(np.deg2rad(self._description.stream.start_tolerance_deg)),
+        )
+        start_index = report.next_index if report.epoch == self._writer.epoch else 0
+        self._execution = Execution(message.id, path.rows, path.dt_s, start_index, self._now_ns)
+        self._say(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
+
+    def _proposal(self, now_ns: int) -> Proposal | None:
+        execution, report = self._execution, self._report
+        if execution is None or report is None:
+            return None
+        stream = self._description.stream
+        known = report.next_index if report.epoch == self._writer.epoch else 0
+        guard, cover = (ms * 1000 // stream.period_us for ms in (stream.guard_ms, stream.cover_ms))
+        rows, ahead, first_index = execution.window(known, guard, cover, AHEAD_ROWS)
+        if not len(rows):
+            return None
+        return Proposal(now_ns, self._writer.epoch, self._description.joint_names, first_index, rows, ahead)
+
+    def _fault_of_stream(self, now_ns: int) -> Fault | None:
+        if self._execution is None or self._report is None or self._core.state is not State.ARMED:
+            return None
+        return self._execution.fault(self._report, self._writer.epoch, now_ns)
+
+    def _follow(self, now_ns: int) -> None:
+        """Say how the trajectory fares; end it when the robot's own state says so."""
+        execution, report = self._execution, self._report
+        if execution is None or report is None:
+            return
+        time_s = execution.time_s(report, self._writer.epoch)
+        name, duration_s = execution.trajectory_id, execution.duration_s
+        if self._core.state is State.STOPPING:
+            return
+        if self._core.state is not State.ARMED:
+            reason = "; ".join(fault.sentence for fault in self._core.faults) or "disarmed"
+            self._say(name, TrajectoryStatus.STATE_STOPPED, time_s, duration_s, reason)
+            self._execution = None
+            return
+        ending = execution.ending(report, self._writer.epoch, now_ns, self._description)
+        if ending is not None:
+            state = TrajectoryStatus.STATE_STOPPED if ending else TrajectoryStatus.STATE_SUCCEEDED
+            self._say(name, state, duration_s, duration_s, ending)
+            self._execution = None
+        elif self._ticks % TICKS_PER_PROGRESS == 0:
+            self._say(name, TrajectoryStatus.STATE_EXECUTING, time_s, duration_s, "")
+
+    def _say(self, name: str, state: TrajectoryStatus.State, time_s: float, duration_s: float, reason: str) -> None:
+        status = TrajectoryStatus(trajectory_id=name, state=state, time_s=time_s, duration_s=duration_s, reason=reason)
+        status.captured.FromNanoseconds(self._now_ns)
+        self._statuses.append(status)
+        if state != TrajectoryStatus.STATE_REFUSED:  # a refused one that is sent again is judged again
+            self._last_status[name] = status
+            while len(self._last_status) > 100:
+                del self._last_status[next(iter(self._last_status))]
+
+    def _safety_state(self, now_ns: int) -> SafetyState:
+        message = SafetyState(state=SAFETY_STATES[self._core.state], refused_trajectories=self._refused)
+        message.captured.FromNanoseconds(now_ns)
+        message.faults.extend(
+            SafetyFault(code=fault.code, joint=fault.joint, sentence=fault.sentence) for fault in self._core.faults
+        )
+        return message

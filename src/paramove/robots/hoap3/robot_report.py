@@ -1,0 +1,77 @@
+"""What HOAP-3 says of itself, in radians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from numpy.typing import NDArray
+
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State
+from paramove.robots.description import RobotDescription
+from paramove.robots.joint_units import JointRangeError
+from paramove.safety.gate_io import Measured
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotReport:
+    """One report. Arrays [J], rad or rad/s; `velocities` are differences to the report before."""
+
+    captured_ns: int
+    epoch: int
+    next_index: int
+    playing: Hoap3State.Playing
+    refusal: str
+    positions: FloatArray
+    commanded: FloatArray
+    velocities: FloatArray
+    joint_names: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls, message: Hoap3State, captured_ns: int, description: RobotDescription, before: RobotReport | None
+    ) -> RobotReport | None:
+        """Read a message; None if its counts are not those of this robot, for nothing may be made up in their place."""
+        units = description.units
+        try:
+            positions = units.to_radians(list(message.counts))
+            # A robot that does not say what it holds is taken to hold where it is.
+            commanded = units.to_radians(list(message.target_counts)) if message.target_counts else positions
+        except JointRangeError:
+            return None
+        velocities = np.zeros(description.n_joints)
+        if before is not None and captured_ns > before.captured_ns:
+            velocities = (positions - before.positions) / ((captured_ns - before.captured_ns) * 1e-9)
+        return cls(
+            captured_ns,
+            message.epoch,
+            message.next_index,
+            message.playing,
+            message.refusal,
+            positions,
+            commanded,
+            velocities,
+            description.joint_names,
+        )
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the robot plays nothing."""
+        return self.playing in (Hoap3State.PLAYING_NOTHING, Hoap3State.PLAYING_HELD)
+
+    def measured(self, epoch: int) -> Measured:
+        """As the safety gate hears it; of another epoch no row counts as played."""
+        index = self.next_index if self.epoch == epoch else 0
+        return Measured(self.captured_ns, self.positions, self.commanded, self.at_rest, index)
+
+    def joint_states(self) -> JointStates:
+        """As the standard message, all joints, rad and rad/s."""
+        message = JointStates()
+        message.timestamp.FromNanoseconds(self.captured_ns)
+        for name, position, velocity in zip(self.joint_names, self.positions, self.velocities, strict=True):
+            message.joints.append(JointState(name=name, position=position, velocity=velocity))
+        return message
