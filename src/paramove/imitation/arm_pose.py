@@ -1,0 +1,272 @@
+"""Arm poses of a person to joint angles of a robot's arm, in closed form (thesis 5.2.4).
+
+The gripper is placed exactly; the elbow as near to the person's as the robot's proportions and joint limits allow. The
+gripper site (the centre of a held cylinder) lies beside the forearm's axis; the solution includes that offset.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+from paramove.robots.description import Arm, RobotDescription
+
+FloatArray = NDArray[np.float64]
+
+# The elbow is turned on this grid, then refined by bisection to a hundredth of a step.
+_TURNS = np.deg2rad(np.arange(0.0, 181.0, 1.0))
+_TURNS_BOTH = np.stack([_TURNS, -_TURNS], axis=1).ravel()
+_BISECTIONS = 7
+_JUMP = np.deg2rad(20.0)
+_NEARLY_STRAIGHT = 1e-9
+
+
+class UnreachablePoseError(ValueError):
+    """No joint angles exist for a pose; the message names the pose and the reason."""
+
+
+@dataclass(frozen=True)
+class JointSolution:
+    """Joint angles for a sequence of K poses.
+
+    Attributes:
+        angles: Shoulder pitch, roll, torsion, elbow, wrist, [K, 5], rad.
+        elbow: The elbow that was set (q′ of 5.2.4), [K, 3], m, shoulder frame.
+        elbow_turn: How far a joint limit turned the elbow about the shoulder-gripper line, [K], rad.
+    """
+
+    angles: FloatArray
+    elbow: FloatArray
+    elbow_turn: FloatArray
+
+
+class ArmPoseSolver:
+    """Inverse kinematics of an arm with three shoulder joints, an elbow and a wrist that twists.
+
+    Args:
+        robot: The robot's description: limits.
+        arm: The arm's chain and lengths.
+    """
+
+    def __init__(self, robot: RobotDescription, arm: Arm) -> None:
+        self._lower = robot.soft_lower[arm.indices]
+        self._upper = robot.soft_upper[arm.indices]
+        self._joints = arm.joints
+        self._upper_arm = arm.kinematics.upper_arm
+        along, aside, above = arm.kinematics.gripper_from_elbow
+        if above != 0.0:
+            raise ValueError(f"the gripper site lies {above} m above the hand's plane; the closed form needs 0")
+        self._along, self._aside = along, aside
+        self._forearm = float(np.hypot(along, aside))  # elbow to gripper site
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Least and greatest distance of the gripper from the shoulder, m, by the elbow's limits."""
+        bend = np.array([self._lower[3], min(self._upper[3], 0.0)])
+        squared = self._upper_arm**2 + self._forearm**2 + 2 * self._upper_arm * self._forearm * np.cos(bend)
+        return float(np.sqrt(squared[0])), float(np.sqrt(squared[1]))
+
+    def solve(
+        self,
+        elbow: ArrayLike,
+        gripper: ArrayLike,
+        finger_to_thumb: ArrayLike,
+        level: ArrayLike = 0.0,
+        smoothing: int = 0,
+    ) -> JointSolution:
+        """Joint angles that place the gripper exactly and the elbow near the one given.
+
+        Where the elbow of 5.2.4 breaks a joint limit it is turned about the shoulder-gripper line by the smallest angle
+        that breaks none. If the smallest angles of one sequence lie on both sides, the side that suits all poses is kept,
+        so that the elbow never jumps.
+
+        Args:
+            elbow: The person's elbow scaled to the robot, [K, 3], m, shoulder frame.
+            gripper: Where the gripper site shall be, [K, 3].
+            finger_to_thumb: Direction from index finger to thumb (o of 5.2.3), [K, 3].
+            level: Share 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the table
+                plane, thumb on the left (5.2.5).
+            smoothing: Over how many poses a turn of the elbow comes and goes; 0 for poses that are no sequence in time.
+
+        Raises:
+            UnreachablePoseError: A gripper point is out of reach, or no turn of the elbow keeps the joint limits.
+        """
+        q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
+        self._check_reach(r)
+        poses = _Poses(q, r, o, np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1]))
+        solution = self._one_sided(poses, self._nearest(poses, _TURNS_BOTH))
+        return self._smoothed(poses, solution, smoothing) if smoothing else solution
+
+    def _smoothed(self, poses: _Poses, solution: JointSolution, smoothing: int) -> JointSolution:
+        """The turn begun a little earlier and ended later, so that the elbow does not jerk; limits still hold."""
+        turn = solution.elbow_turn
+        if not turn.any():
+            return solution
+        sign = 1.0 if turn.max() >= -turn.min() else -1.0
+        wider = maximum_filter1d(np.maximum(sign * turn, 0.0), 2 * smoothing + 1, mode="nearest")
+        smooth = sign * gaussian_filter1d(wider, smoothing / 2.0, mode="nearest", truncate=2.0)
+        ends = np.minimum(np.arange(len(turn)), np.arange(len(turn))[::-1])
+        smooth = np.where(ends < smoothing, turn + np.clip(ends / smoothing, 0.0, 1.0) ** 2 * (smooth - turn), smooth)
+        angles, q_set = self._pose(poses, smooth)
+        return JointSolution(angles, q_set, smooth) if (self._excess(angles) <= 0.0).all() else solution
+
+    def _one_sided(self, poses: _Poses, solution: JointSolution) -> JointSolution:
+        turn = solution.elbow_turn
+        if np.any(np.abs(np.diff(turn)) > _JUMP) and turn.min() < 0.0 < turn.max():
+            one_sided = []
+            for side in (1.0, -1.0):
+                try:
+                    one_sided.append(self._nearest(poses, side * _TURNS))
+                except UnreachablePoseError:
+                    continue
+            if one_sided:
+                return min(one_sided, key=lambda s: float(np.abs(s.elbow_turn).max()))
+        return solution
+
+    def _check_reach(self, r: FloatArray) -> None:
+        least, greatest = self.reach
+        least, greatest = least - self._aside * 0.1, greatest + 1e-9  # the offset changes the bend by up to 2.6 deg
+        distance = np.linalg.norm(r, axis=1)
+        bad = np.flatnonzero(~((distance >= least) & (distance <= greatest)))
+        if bad.size:
+            k = int(bad[0])
+            raise UnreachablePoseError(
+                f"pose {k}: gripper at {_cm(r[k])} cm is {distance[k] * 100:.1f} cm from the shoulder; "
+                f"the arm reaches {least * 100:.1f} to {greatest * 100:.1f} cm"
+            )
+
+    def _nearest(self, poses: _Poses, turns: FloatArray) -> JointSolution:
+        """The first of `turns` (sorted by size) that breaks no limit, refined; only poses that need a turn search."""
+        best = np.zeros(len(poses.r))
+        angles, _ = self._pose(poses, best)
+        stuck = np.flatnonzero(self._excess(angles) > 0.0)
+        if stuck.size:
+            some = poses.of(stuck)
+            excess = np.stack([self._excess(self._pose(some, np.full(stuck.size, turn))[0]) for turn in turns], axis=1)
+            good = excess <= 0.0  # [K, S]
+            if not good.any(axis=1).all():
+                k = int(stuck[np.flatnonzero(~good.any(axis=1))[0]])
+                raise UnreachablePoseError(
+                    f"pose {k}: gripper at {_cm(poses.r[k])} cm breaks {self._broken(angles[k])} "
+                    "and another limit wherever the elbow is turned"
+                )
+            best[stuck] = self._refine(some, turns[np.argmax(good, axis=1)])
+        angles, q_set = self._pose(poses, best)
+        return JointSolution(angles, q_set, best)
+
+    def _refine(self, poses: _Poses, turn: FloatArray) -> FloatArray:
+        good, bad = turn.copy(), turn - _TURNS[1] * np.sign(turn)
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (good + bad)
+            inside = self._excess(self._pose(poses, middle)[0]) <= 0.0
+            good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
+        return good
+
+    def _excess(self, angles: FloatArray) -> FloatArray:
+        """How far the worst joint lies outside its limits, rad; not positive inside."""
+        return np.maximum(self._lower - angles, angles - self._upper).max(axis=-1)  # type: ignore[no-any-return]
+
+    def _broken(self, angles: FloatArray) -> str:
+        worst = int(np.argmax(np.maximum(self._lower - angles, angles - self._upper)))
+        low, high, found = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
+        return f"the limit of {self._joints[worst]} ({found:.1f} deg, allowed {low:.1f} to {high:.1f})"
+
+    def _pose(self, poses: _Poses, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angles [K, 5] and elbow [K, 3] for the elbow of 5.2.4 turned by `turn` [K]."""
+        q = self._elbow(poses.q, poses.r, turn)
+        o = poses.o / np.maximum(np.linalg.norm(poses.o, axis=-1, keepdims=True), _NEARLY_STRAIGHT)
+        share = poses.level[:, None]
+        forearm, aside = self._hand(q, poses.r, (1.0 - share) * o + share * _level(q, poses.r))
+        return _angles(q / self._upper_arm, forearm, aside), q
+
+    def _elbow(self, q: FloatArray, r: FloatArray, turn: FloatArray) -> FloatArray:
+        a, b = self._upper_arm, self._forearm
+        c = np.linalg.norm(r, axis=-1, keepdims=True)  # c = |r - p| with p = 0; corrected (printed |r - q|)
+        w1 = r / c  # (5.11)
+        w2 = q - np.sum(q * w1, axis=-1, keepdims=True) * w1  # (5.13)
+        length = np.linalg.norm(w2, axis=-1, keepdims=True)
+        straight_down = np.array([0.0, 0.0, -1.0])
+        fallback = straight_down - np.sum(straight_down * w1, axis=-1, keepdims=True) * w1
+        w2 = np.where(length > _NEARLY_STRAIGHT, w2, fallback)
+        w2 = w2 / np.linalg.norm(w2, axis=-1, keepdims=True)  # (5.12)
+        cos_beta = np.clip((a**2 + c**2 - b**2) / (2 * a * c), -1.0, 1.0)  # (5.8)
+        sin_beta = np.sqrt(1.0 - cos_beta**2)
+        w3 = np.cross(w1, w2)
+        side = np.cos(turn)[..., None] * w2 + np.sin(turn)[..., None] * w3
+        return a * (cos_beta * w1 + sin_beta * side)  # (5.10)
+
+    def _hand(self, q: FloatArray, r: FloatArray, o: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Unit forearm axis b and the hand's sideward axis y (towards the thumb), with r = q + along b + aside y.
+
+        y is o made perpendicular to b, (5.22) corrected. As r - q and o span both, y follows without iteration.
+        """
+        d = r - q
+        length = np.linalg.norm(d, axis=-1, keepdims=True)
+        d = d / length
+        across = o - np.sum(o * d, axis=-1, keepdims=True) * d
+        norm = np.linalg.norm(across, axis=-1, keepdims=True)
+        across = np.where(norm > _NEARLY_STRAIGHT, across, _level(q, r))
+        across = across / np.linalg.norm(across, axis=-1, keepdims=True)
+        sine = self._aside / length
+        y = sine * d + np.sqrt(1.0 - sine**2) * across
+        b = (length * d - self._aside * y) / self._along  # (5.23) corrected: from the robot's elbow
+        return b, y
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """Elbow, gripper, finger to thumb [K, 3] and level [K]."""
+
+    q: FloatArray
+    r: FloatArray
+    o: FloatArray
+    level: FloatArray
+
+    def of(self, places: NDArray[np.intp]) -> _Poses:
+        return _Poses(self.q[places], self.r[places], self.o[places], self.level[places])
+
+
+def _level(q: FloatArray, r: FloatArray) -> FloatArray:
+    """o′ of 5.2.5: level and across the line from elbow to gripper, to the left, [K, 3]."""
+    d = r - q
+    level = np.stack([-d[..., 1], d[..., 0], np.zeros_like(d[..., 0])], axis=-1)
+    return np.asarray(level / np.linalg.norm(level, axis=-1, keepdims=True))
+
+
+def _angles(upper_arm: FloatArray, forearm: FloatArray, aside: FloatArray) -> FloatArray:
+    """Joint angles from the axes of the upper arm, the forearm and the hand's side.
+
+    Cardan angles as in (5.17)-(5.20), corrected; derived for HOAP-3's chain R_y(α1) R_z(α2) R_x(α3) R_y(α4) R_x(α5) and
+    verified by its forward kinematics.
+    """
+    pitch = np.arctan2(-upper_arm[..., 2], upper_arm[..., 0])
+    roll = np.arcsin(np.clip(upper_arm[..., 1], -1.0, 1.0))
+    b = _rotate_z(_rotate_y(forearm, -pitch), -roll)
+    elbow = -np.arccos(np.clip(b[..., 0], -1.0, 1.0))  # α4 = -(180° - γ°), corrected
+    torsion = np.arctan2(-b[..., 1], b[..., 2])
+    y = _rotate_z(_rotate_y(aside, -pitch), -roll)
+    y = _rotate_y(_rotate_x(y, -torsion), -elbow)
+    wrist = np.arctan2(y[..., 2], y[..., 1])  # (5.21) with atan2, corrected
+    return np.stack([pitch, roll, torsion, elbow, wrist], axis=-1)
+
+
+def _rotate_x(v: FloatArray, angle: FloatArray) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([v[..., 0], c * v[..., 1] - s * v[..., 2], s * v[..., 1] + c * v[..., 2]], axis=-1)
+
+
+def _rotate_y(v: FloatArray, angle: FloatArray) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * v[..., 0] + s * v[..., 2], v[..., 1], -s * v[..., 0] + c * v[..., 2]], axis=-1)
+
+
+def _rotate_z(v: FloatArray, angle: FloatArray) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1], v[..., 2]], axis=-1)
+
+
+def _cm(point: FloatArray) -> str:
+    return "(" + ", ".join(f"{v * 100:.1f}" for v in point) + ")"

@@ -1,0 +1,163 @@
+"""Clearance of planned arm paths from the table, the robot's own body and standing objects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.robots.description import RobotDescription
+
+FloatArray = NDArray[np.float64]
+
+_FAR = 0.05  # distances beyond are not told apart, m
+_HIDDEN = 10.0
+
+
+@dataclass(frozen=True)
+class WorkSurface:
+    """The box in front of the robot whose upper face is the working plane; shoulder frame, m."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    z: float
+    thickness: float = 0.1
+
+
+@dataclass(frozen=True)
+class UprightCylinder:
+    """The objects that are handled: they stand on the working plane."""
+
+    radius: float = 0.010
+    height: float = 0.050
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """The closest approach of a path.
+
+    Attributes:
+        distance: m; at most 0.05.
+        sample: Which sample of the path.
+        pair: The two parts.
+    """
+
+    distance: float
+    sample: int
+    pair: tuple[str, str]
+
+
+class ClearanceChecker:
+    """Distances between one arm of a robot and what surrounds it, by MuJoCo's own collision shapes.
+
+    Args:
+        robot: The robot's description.
+        side: Which arm.
+        surface: The working surface.
+        cylinder: The standing objects' shape.
+        n_standing: How many standing objects can be told apart at once.
+    """
+
+    def __init__(
+        self, robot: RobotDescription, side: str, surface: WorkSurface, cylinder: UprightCylinder, n_standing: int = 3
+    ) -> None:
+        self._robot, self._arm = robot, robot.arms[side]
+        self._cylinder, self._n_standing, self._surface = cylinder, n_standing, surface
+        self._model = self._compile(robot.model_path)
+        self._data = mujoco.MjData(self._model)
+        self._data.qpos[:] = 0.0
+        self._qpos = [int(self._model.jnt_qposadr[self._model.joint(n).id]) for n in robot.joint_names]
+        self._data.qpos[self._qpos] = robot.base_pose
+        self._moving, self._fixed = self._geoms(side)
+        self._hand_names = {f"{side}_hand", f"{side}_thumb"}
+
+    def _compile(self, model_path: Path) -> mujoco.MjModel:
+        spec = mujoco.MjSpec.from_file(str(model_path))
+        shoulder = np.array(spec.site(self._arm.sites.shoulder).pos)  # on the torso, axes parallel
+        box, world = self._surface, spec.worldbody
+        low = np.array([box.x[0], box.y[0], box.z - box.thickness])
+        high = np.array([box.x[1], box.y[1], box.z])
+        world.add_geom(
+            name="surface", type=mujoco.mjtGeom.mjGEOM_BOX, pos=shoulder + (low + high) / 2, size=(high - low) / 2
+        )
+        size = [self._cylinder.radius, self._cylinder.height / 2, 0.0]
+        for k in range(self._n_standing):
+            body = world.add_body(name=f"standing_{k}", mocap=True, pos=[_HIDDEN, _HIDDEN, 0.0])
+            body.add_geom(name=f"standing_{k}", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
+        gripper = spec.site(self._arm.sites.gripper)
+        held = gripper.parent.add_geom(name="held", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=gripper.pos, size=size)
+        held.pos = np.array(gripper.pos) + [0.0, 0.0, -0.011]  # grasped above the middle
+        self._shoulder = shoulder
+        return spec.compile()
+
+    def _geoms(self, side: str) -> tuple[list[int], list[int]]:
+        model = self._model
+        collides = [g for g in range(model.ngeom) if model.geom_contype[g] or model.geom_conaffinity[g]]
+        chain = _bodies_below(model, f"{side}_upper_arm")
+        moving = [g for g in collides if int(model.geom_bodyid[g]) in chain and model.geom(g).name != "held"]
+        own_shoulder = {f"{side}_shoulder_bracket"}
+        fixed = [
+            g
+            for g in collides
+            if int(model.geom_bodyid[g]) not in chain
+            and not model.geom(g).name.startswith(("standing", "surface"))
+            and model.body(int(model.geom_bodyid[g])).name not in own_shoulder
+        ]
+        return moving, fixed
+
+    def smallest(self, angles: ArrayLike, standing: ArrayLike, holding: ArrayLike, every: int = 2) -> Clearance:
+        """The closest approach along a path.
+
+        Args:
+            angles: Arm joints and fingers, [K, 6], rad.
+            standing: Middles of standing objects to keep clear of, [M, 3], shoulder frame.
+            holding: Whether an object is held, [K]; it is kept clear of the standing ones.
+            every: Check every so many samples.
+        """
+        q = np.asarray(angles, dtype=np.float64)
+        held = np.asarray(holding, dtype=bool)
+        upright = self._place(np.asarray(standing, dtype=np.float64).reshape(-1, 3))
+        held_geom = self._model.geom("held").id
+        surface = self._model.geom("surface").id
+        columns = [self._qpos[i] for i in (*self._arm.indices, self._arm.fingers_index)]
+        worst = Clearance(_FAR, 0, ("", ""))
+        for k in range(0, len(q), every):
+            self._data.qpos[columns] = q[k]
+            mujoco.mj_kinematics(self._model, self._data)
+            pairs = [(g, other) for g in self._moving for other in (surface, *upright)]
+            pairs += [(g, other) for g in self._hand_geoms for other in self._fixed]
+            if held[k]:
+                pairs += [(held_geom, other) for other in upright]
+            for one, two in pairs:
+                distance = mujoco.mj_geomDistance(self._model, self._data, one, two, _FAR, None)
+                if distance < worst.distance:
+                    worst = Clearance(distance, k, (self._name(one), self._name(two)))
+        return worst
+
+    @property
+    def _hand_geoms(self) -> list[int]:
+        return [g for g in self._moving if self._model.body(int(self._model.geom_bodyid[g])).name in self._hand_names]
+
+    def _place(self, standing: FloatArray) -> list[int]:
+        if len(standing) > self._n_standing:
+            raise ValueError(f"{len(standing)} standing objects; this checker was made for {self._n_standing}")
+        self._data.mocap_pos[:] = [_HIDDEN, _HIDDEN, 0.0]
+        for k, middle in enumerate(standing):
+            body = self._model.body(f"standing_{k}").mocapid[0]
+            self._data.mocap_pos[body] = self._shoulder + middle
+        return [self._model.geom(f"standing_{k}").id for k in range(len(standing))]
+
+    def _name(self, geom: int) -> str:
+        return str(self._model.geom(geom).name or self._model.body(int(self._model.geom_bodyid[geom])).name)
+
+
+def _bodies_below(model: mujoco.MjModel, name: str) -> set[int]:
+    root = model.body(name).id
+    below = {root}
+    for body in range(root + 1, model.nbody):
+        if int(model.body_parentid[body]) in below:
+            below.add(body)
+    return below

@@ -1,0 +1,320 @@
+"""The relocation action: fetch an object and put it elsewhere with a learned reaching movement (thesis 5.2.5).
+
+Approach and retreat are the synthesised movement; in between, the state T in which the gripper has reached the target is kept
+and only the parameter t varies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from paramove.imitation.arm_pose import ArmPoseSolver
+from paramove.imitation.conversion import ArmPoses, RobotMovement
+from paramove.imitation.timing import fade_in, minimum_jerk, resampled, slowed_times, soft_ends
+from paramove.robots.description import Arm
+
+FloatArray = NDArray[np.float64]
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class RelocationOptions:
+    """Sizes of the relocation action, m, s, m/s. Where the thesis gives a number it is named."""
+
+    before: float = 0.03  # 3 cm before the object
+    aside: float = 0.010  # 1 cm to the right
+    grasp_aside: float = 0.005  # thesis 1 cm; the gripper site already lies beside the forearm's axis
+    release_aside: float = 0.006  # 0.6 cm
+    lift: float = 0.048  # thesis 1.5 cm; this much clears standing objects
+    entry_height: float = 0.048  # the synthesised approach ends and the retreat begins so far above the table target
+    release_height: float = 0.001
+    approach_duration: float = 3.0  # about 3 s
+    retreat_duration: float = 2.6
+    speed: float = 0.10
+    careful_speed: float = 0.05
+    finger_duration: float = 0.5
+    settle_duration: float = 0.3
+    work_opening: float = 0.85  # ξ while approaching and leaving an object
+    level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
+    limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
+    reach_margin: float = 0.002  # the synthesised path keeps this much outside the least reach of the arm
+    reach_width: float = 0.012  # and begins to be moved outward from twice so much on
+    turn_smoothing: float = 0.15  # s, over which a turn of the elbow comes and goes
+    blend_share: float = 0.45  # part of the approach over which the robot's own base pose fades into the movement
+    sample_period: float = 0.005
+
+
+@dataclass
+class _Path:
+    """A path under construction: samples of pose, opening and level, and where phases begin."""
+
+    period: float
+    poses: list[ArmPoses] = field(default_factory=list)
+    opening: list[FloatArray] = field(default_factory=list)
+    level: list[FloatArray] = field(default_factory=list)
+    holding: list[NDArray[np.bool_]] = field(default_factory=list)
+    phases: list[tuple[str, float]] = field(default_factory=list)
+
+    def add(
+        self, name: str, poses: ArmPoses, opening: ArrayLike, level: ArrayLike = 1.0, holding: bool = False
+    ) -> None:
+        n = len(poses)
+        start = self.period * sum(len(p) for p in self.poses)
+        if not self.phases or self.phases[-1][0] != name:
+            self.phases.append((name, start))
+        self.poses.append(poses)
+        self.opening.append(np.broadcast_to(np.asarray(opening, dtype=np.float64), n))
+        self.level.append(np.broadcast_to(np.asarray(level, dtype=np.float64), n))
+        self.holding.append(np.full(n, holding))
+
+    @property
+    def end(self) -> ArmPoses:
+        return self.poses[-1][-1:]
+
+
+@dataclass(frozen=True)
+class PlannedMotion:
+    """A motion from rest to rest, ready for the driver.
+
+    Attributes:
+        times: [K], s, from 0.
+        angles: Arm joints and fingers, [K, 6], rad.
+        gripper: Where the gripper site shall be, [K, 3], m, shoulder frame.
+        holding: Whether an object is held, [K].
+        phases: Name and start of each phase.
+        elbow_turn: Largest turn of the elbow that a joint limit asked for, rad.
+    """
+
+    times: FloatArray
+    angles: FloatArray
+    gripper: FloatArray
+    holding: NDArray[np.bool_]
+    phases: tuple[tuple[str, float], ...]
+    elbow_turn: float
+
+
+class RelocationPlanner:
+    """Builds the motions of the relocation action from a converted model.
+
+    Args:
+        movement: The converted reaching movement.
+        solver: Inverse kinematics of the arm.
+        arm: The arm's joints and fingers.
+        base_angles: The arm's base pose, [5], rad; every motion starts or ends there or where the last one ended.
+        velocity: Largest speed of the five joints and the fingers, [6], rad/s.
+        acceleration: Largest acceleration of them, [6], rad/s².
+        options: Sizes.
+    """
+
+    def __init__(
+        self,
+        movement: RobotMovement,
+        solver: ArmPoseSolver,
+        arm: Arm,
+        base_angles: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        options: RelocationOptions | None = None,
+    ) -> None:
+        self.movement, self.solver, self.arm = movement, solver, arm
+        self.options = options or RelocationOptions()
+        self._velocity = np.asarray(velocity, dtype=np.float64)
+        self._acceleration = np.asarray(acceleration, dtype=np.float64)
+        self._base = self._pose_of(np.asarray(base_angles, dtype=np.float64))
+
+    def fetch(self, target: ArrayLike, entry_height: float | None = None) -> PlannedMotion:
+        """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5)."""
+        t = np.asarray(target, dtype=np.float64)
+        o = self.options
+        path = self._new_path()
+        before = self._before(t)
+        grasp = t + o.grasp_aside * self._right(t)
+        self._approach(path, before + (o.entry_height if entry_height is None else entry_height) * _UP)
+        self._move(path, "lower", [before], o.speed, o.work_opening)
+        self._move(path, "reach", [grasp], o.careful_speed, o.work_opening)
+        self._fingers(path, "grasp", o.work_opening, 0.0)
+        self._move(path, "lift", [grasp + o.lift * _UP], o.careful_speed, 0.0, holding=True)
+        return self._finish(path)
+
+    def deliver(self, start: ArrayLike, target: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `target`, let go, back to the base pose."""
+        o = self.options
+        t = np.asarray(target, dtype=np.float64)
+        path = self._new_path()
+        here = np.asarray(start, dtype=np.float64)
+        above = t + o.lift * _UP
+        self._stay(path, "carry", here, 0.0, holding=True)
+        self._move(path, "carry", [*(np.asarray(v, dtype=np.float64) for v in via), above], o.speed, 0.0, holding=True)
+        self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, 0.0, holding=True)
+        self._leave(path, t)
+        return self._finish(path)
+
+    def leave(self, start: ArrayLike, opening: float) -> PlannedMotion:
+        """Open the hand where it is and go back to the base pose (last part of 5.2.5)."""
+        path = self._new_path()
+        here = np.asarray(start, dtype=np.float64)
+        self._stay(path, "release", here, opening)
+        self._leave(path, here, opening)
+        return self._finish(path)
+
+    def offer(self, target: ArrayLike) -> PlannedMotion:
+        """Go to `target` with an open hand and stay there."""
+        path = self._new_path()
+        self._approach(path, np.asarray(target, dtype=np.float64))
+        return self._finish(path)
+
+    def fingers(self, here: ArrayLike, start: float, end: float) -> PlannedMotion:
+        """Open or close the hand where it is."""
+        path = self._new_path()
+        self._stay(path, "fingers", np.asarray(here, dtype=np.float64), start)
+        self._fingers(path, "fingers", start, end)
+        return self._finish(path)
+
+    def _new_path(self) -> _Path:
+        return _Path(self.options.sample_period)
+
+    def _approach(self, path: _Path, target: FloatArray) -> None:
+        """States 1..T of the movement for `target`, started from the base pose."""
+        o, m = self.options, self.movement
+        target = self._far_enough(target)
+        states = m.poses(m.parameter_for(m.reach_state, target)[0])[: m.reach_state + 1]
+        opening = np.maximum(m.opening(states.finger_to_thumb), 0.0)
+        n = len(states)
+        level = fade_in(n, o.level_states)
+        opening = opening + fade_in(n, n) * (o.work_opening - opening)
+        states = self._blended(states, o.blend_share)
+        self._synthesised(path, "approach", states, opening, level, o.approach_duration)
+
+    def _leave(self, path: _Path, target: FloatArray, opening: float = 0.0) -> None:
+        o, m = self.options, self.movement
+        self._fingers(path, "release", opening, o.work_opening)
+        aside = target + o.release_aside * self._right(target)
+        before = self._before(target)
+        high = self._far_enough(before + o.entry_height * _UP)
+        self._move(path, "withdraw", [aside], o.careful_speed, o.work_opening)
+        self._move(path, "withdraw", [before], o.speed, o.work_opening)
+        self._move(path, "withdraw", [high], o.speed, o.work_opening)
+        states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
+        opening_path = m.opening(states.finger_to_thumb)
+        n = len(states)
+        opening_path = opening_path + fade_in(n, n)[::-1] * (o.work_opening - opening_path)
+        level = fade_in(n, o.level_states)[::-1]
+        backwards = self._blended(ArmPoses.from_stacked(states.stacked()[::-1]), o.blend_share)
+        states = ArmPoses.from_stacked(backwards.stacked()[::-1])
+        first = path.end.stacked()[0]
+        fade = fade_in(n, n // 2)[::-1, None]
+        states = ArmPoses.from_stacked(states.stacked() + fade * (first - states.stacked()[0]))
+        self._synthesised(path, "retreat", states, opening_path, level, o.retreat_duration)
+
+    def _synthesised(
+        self, path: _Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
+    ) -> None:
+        """State means in order (synthesis method D), smoothly timed from rest to rest."""
+        at = np.linspace(0.0, 1.0, len(states))
+        columns = np.concatenate([states.stacked(), opening[:, None], level[:, None]], axis=1)
+        curve = CubicSpline(at, columns, axis=0, bc_type="clamped")
+        n = max(2, round(duration / path.period))
+        values = curve(soft_ends(np.arange(1, n + 1) / n))
+        poses = ArmPoses.from_stacked(values[:, :9])
+        poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
+        path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
+
+    def _far_enough(self, point: FloatArray) -> FloatArray:
+        """The point moved away from the shoulder until `_outward` leaves it where it is."""
+        least = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
+        return point * max(1.0, least / float(np.linalg.norm(point)))
+
+    def _outward(self, gripper: FloatArray) -> FloatArray:
+        """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
+        least, width = self.solver.reach[0] + self.options.reach_margin, self.options.reach_width
+        distance = np.linalg.norm(gripper, axis=1, keepdims=True)
+        beyond = distance - least
+        softened = np.where(beyond > width, beyond, np.clip(beyond + width, 0.0, None) ** 2 / (4.0 * width))
+        return np.asarray(gripper * (least + softened) / distance)
+
+    def _move(
+        self, path: _Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
+    ) -> None:
+        """θ_T^t along straight lines of t, at rest at every point."""
+        here = path.end.gripper[0]
+        for point in points:
+            distance = float(np.linalg.norm(point - here))
+            n = max(2, int(np.ceil(1.6 * distance / speed / path.period)))
+            along = minimum_jerk(np.arange(1, n + 1) / n)[:, None]
+            path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
+            here = point
+
+    def _stay(self, path: _Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
+        path.add(name, self._reached(here[None]), opening, holding=holding)
+
+    def _fingers(self, path: _Path, name: str, start: float, end: float) -> None:
+        o = self.options
+        n = max(2, round(o.finger_duration / path.period))
+        rest = max(1, round(o.settle_duration / path.period))
+        along = minimum_jerk(np.arange(1, n + 1) / n)
+        opening = np.concatenate([start + along * (end - start), np.full(rest, end)])
+        path.add(name, self._reached(np.repeat(path.end.gripper, n + rest, axis=0)), opening, holding=end < start)
+
+    def _reached(self, gripper: FloatArray) -> ArmPoses:
+        """Poses of state T in which the gripper is at the given points [K, 3]."""
+        m = self.movement
+        poses = m.poses_of_state(m.reach_state, m.parameter_for(m.reach_state, gripper))
+        return ArmPoses(poses.elbow, gripper, poses.finger_to_thumb)
+
+    def _right(self, target: FloatArray) -> FloatArray:
+        """b′⊥ of 5.2.5: level, to the right of the forearm when the gripper is at `target`."""
+        b = self._forward(target)
+        return np.array([b[1], -b[0], 0.0])
+
+    def _forward(self, target: FloatArray) -> FloatArray:
+        """b′ of 5.2.5: the forearm's direction projected onto the table plane."""
+        pose = self._reached(target[None])
+        solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, level=1.0)
+        b = (pose.gripper - solution.elbow)[0] * [1.0, 1.0, 0.0]
+        return np.asarray(b / np.linalg.norm(b))
+
+    def _before(self, target: FloatArray) -> FloatArray:
+        """t′ = t - 0.03 b′ + 0.01 b′⊥ of 5.2.5."""
+        return target - self.options.before * self._forward(target) + self.options.aside * self._right(target)
+
+    def _blended(self, states: ArmPoses, share: float) -> ArmPoses:
+        """The movement started from the robot's own base pose, which fades out over the first `share`."""
+        values = states.stacked()
+        n = len(values)
+        fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (share * (n - 1)), 0.0, 1.0))
+        return ArmPoses.from_stacked(values + fade[:, None] * (self._base.stacked()[0] - values[0]))
+
+    def _pose_of(self, angles: FloatArray) -> ArmPoses:
+        points = self.arm.kinematics.forward(angles)
+        across = points.shoulder_from_hand[..., :, 1] * self.movement.o_max
+        return ArmPoses(points.elbow[None], points.gripper[None], across[None])
+
+    def _finish(self, path: _Path) -> PlannedMotion:
+        poses = ArmPoses.joined(path.poses)
+        opening, level = np.concatenate(path.opening), np.concatenate(path.level)
+        smoothing = round(self.options.turn_smoothing / path.period)
+        solution = self.solver.solve(poses.elbow, poses.gripper, poses.finger_to_thumb, level, smoothing)
+        closed, opened = self.arm.fingers_closed, self.arm.fingers_open
+        fingers = closed + opening * (opened - closed)
+        angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)
+        share = self.options.limit_share
+        stretched = slowed_times(angles, path.period, share * self._velocity, share * self._acceleration)
+        holding = np.concatenate(path.holding).astype(np.float64)
+        columns = np.concatenate([angles, poses.gripper], axis=1)
+        times, values = resampled(stretched, columns, path.period)
+        planned = path.period * np.arange(len(poses))
+        phases = [(name, float(np.interp(start, planned, stretched))) for name, start in path.phases]
+        return PlannedMotion(
+            times=times,
+            angles=values[:, :6],
+            gripper=values[:, 6:],
+            holding=np.interp(times, stretched, holding) > 0.5,
+            phases=tuple(phases),
+            elbow_turn=float(np.abs(solution.elbow_turn).max()),
+        )

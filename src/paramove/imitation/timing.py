@@ -1,0 +1,65 @@
+"""Timing of sampled paths: smooth progress, and slowing down where a joint would be too fast."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+
+FloatArray = NDArray[np.float64]
+
+_WINDOW_S = 0.12
+_ACCELERATION_ROUNDS = 6
+
+
+def minimum_jerk(u: FloatArray) -> FloatArray:
+    """Progress 0 to 1 from rest to rest for u in 0 to 1 (Flash and Hogan 1985)."""
+    return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
+
+
+def soft_ends(u: FloatArray) -> FloatArray:
+    """Progress that is even but for its ends, so that a movement with a timing of its own keeps it in the middle."""
+    return np.asarray(0.6 * u + 0.4 * minimum_jerk(u))
+
+
+def fade_in(n: int, last: int) -> FloatArray:
+    """0 up to the last `last` of n values, then smoothly to 1 at the end."""
+    return minimum_jerk(np.clip((np.arange(n) - (n - last)) / max(1, last - 1), 0.0, 1.0))
+
+
+def slowed_times(angles: FloatArray, period: float, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+    """Times of samples that were planned `period` apart, stretched where a joint would exceed its limits.
+
+    The stretch is spread over a tenth of a second before and after, so that slowing down is itself smooth.
+
+    Args:
+        angles: [K, J], rad.
+        period: s.
+        velocity: Largest speed of each joint, [J], rad/s.
+        acceleration: Largest acceleration of each joint, [J], rad/s².
+    """
+    stretch = _spread((np.abs(np.diff(angles, axis=0)) / velocity).max(axis=1) / period, period)
+    for _ in range(_ACCELERATION_ROUNDS):
+        steps = stretch * period
+        rates = np.diff(angles, axis=0) / steps[:, None]
+        excess = (np.abs(np.diff(rates, axis=0)) / (0.5 * (steps[1:] + steps[:-1]))[:, None] / acceleration).max(axis=1)
+        if excess.max(initial=0.0) <= 1.0:
+            break
+        needed = np.sqrt(np.concatenate([excess[:1], np.maximum(excess[1:], excess[:-1]), excess[-1:]]))
+        stretch = stretch * _spread(needed, period)
+    return np.concatenate([[0.0], np.cumsum(stretch * period)])
+
+
+def _spread(needed: FloatArray, period: float) -> FloatArray:
+    """At least 1 and at least `needed`, smooth in time."""
+    window = max(1, round(_WINDOW_S / period))
+    widest = maximum_filter1d(np.maximum(1.0, needed), 2 * window + 1, mode="nearest")
+    return np.asarray(gaussian_filter1d(widest, window / 2.0, mode="nearest", truncate=2.0))
+
+
+def resampled(times: FloatArray, values: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+    """A curve through `values` [K, J] at `times` [K], sampled every `period` and at its end."""
+    n = max(1, int(np.ceil(times[-1] / period - 1e-9)))
+    at = np.linspace(0.0, times[-1], n + 1)
+    return period * np.arange(n + 1), CubicSpline(times, values, axis=0)(at)
