@@ -13,7 +13,7 @@ import signal
 import sys
 import time
 
-GRACE_S = 5.0
+GRACE_S = 1.5
 
 
 def main() -> None:

@@ -1,0 +1,56 @@
+# `make demo` and `make test` each install what is missing by themselves and say what.
+# Prerequisites: git, make, Python 3.11 or newer. Linux, x86_64.
+#
+#   make demo ARGS="--seed 7"      the rule-learning demo with another world
+#   make test ARGS="tests/hmm"     some of the tests
+
+BIN := .venv/bin
+ARGS ?=
+SEEDS ?= 0-9
+PROTOC = $(BIN)/python -m grpc_tools.protoc -Iparamove/msgs=msgs $(wildcard msgs/*.proto)
+
+.PHONY: help demo test check format setup messages lock benchmark-seeds bare clean
+
+help: ## this list
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
+
+demo: setup ## the robot learns where three objects belong and tidies them up, in simulation
+	@$(BIN)/paramove launch rule_learning $(ARGS)
+
+test: setup ## all tests that need no hardware
+	@$(BIN)/python -m pytest -m "not hardware" $(ARGS)
+
+check: setup ## formatting, lint, types, generated messages
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	@rm -rf build/messages && mkdir -p build/messages
+	@$(PROTOC) --python_out=build/messages --pyi_out=build/messages
+	@diff -r -x __init__.py -x __pycache__ build/messages/paramove/msgs src/paramove/msgs \
+	  || { echo "src/paramove/msgs is not what msgs/*.proto says; run: make messages" >&2; exit 1; }
+
+format: setup ## puts the code into its standard form
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+benchmark-seeds: setup ## the demo with many worlds: make benchmark-seeds SEEDS=0-29
+	@$(BIN)/paramove evaluate rule_learning --seeds $(SEEDS) $(ARGS)
+
+setup: ## installs what is missing; done by the others too
+	@sh docker/setup.sh
+
+messages: setup ## generates src/paramove/msgs from msgs/*.proto
+	$(PROTOC) --python_out=src --pyi_out=src
+
+lock: ## finds newer versions and writes requirements.lock
+	python3 -m venv build/lock
+	build/lock/bin/python -m pip install --quiet uv
+	build/lock/bin/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade \
+	  --generate-hashes --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
+	  --output-file requirements.lock
+
+bare: ## demo and tests in a bare Debian, as root and as an ordinary user (needs root and debootstrap)
+	docker/bare.sh $(ARGS)
+
+clean: ## removes what can be made again, but not the runs
+	rm -rf .venv build .pytest_cache .mypy_cache .ruff_cache .hypothesis
