@@ -17,8 +17,8 @@ Action = Literal["reaching", "pointing"]
 
 FRAME = "demonstrator_table"
 SAMPLE_RATE_HZ = 60.0
-RESTING_STERNUM = np.array([-0.19, 0.0, 0.29])
-RESTING_SHOULDER = np.array([-0.22, -0.18, 0.35])
+RESTING_STERNUM = np.array([-0.24, 0.0, 0.29])
+RESTING_SHOULDER = np.array([-0.27, -0.18, 0.35])
 RESTING_HAND = RESTING_SHOULDER + np.array([0.03, -0.08, -0.630])
 COMFORTABLE_TARGET = RESTING_SHOULDER + np.array([0.36, 0.0, -0.26])
 
@@ -68,8 +68,8 @@ class Timing:
     arrive: float = 0.425
     close: float = 0.468
     closed: float = 0.505
-    release: float = 0.563
-    leave: float = 0.585
+    release: float = 0.554
+    leave: float = 0.580
     home: float = 0.97
     duration: float = 3.2
 
@@ -198,9 +198,9 @@ def grasping(progress: Floats, timing: Timing) -> Floats:
 
 def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, share: Floats) -> Floats:
     """Bezier curve from the hanging hand up beside the table and down to the target from behind and above. (T, 3)."""
-    lifted = RESTING_SHOULDER + np.array([0.12, -0.28, -0.41]) + 0.15 * (reached - COMFORTABLE_TARGET) + sway_low
+    lifted = RESTING_SHOULDER + np.array([0.18, -0.34, -0.28]) + 0.15 * (reached - COMFORTABLE_TARGET) + sway_low
     away = (RESTING_SHOULDER - reached) * np.array([1.0, 1.0, 0.0])
-    above = reached + 0.22 * away + 0.12 * UPWARD + sway_high
+    above = reached + 0.10 * away + 0.22 * UPWARD + sway_high
     s = share[:, None]
     result: Floats = (1 - s) ** 3 * base + 3 * s * (1 - s) ** 2 * lifted + 3 * s**2 * (1 - s) * above + s**3 * reached
     return result
