@@ -1,0 +1,54 @@
+"""Camera: reads frames from a camera, a video file or a topic, checks them and says them compressed.
+
+Hears   camera/light   foxglove.RawImage          15 Hz   camera_optical   only with source topic:camera/light
+Says    camera/image   foxglove.CompressedImage   15 Hz   camera_optical
+"""
+
+from pydantic import Field
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.vision.frame_sources import open_source
+from paramove.vision.frames import EndOfFrames, FrameChecks, FrameError, encode
+
+HEARS = (topics.CAMERA_LIGHT,)
+SAYS = (topics.CAMERA_IMAGE,)
+
+
+class Config(NodeConfig):
+    source: str = "topic:camera/light"  # or file:PATH, or device:PATH
+    width: int = Field(480, gt=0)
+    height: int = Field(360, gt=0)
+    jpeg_quality: int = Field(95, ge=1, le=100)
+    frozen_after: int = Field(15, ge=0)  # equal frames in a row; 0: equal frames are allowed
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes or a video file ends. A bad frame is not said but makes the node degraded."""
+    source = open_source(config.source, config.width, config.height)
+    checks = FrameChecks(config.width, config.height, config.frozen_after)
+    bus.ready(f"frames from {config.source}")
+    fault = ""
+    try:
+        for event in bus.latest(topics.CAMERA_LIGHT) if source.hears_light else bus.events(tick=True):
+            now_ns, light = (event.captured_ns, event.message) if isinstance(event, Heard) else (event.now_ns, None)
+            try:
+                frame = source.frame(now_ns, light)
+                if frame is None:
+                    continue
+                bus.publish(topics.CAMERA_IMAGE, encode(checks.passed(frame), config.jpeg_quality), frame.captured_ns)
+            except EndOfFrames:
+                return
+            except FrameError as error:
+                fault = str(error)
+                bus.degraded(fault)
+                continue
+            if fault:
+                fault = ""
+                bus.ready(f"frames from {config.source} again")
+    finally:
+        source.close()
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

@@ -1,0 +1,40 @@
+"""Colour tracker: finds the coloured objects and the hand in each camera frame.
+
+Hears   camera/image     foxglove.CompressedImage   15 Hz   camera_optical
+Says    objects/tracked  TrackedObjects             15 Hz   image plane, pixels
+"""
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, main
+from paramove.vision.colour_tracker import DEFAULT_COLOURS, Colour, ColourTracker
+from paramove.vision.frames import FrameError, decode
+
+HEARS = (topics.CAMERA_IMAGE,)
+SAYS = (topics.OBJECTS_TRACKED,)
+
+
+class Config(NodeConfig):
+    colours: tuple[Colour, ...] = DEFAULT_COLOURS
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes. An image that cannot be decoded is left out."""
+    tracker = ColourTracker(config.colours)
+    sentence = f"tracking {', '.join(colour.name for colour in config.colours)}"
+    bus.ready(sentence)
+    well = True
+    for heard in bus.latest(topics.CAMERA_IMAGE):
+        try:
+            image = decode(heard.message)
+        except FrameError as error:
+            well = False
+            bus.degraded(str(error))
+            continue
+        bus.publish(topics.OBJECTS_TRACKED, tracker.update(image, heard.captured_ns), heard.captured_ns)
+        if not well:
+            well = True
+            bus.ready(sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

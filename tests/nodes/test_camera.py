@@ -1,0 +1,90 @@
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from pydantic import ValidationError
+
+from nodes import camera
+from paramove.bus import topics
+from paramove.vision.frames import FrameError, decode
+from tests.nodes.recorded_bus import RecordedBus
+
+
+def _picture(seed: int, width: int = 480, height: int = 360) -> np.ndarray:
+    small = np.random.default_rng(seed).integers(40, 200, (height // 12, width // 12, 3), dtype=np.uint8)
+    return cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
+
+
+def _light(image: np.ndarray) -> tuple[Any, RawImage]:
+    height, width = image.shape[:2]
+    raw = RawImage(encoding="bgr8", width=width, height=height, step=3 * width, data=image.tobytes())
+    return topics.CAMERA_LIGHT, raw
+
+
+def test_says_each_frame_of_a_video_file_once(tmp_path: Path) -> None:
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (480, 360))
+    pictures = [_picture(seed) for seed in range(6)]
+    for picture in pictures:
+        writer.write(picture)
+    writer.release()
+    bus = RecordedBus(ticks=30)
+    camera.run(bus, camera.Config(source=f"file:{path}"))
+    assert bus.now_ns < 30 * 66_666_667  # it ended with the file
+    assert len(bus.said) == 6
+    for (topic, message, captured_ns), picture in zip(bus.said, pictures, strict=True):
+        assert topic is topics.CAMERA_IMAGE
+        assert message.frame_id == "camera_optical"
+        assert message.timestamp.ToNanoseconds() == captured_ns
+        assert np.abs(decode(message).astype(int) - picture).mean() < 6
+
+
+def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (480, 360))
+    for seed in range(12):
+        writer.write(_picture(seed))
+    writer.release()
+    bus = RecordedBus(ticks=30)
+    camera.run(bus, camera.Config(source=f"file:{path}"))
+    assert len(bus.said) == 6
+
+
+def test_compresses_the_light_of_a_topic_and_recovers_from_bad_frames() -> None:
+    black = np.zeros((360, 480, 3), np.uint8)
+    wrong_size = _picture(1, 360, 240)
+    bus = RecordedBus([_light(image) for image in (_picture(1), black, wrong_size, _picture(2))])
+    camera.run(bus, camera.Config())
+    assert [captured_ns // 66_666_667 for _, _, captured_ns in bus.said] == [1, 4]
+    assert [state for state, _ in bus.states] == ["ready", "degraded", "degraded", "ready"]
+    assert "black" in bus.states[1][1]
+    assert "360 x 240 px, 480 x 360 expected" in bus.states[2][1]
+
+
+def test_a_frozen_picture_is_said_no_more() -> None:
+    bus = RecordedBus([_light(_picture(1))] * 20)
+    camera.run(bus, camera.Config(frozen_after=10))
+    assert len(bus.said) == 9
+    assert "frozen" in bus.states[-1][1]
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("file:/nowhere/clip.avi", "no video file /nowhere/clip.avi"),
+        ("device:/dev/no-such-camera", "no camera /dev/no-such-camera; found"),
+        ("socket:1", "topic:camera/light, file:PATH or device:PATH expected"),
+        ("topic:camera/image", "expected"),
+    ],
+)
+def test_a_source_that_is_not_there_is_named(source: str, words: str) -> None:
+    with pytest.raises(FrameError, match=words):
+        camera.run(RecordedBus(), camera.Config(source=source))
+
+
+def test_refuses_unknown_parameters() -> None:
+    with pytest.raises(ValidationError):
+        camera.Config.model_validate({"sauce": "file:x"})
