@@ -162,6 +162,12 @@ def test_cuboid_holds_what_the_scaled_arm_can_reach_of_the_robots_working_area(m
 def test_cached_model_is_read_back(model: InterpolativePHMM, tmp_path: Path) -> None:
     file = tmp_path / "reaching.npz"
     model.save(file)
-    again = train_reaching_model(99, cache=file)
+    written = file.stat().st_mtime_ns
+    again = train_reaching_model(0, cache=file)
     assert_allclose(again.means_, model.means_, rtol=0.0, atol=0.0)
     assert again.description == model.description
+    assert file.stat().st_mtime_ns == written
+    other = train_reaching_model(1, cache=file)
+    assert other.description is not None
+    assert "seed 1" in other.description.source
+    assert InterpolativePHMM.load(file).description == other.description

@@ -14,6 +14,8 @@ from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription
 Floats = NDArray[np.float64]
 logger = logging.getLogger(__name__)
 
+DEMONSTRATOR_VERSION = 1  # raise it with every change of the synthetic movements: cached models then train again
+
 
 @dataclass(frozen=True)
 class Demonstrations:
@@ -81,22 +83,24 @@ def train_reaching_model(
 ) -> InterpolativePHMM:
     """The 2 x 2 x 2 interpolative model of reaching, 80 states of 2 or 3 frames (thesis 5.2.2).
 
-    Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it fits
-    and written there otherwise.
+    Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it was made
+    with the same arguments, and written there otherwise.
     """
-    expected = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
+    source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, {repetitions} repetitions"
+    model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
     if cache is not None and cache.exists():
         try:
             stored = InterpolativePHMM.load(cache)
-            if stored.n_states == n_states:
+            if stored.n_states == n_states and stored.description and stored.description.source == source:
                 return stored
         except ModelFileError as error:
             logger.warning("training again, the cached model does not fit: %s", error)
     shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=repetitions)
-    model = expected.set_params(description=shown.description).fit(shown.sequences, shown.theta)
+    model.fit(shown.sequences, shown.theta)
     arrival, grasp = grasp_states(model.means_)
     steps = n_states - 1
-    model.description = replace(shown.description, arrival=arrival / steps, grasp=grasp / steps)
+    progress = {"arrival": arrival / steps, "grasp": grasp / steps}
+    model.description = replace(shown.description, source=source, **progress)
     if cache is not None:
         model.save(cache)
     return model

@@ -17,6 +17,7 @@ class MovementDescription:
         duration: mean duration of the demonstrations in seconds; 0 if unknown.
         arrival: progress tau at which the target is reached, the hand still open; -1 if there is none.
         grasp: last progress tau at which the object is held; -1 if there is none.
+        source: where the demonstrations come from; "" if unknown.
     """
 
     action: str = "movement"
@@ -27,6 +28,7 @@ class MovementDescription:
     duration: float = 0.0
     arrival: float = -1.0
     grasp: float = -1.0
+    source: str = ""
 
     def as_record(self) -> dict[str, Any]:
         """Plain values for a file."""

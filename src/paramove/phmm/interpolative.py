@@ -1,6 +1,7 @@
 """The interpolative parametric HMM: multilinear interpolation of synchronised local HMMs on a grid (thesis 3.4)."""
 
-from typing import cast
+from collections.abc import Sequence
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +64,47 @@ class InterpolativePHMM(ParametricHMM):
         self.search_margin = search_margin
         self.covariance_inflation = covariance_inflation
 
+    @classmethod
+    def from_local_models(cls, grid: ParameterGrid, local: Sequence[Parameters], **parameters: Any) -> Self:
+        """A model made of given local HMMs, one per grid point in the order of `grid.points()` (thesis 5.2.3).
+
+        `parameters` are further constructor arguments. Raises ValueError where number or shapes differ.
+        """
+        if len(local) != grid.size:
+            raise ValueError(f"expected {grid.size} local models, one per grid point, found {len(local)}")
+        kinds = {(one.means.shape, one.durations.shape, one.d_min) for one in local}
+        if len(kinds) != 1:
+            raise ValueError(f"all local models have the same shapes and d_min, found {sorted(kinds)}")
+        (states, _), (_, d_max), d_min = kinds.pop()
+        model = cls(states, d_min, d_max, **parameters)
+        corners = grid.points()
+        model.parameter_bounds_ = np.stack([corners.min(axis=0), corners.max(axis=0)])
+        model._set_local(grid, local)
+        return model
+
+    def local_models(self) -> list[Parameters]:
+        """The local HMMs in the order of `grid_.points()`."""
+        stored = zip(self.means_, self.covariances_, self.durations_, strict=True)
+        return [Parameters(means, covariances, durations, self.d_min) for means, covariances, durations in stored]
+
+    def calibrate(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
+        """Set `covariance_inflation` so that covariances of `estimate` match its errors on labelled sequences.
+
+        The likelihood takes frames for independent, which makes its curvature far too sure. Use sequences that did not
+        train the model. Raises ValueError for fewer than two.
+        """
+        labels = np.atleast_2d(np.asarray(theta, dtype=np.float64))
+        if len(sequences) < 2:
+            raise ValueError(f"calibration needs at least 2 labelled sequences, found {len(sequences)}")
+        self.covariance_inflation = 1.0
+        squared = []
+        for sequence, label in zip(sequences, labels, strict=True):
+            found = self.estimate(sequence)
+            error = found.theta - label
+            squared.append(float(error @ np.linalg.solve(found.covariance, error)))
+        self.covariance_inflation = float(np.mean(squared)) / self.grid_.dimension
+        return self
+
     def _fit(self, sequences: list[Floats], theta: Floats) -> None:
         grid = self._grid_for(theta)
         groups = grouped(sequences, theta, grid)
@@ -77,7 +119,7 @@ class InterpolativePHMM(ParametricHMM):
             return ParameterGrid.from_theta(theta)
         return ParameterGrid.from_corners(self.corners, self.shape or (2,) * theta.shape[1])
 
-    def _set_local(self, grid: ParameterGrid, local: list[Parameters]) -> None:
+    def _set_local(self, grid: ParameterGrid, local: Sequence[Parameters]) -> None:
         self.grid_ = grid
         self.means_ = np.stack([one.means for one in local])
         self.covariances_ = np.stack([one.covariances for one in local])
