@@ -83,8 +83,8 @@ def train_reaching_model(
 ) -> InterpolativePHMM:
     """The 2 x 2 x 2 interpolative model of reaching, 80 states of 2 or 3 frames (thesis 5.2.2).
 
-    Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it was made
-    with the same arguments, and written there otherwise.
+    Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it was
+    made with the same arguments, and written there otherwise.
     """
     source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, {repetitions} repetitions"
     model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
@@ -98,9 +98,9 @@ def train_reaching_model(
     shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=repetitions)
     model.fit(shown.sequences, shown.theta)
     arrival, grasp = grasp_states(model.means_)
-    steps = n_states - 1
-    progress = {"arrival": arrival / steps, "grasp": grasp / steps}
-    model.description = replace(shown.description, source=source, **progress)
+    model.description = replace(
+        shown.description, source=source, arrival=arrival / (n_states - 1), grasp=grasp / (n_states - 1)
+    )
     if cache is not None:
         model.save(cache)
     return model
