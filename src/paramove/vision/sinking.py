@@ -111,7 +111,8 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> Las
     seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * carried_px] or [samples[-1]]
     on_rim = _on_rim(seen)
     sunk = min(samples[-1].height_px, *(s.height_px for s in on_rim)) < SHRUNK_SHARE * carried_px
-    bottom_px = median(s.bottom_px for s in on_rim) if sunk else seen[-1].bottom_px
+    on_rim = on_rim if sunk else seen[-1:]
+    bottom_px = median(s.bottom_px for s in on_rim)
     at_place = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
     middle_px = bottom_px - at_place.lower_px
     u_px = _on_axis(seen[-len(on_rim) - 8 :], on_rim, middle_px)
@@ -119,10 +120,11 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> Las
 
 
 def _on_rim(seen: Sequence[Sample]) -> list[Sample]:
-    """The last samples whose lower border is where that of the very last is."""
+    """The last samples whose lower border is where that of the very last is, across and along."""
     on_rim = [seen[-1]]
     for sample in reversed(seen[:-1]):
-        if abs(sample.bottom_px - median(s.bottom_px for s in on_rim)) > BORDER_PX:
+        lifted = abs(sample.bottom_px - median(s.bottom_px for s in on_rim)) > BORDER_PX
+        if lifted or abs(sample.u_px - seen[-1].u_px) > 2 * BORDER_PX:
             break
         on_rim.append(sample)
     return on_rim[::-1]
