@@ -1,0 +1,45 @@
+"""From rendered images to gestures: the instructor shows a rule and points (thesis 5.2.6, steps 3 and 4)."""
+
+import numpy as np
+import pytest
+
+from paramove.msgs.gesture_pb2 import Gesture
+from tests.vision.scene import Look, Scene
+from tests.vision.stories import OPENING, Story, segment, show_rule
+
+RIM_RADIUS = 0.020  # an opening of 28 mm with a chamfer of 6 mm
+
+
+@pytest.mark.parametrize(
+    ("seed", "lowering_ticks", "drop"), [(0, 12, False), (1, 25, False), (2, 12, True), (5, 9, False)]
+)
+def test_a_shown_rule_is_located_within_four_millimetres(seed: int, lowering_ticks: int, drop: bool) -> None:
+    draw = np.random.default_rng(seed)
+    with Scene(Look.random(seed), seed, opening_radius=RIM_RADIUS) as scene:
+        story = Story(scene)
+        story.calibrate()
+        start = (draw.uniform(0.13, 0.18), draw.uniform(-0.12, -0.07))
+        show_rule(story, "blue", start, lowering_ticks, drop, yaw=draw.uniform(-0.6, 0.6))
+    assert story.kinds("blue") == ["APPEARED", "MOVED", "VANISHED"]
+    vanished = next(g for g in story.gestures if g.kind == Gesture.KIND_VANISHED)
+    assert vanished.located
+    assert np.hypot(vanished.x - OPENING[0], vanished.y - OPENING[1]) < 0.004
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
+    places = {"yellow": (0.14, -0.10), "green": (0.17, -0.03), "blue": (0.13, 0.05)}
+    with Scene(Look.random(seed), seed) as scene:
+        story = Story(scene)
+        story.calibrate()
+        for name, place in places.items():
+            scene.stand(name, *place)
+        story.step(12)
+        x, y = places["green"]
+        for centre in segment((0.40, 0.20, 0.12), (x + 0.085, y, 0.055), 20):
+            scene.put("hand", tuple(centre))
+            story.step()
+        story.step(12)
+    pointed = [g for g in story.gestures if g.kind == Gesture.KIND_POINTED_AT]
+    assert [g.object for g in pointed] == ["green"]
+    assert np.hypot(pointed[0].x - x, pointed[0].y - y) < 0.003
