@@ -146,22 +146,23 @@ class SafetyCore:
             return self._stop(now_ns, inputs.stop, proposal, measured)
         if proposal is None:
             return None
-        fault, good_rows = self._judge(now_ns, proposal, measured)
+        fault = self._judge(now_ns, proposal, measured)
         if fault is not None:
-            return self._stop(now_ns, fault, proposal, measured, good_rows)
-        return self._accept(proposal.first_index, proposal.rows, proposal.ahead, measured)
+            return self._stop(now_ns, fault, proposal, measured)
+        ahead = proposal.ahead
+        ramp = stop_ramp(proposal.rows[-1], ahead, self.limits) if len(ahead) else ahead
+        return self._accept(proposal.first_index, proposal.rows, ramp, measured)
 
-    def _judge(self, now_ns: int, proposal: Proposal, measured: Measured) -> tuple[Fault | None, int]:
-        """The first gate that refuses, and how many rows before the refused one are good."""
+    def _judge(self, now_ns: int, proposal: Proposal, measured: Measured) -> Fault | None:
+        """The first gate that refuses."""
         fault = self._judge_form(now_ns, proposal) or self._judge_place(proposal, measured)
         if fault is not None:
-            return fault, 0
+            return fault
         # The rows ahead are judged too: the stop ramp will run over them.
         rows = np.concatenate([proposal.rows, proposal.ahead])
-        violation = self.limits.first_violation(rows, self._before(proposal.first_index, measured))
-        if violation is None:
-            return None, len(rows)
-        return Fault(violation.code, violation.joint, violation.sentence), violation.row
+        before = self._before(proposal.first_index, measured)
+        violation = self.limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
+        return Fault(violation.code, violation.joint, violation.sentence) if violation else None
 
     def _judge_form(self, now_ns: int, proposal: Proposal) -> Fault | None:
         names, n_joints = self.limits.names, len(self.limits.names)
@@ -183,56 +184,53 @@ class SafetyCore:
         return None
 
     def _judge_place(self, proposal: Proposal, measured: Measured) -> Fault | None:
-        first = proposal.first_index
+        first, end = proposal.first_index, self._sent.end_index if self._sent else measured.next_index
         if first < measured.next_index:
             sentence = f"rows from index {first}, allowed from {measured.next_index}: earlier ones are played"
             return Fault("played", "", sentence)
-        if self._sent is not None and first > self._sent.end_index:
-            return Fault("gap", "", f"rows from index {first}, allowed up to {self._sent.end_index}: no gap")
+        if first > end:
+            return Fault("gap", "", f"rows from index {first}, allowed up to {end}: no gap")
         return None
 
     def _before(self, first_index: int, measured: Measured) -> FloatArray:
         """The rows already accepted just before `first_index`; the commanded pose where there are none."""
         sent = self._sent
-        if sent is None or first_index <= sent.first_index:
+        if sent is None:
             return measured.commanded[None]
         upto = first_index - sent.first_index
         return sent.rows[max(0, upto - 2 * SPAN) : upto]
 
-    def _accept(self, first_index: int, rows: FloatArray, ahead: FloatArray, measured: Measured) -> Targets:
-        ramp = stop_ramp(rows[-1], ahead, self.limits) if len(ahead) else np.empty((0, rows.shape[1]))
+    def _accept(self, first_index: int, rows: FloatArray, ramp: FloatArray, measured: Measured) -> Targets:
+        """Give the rows and their ramp; keep all that the robot has yet to play and a little of what it played."""
         targets = Targets(first_index, np.concatenate([rows, ramp]), len(ramp))
-        self._remember(targets, measured)
+        sent = self._sent
+        if sent is None:
+            kept_index, kept = first_index - 1, measured.commanded[None]
+        else:
+            kept_index = max(sent.first_index, measured.next_index - 2 * SPAN)
+            kept = sent.rows[kept_index - sent.first_index : first_index - sent.first_index]
+        self._sent = Targets(kept_index, np.concatenate([kept, targets.rows]), targets.ramp_rows)
         return targets
 
-    def _remember(self, targets: Targets, measured: Measured) -> None:
-        """Keep what the robot will play: rows accepted earlier up to the new ones, then the new ones."""
-        kept = self._before(targets.first_index, measured)
-        self._sent = Targets(targets.first_index - len(kept), np.concatenate([kept, targets.rows]), targets.ramp_rows)
+    def _stop(self, now_ns: int, fault: Fault | None, proposal: Proposal | None, measured: Measured) -> Targets | None:
+        """Latch the fault; give the rows of a stop that begins as early as the stream allows.
 
-    def _stop(
-        self,
-        now_ns: int,
-        fault: Fault | None,
-        proposal: Proposal | None,
-        measured: Measured,
-        good_rows: int | None = None,
-    ) -> Targets | None:
-        """Latch the fault; give the rows of a stop that begins as early as the stream allows."""
+        Without good rows to stop along, nothing: what was sent before ends in its own ramp.
+        """
         if fault is not None:
             self.faults = (*self.faults, fault)
         self.state = State.STOPPING
         self._stopping_since_ns = now_ns
-        if proposal is None or (good_rows is not None and good_rows < 1) or self._judge_place(proposal, measured):
-            return None  # what was sent before ends in its own ramp
-        path = np.concatenate([proposal.rows, proposal.ahead])[:good_rows]
-        before = self._before(proposal.first_index, measured)
-        ramp = stop_ramp(before[-1], path, self.limits)
-        if not len(ramp):
+        if proposal is None or self._judge_form(now_ns, proposal) or self._judge_place(proposal, measured):
             return None
-        targets = Targets(proposal.first_index, ramp, len(ramp))
-        self._remember(targets, measured)
-        return targets
+        before = self._before(proposal.first_index, measured)
+        path = np.concatenate([proposal.rows, proposal.ahead])
+        while len(path) and (violation := self.limits.first_violation(path, before)) is not None:
+            path = path[: violation.row]
+        if not len(path):
+            return None
+        ramp = stop_ramp(before[-1], path, self.limits)
+        return self._accept(proposal.first_index, ramp[:0], ramp, measured) if len(ramp) else None
 
     def _moving(self, measured: Measured) -> bool:
         """Whether rows are played or still to be played: a report of rest can be older than the rows just sent."""

@@ -1,0 +1,45 @@
+"""The operator arms once in simulation and never a real robot."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from nodes.operator import Config
+from paramove.msgs.safety_state_pb2 import SafetyState
+from paramove.safety.operator import Operator
+
+SECOND = 1_000_000_000
+
+
+def said(state: SafetyState.State) -> SafetyState:
+    return SafetyState(state=state)
+
+
+def test_arms_once_when_the_gate_is_disarmed() -> None:
+    operator = Operator(arms_at_start=True)
+    assert operator.update(said(SafetyState.STATE_DISCONNECTED), 0) is None
+    request = operator.update(said(SafetyState.STATE_DISARMED), SECOND)
+    assert request is not None
+    assert request.armed
+    assert request.source
+    assert request.captured.ToNanoseconds() == SECOND
+    assert operator.update(said(SafetyState.STATE_DISARMED), SECOND + SECOND // 15) is None
+    assert operator.update(said(SafetyState.STATE_DISARMED), 2 * SECOND) is not None  # the word was lost
+    for state in (SafetyState.STATE_ARMED, SafetyState.STATE_HOLD, SafetyState.STATE_DISARMED):
+        assert operator.update(said(state), 9 * SECOND) is None
+
+
+def test_a_gate_found_armed_or_in_hold_is_left_alone() -> None:
+    for state in (SafetyState.STATE_ARMED, SafetyState.STATE_HOLD, SafetyState.STATE_STOPPING):
+        assert Operator(arms_at_start=True).update(said(state), 0) is None
+
+
+def test_without_leave_it_never_arms() -> None:
+    assert Operator(arms_at_start=False).update(said(SafetyState.STATE_DISARMED), 0) is None
+
+
+def test_a_real_robot_is_for_a_person_to_arm() -> None:
+    assert not Config.model_validate({"arms_at_start": True}).real
+    with pytest.raises(ValidationError, match="a person must"):
+        Config.model_validate({"arms_at_start": True, "real": True})

@@ -1,0 +1,118 @@
+"""Whole trajectories: what is refused and where, and what an accepted one becomes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paramove.safety.limits import MotionLimits
+from paramove.safety.trajectory_check import CheckedPath, TrajectoryRefusedError, check_trajectory
+from tests.robots.hoap3.movements import HOAP3
+
+LIMITS = MotionLimits.of(HOAP3)
+JOINTS = ("right_shoulder_pitch", "right_elbow")
+PLACES = HOAP3.indices(JOINTS)
+START = HOAP3.base_pose[PLACES]
+
+
+def check(times: list[float], offsets_deg: list[list[float]], joints: tuple[str, ...] = JOINTS) -> CheckedPath:
+    """Points as offsets from the base pose, deg."""
+    base = HOAP3.base_pose[HOAP3.indices([joint for joint in joints if joint in HOAP3.joint_names])]
+    points = [[*(np.deg2rad(point) + base[: len(point)])] for point in offsets_deg]
+    return check_trajectory(joints, times, points, HOAP3.base_pose, LIMITS, np.deg2rad(2.0))
+
+
+def rise(gap_s: float, duration_s: float, degrees: float) -> tuple[list[float], list[list[float]]]:
+    times = np.linspace(0, duration_s, round(duration_s / gap_s) + 1)
+    u = times / duration_s
+    return list(times), [[degrees * float(f), 0.0] for f in 10 * u**3 - 15 * u**4 + 6 * u**5]
+
+
+@pytest.mark.parametrize("gap_s", [0.001, 0.002, 0.01, 0.05, 1.0])
+def test_accepted_whatever_the_spacing_and_ends_exactly_at_the_last_point(gap_s: float) -> None:
+    path = check(*rise(gap_s, 1.0, -60.0))
+    assert path.rows.shape == (1001, 28)
+    assert path.duration_s == 1.0
+    np.testing.assert_array_equal(path.rows[0], HOAP3.base_pose)
+    np.testing.assert_allclose(path.rows[-1, PLACES], START + np.deg2rad([-60, 0]), rtol=0, atol=1e-12)
+    still = np.setdiff1d(np.arange(28), PLACES)
+    assert (path.rows[:, still] == HOAP3.base_pose[still]).all()
+    np.testing.assert_allclose(path.rows[500, PLACES[0]], START[0] - np.deg2rad(30), rtol=0, atol=1e-3)
+
+
+def test_via_points_far_apart_are_joined_by_straight_lines_with_rests() -> None:
+    path = check([0, 1, 2], [[0, 0], [-30, 10], [-60, 0]])
+    moved = np.rad2deg(path.rows[:1001, PLACES] - START)
+    np.testing.assert_allclose(moved[:, 1] * 30, -moved[:, 0] * 10, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        path.rows[999:1002, PLACES], path.rows[1000, PLACES] * np.ones((3, 1)), rtol=0, atol=1e-7
+    )
+
+
+def test_a_start_within_two_degrees_is_faded_in_from_the_commanded_pose() -> None:
+    path = check([0, 1], [[1.9, 0], [20, 0]])
+    np.testing.assert_array_equal(path.rows[0], HOAP3.base_pose)
+    np.testing.assert_allclose(path.rows[-1, PLACES[0]], START[0] + np.deg2rad(20), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("times", "offsets", "joints", "code", "index", "joint"),
+    [
+        ([0, 1], [[0, 0]] * 2, ("right_shoulder_pitch", "tail"), "joints", -1, "tail"),
+        ([0, 1], [[0, 0]] * 2, ("right_elbow", "right_elbow"), "joints", -1, "right_elbow"),
+        ([0, 1], [[], []], (), "joints", -1, ""),
+        ([0], [[0, 0]], JOINTS, "times", -1, ""),
+        ([], [], JOINTS, "times", -1, ""),
+        ([0, 1], [[0, 0], [0]], JOINTS, "joints", 1, ""),
+        ([0, 1, 1], [[0, 0]] * 3, JOINTS, "times", 2, ""),
+        ([0, 2, 1], [[0, 0]] * 3, JOINTS, "times", 2, ""),
+        ([0.5, 1], [[0, 0]] * 2, JOINTS, "times", 0, ""),
+        ([0, 1, float("nan")], [[0, 0]] * 3, JOINTS, "not_finite", 2, ""),
+        ([0, 500], [[0, 0]] * 2, JOINTS, "times", 1, ""),
+        ([0, 1], [[0, 0], [0, float("nan")]], JOINTS, "not_finite", 1, "right_elbow"),
+        ([0, 1], [[0, 0], [float("inf"), 0]], JOINTS, "not_finite", 1, "right_shoulder_pitch"),
+        ([0, 1, 2], [[0, 0], [0, -5], [0, 0]], JOINTS, "joint_limit", 1, "right_elbow"),
+        ([0, 1], [[0, 2.5], [0, 0]], JOINTS, "start", 0, "right_elbow"),
+        ([0, 0.5], [[0, 0], [-60, 0]], JOINTS, "velocity", 1, "right_shoulder_pitch"),
+        ([0, 0.3], [[0, 0], [-25, 0]], JOINTS, "acceleration", 1, "right_shoulder_pitch"),
+        ([0, 0.06], [[0, 0], [-25, 0]], JOINTS, "jump", 1, "right_shoulder_pitch"),
+        ([0, 0.05, 0.1, 0.15], [[0, 0], [0, 0], [-30, 0], [-30, 0]], JOINTS, "detour", 0, "right_shoulder_pitch"),
+    ],
+)
+def test_refused_with_the_point_and_the_joint(
+    times: list[float], offsets: list[list[float]], joints: tuple[str, ...], code: str, index: int, joint: str
+) -> None:
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check(times, offsets, joints)
+    assert (refusal.value.code, refusal.value.joint) == (code, joint)
+    assert refusal.value.index == index
+    assert refusal.value.asked
+    assert refusal.value.allowed
+
+
+def test_a_trajectory_that_ends_in_motion_is_refused() -> None:
+    times = [0.001 * i for i in range(201)]
+    ramp = [[-0.5 * 900 * t**2, 0.0] for t in times]
+    with pytest.raises(TrajectoryRefusedError, match="acceleration"):
+        check(times, ramp)
+
+
+@settings(deadline=None, max_examples=60, derandomize=True)
+@given(
+    gaps=st.lists(st.floats(min_value=0.002, max_value=0.4), min_size=1, max_size=12),
+    moves=st.lists(st.floats(min_value=-25, max_value=25), min_size=12, max_size=12),
+)
+def test_whatever_passes_keeps_every_limit(gaps: list[float], moves: list[float]) -> None:
+    times = [0.0, *np.cumsum(gaps)]
+    offsets = [[0.0, 0.0], *([move, 0.0] for move in moves[: len(gaps)])]
+    try:
+        rows = check(times, offsets).rows
+    except TrajectoryRefusedError:
+        return
+    rows = np.concatenate([rows[:1]] * 4 + [rows] + [rows[-1:]] * 4)
+    assert (rows >= LIMITS.lower).all()
+    assert (rows <= LIMITS.upper).all()
+    assert (np.abs(np.diff(rows, axis=0)) <= LIMITS.velocity * 1e-3 * 1.01).all()
+    assert (np.abs(rows[8:] - 2 * rows[4:-4] + rows[:-8]) <= LIMITS.acceleration * 16e-6 * 1.01).all()
