@@ -7,7 +7,6 @@
 BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
-PROTOC = $(BIN)/python -m grpc_tools.protoc -Iparamove/msgs=msgs $(wildcard msgs/*.proto)
 
 .PHONY: help demo test check format setup messages lock benchmark-seeds bare clean
 
@@ -24,10 +23,7 @@ check: setup ## formatting, lint, types, generated messages
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	@rm -rf build/messages && mkdir -p build/messages
-	@$(PROTOC) --python_out=build/messages --pyi_out=build/messages
-	@diff -r -x __init__.py -x __pycache__ build/messages/paramove/msgs src/paramove/msgs \
-	  || { echo "src/paramove/msgs is not what msgs/*.proto says; run: make messages" >&2; exit 1; }
+	$(BIN)/python msgs/generate.py --check
 
 format: setup ## puts the code into its standard form
 	$(BIN)/ruff format .
@@ -40,7 +36,7 @@ setup: ## installs what is missing; done by the others too
 	@sh docker/setup.sh
 
 messages: setup ## generates src/paramove/msgs from msgs/*.proto
-	$(PROTOC) --python_out=src --pyi_out=src
+	$(BIN)/python msgs/generate.py
 
 lock: ## finds newer versions and writes requirements.lock
 	python3 -m venv build/lock

@@ -50,24 +50,38 @@ pass_in() { # configuration files of this machine into the system at $1, at the 
     for file in "$HOME/.config/pip/pip.conf" "$HOME/.pip/pip.conf"; do
         [ -e "$file" ] && cp -L "$file" "$root/etc/pip.conf"
     done
-    while IFS= read -r file; do # certificates and wheel folders that variables name
-        [ -e "$file" ] && [ ! -e "$root$file" ] && mkdir -p "$root$(dirname "$file")" && cp -rL "$file" "$root$file"
-    done < <(passed_variables | cut -d= -f2- | grep '^/' || true)
+    mkdir -p "$root/opt/host"
+    while IFS== read -r name file; do
+        [ -e "$file" ] && cp -rLT "$file" "$root/opt/host/$name"
+    done < <(host_variables)
     for file in /etc/apt/apt.conf.d/*proxy*; do
         [ -e "$file" ] && cp "$file" "$root$file"
     done
     return 0
 }
 
-passed_variables() { env | grep -E '^(PIP_[A-Z_]*|(https?|no|HTTPS?|NO)_(proxy|PROXY)|SSL_CERT_FILE)=' || true; }
+host_variables() { # of pip and of the network; pip.conf's certificates as a variable
+    env | grep -E '^(PIP_[A-Z_]*|(https?|no|HTTPS?|NO)_(proxy|PROXY)|SSL_CERT_FILE)=' || true
+    local cert
+    cert=$(python3 -m pip config get global.cert 2>/dev/null || true)
+    [ -n "${PIP_CERT:-$cert}" ] && echo "PIP_CERT=${PIP_CERT:-$cert}"
+    return 0
+}
+
+passed_variables() { # the same, with files at the place where pass_in puts them: packages may overwrite the old one
+    local name value
+    while IFS== read -r name value; do
+        if [ -e "$value" ]; then echo "$name=/opt/host/$name"; else echo "$name=$value"; fi
+    done < <(host_variables)
+}
 
 work=""
 clean_up() {
     [ -n "$work" ] || return 0
-    for place in proc sys dev/pts dev/shm dev; do
-        mountpoint -q "$work/$place" && umount "$work/$place"
+    for place in proc dev/pts dev/shm; do
+        ! mountpoint -q "$work/$place" || umount "$work/$place" || umount --lazy "$work/$place"
     done
-    [ -n "$keep" ] && echo "bare.sh: left standing: $work" || rm -rf --one-file-system "$work"
+    if [ -n "$keep" ]; then echo "bare.sh: left standing: $work"; else rm -rf --one-file-system "$work"; fi
     work=""
 }
 trap clean_up EXIT
@@ -111,7 +125,9 @@ for person in "${people[@]}"; do
     chmod 755 "$work"
     pass_in "$work"
     mount -t proc proc "$work/proc"
-    mount --rbind /dev "$work/dev" 2>/dev/null && mount --make-rslave "$work/dev" || true
+    mount -t devpts -o newinstance,ptmxmode=0666,mode=0620 devpts "$work/dev/pts"
+    ln -sf pts/ptmx "$work/dev/ptmx"
+    mount -t tmpfs -o mode=1777 tmpfs "$work/dev/shm"
     echo "bare.sh: installs the prerequisites: $packages"
     { inside root apt-get update && inside root apt-get install -y --no-install-recommends $packages; } \
         >"$work/tmp/prerequisites.log" 2>&1 || { tail -n 5 "$work/tmp/prerequisites.log" >&2; exit 1; }

@@ -76,7 +76,8 @@ def validated(document: Document) -> LaunchFile:
     try:
         return LaunchFile.model_validate(document.data)
     except ValidationError as error:
-        findings = [_finding(document, details) for details in error.errors()]
+        details = sorted(error.errors(), key=lambda found: found["type"] == "missing")  # often a mistyped key's echo
+        findings = [_finding(document, found) for found in details]
         first, rest = findings[0], findings[1:]
         message = "\n".join([first.message, *(str(finding) for finding in rest)])
         raise LaunchFileError(first.position, message) from error

@@ -45,7 +45,9 @@ class NodeSettings(_Checked):
     ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 30.0
     ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
     lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
-    observer: bool = Field(default=False, description="hears whatever is said: a topic without a speaker is no error")
+    optional_topics: list[str] = Field(
+        default_factory=list, description="heard topics that may lack a speaker; '*': all"
+    )
     truth: bool = Field(
         default=False, description="gets the folder of ground truth; for the simulator and the judge only"
     )

@@ -51,10 +51,14 @@ def check_wiring(launch: Launch, interfaces: Mapping[str, Interface]) -> None:
                 raise launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
         for topic in interface.hears:
             heard = _on_bus(launch, name, topic.name)
-            if launch.file.nodes[name].observer:
+            optional = launch.file.nodes[name].optional_topics
+            if heard in speakers or heard.startswith("status/") or topic.name in optional or "*" in optional:
                 continue
-            if heard not in speakers and not heard.startswith("status/"):
-                raise launch.error(("nodes", name), f"'{name}' hears {heard}, which no node of this launch file says")
+            raise launch.error(
+                ("nodes", name),
+                f"'{name}' hears {heard}, which no node of this launch file says; "
+                "add its speaker, or name it in 'optional_topics' of the node",
+            )
 
 
 def clock_speaker(interfaces: Mapping[str, Interface]) -> str | None:

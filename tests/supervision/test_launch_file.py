@@ -1,0 +1,188 @@
+"""Launch files: what is read, what is refused, and where the error points."""
+
+import contextlib
+import textwrap
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paramove.supervision.launch_file import LaunchFileMissingError, load, start_waves, validated
+from paramove.supervision.positions import LaunchFileError, read_mapping
+from paramove.supervision.supervisor import stop_waves
+
+GOOD = """\
+description: Two nodes
+default_overlays: [slow]
+seed_parameters: [world.seed]
+nodes:
+  camera: {module: nodes.camera, parameters: {rate_hz: 15, lens: {k1: 0.1, k2: 0.2}}}
+  world:
+    module: sim.simulator
+    restart: on-failure
+    budget: {restarts: 2, window_s: 10}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "overlays").mkdir()
+    (tmp_path / "good.yaml").write_text(GOOD)
+    (tmp_path / "overlays" / "slow.yaml").write_text("nodes: {camera: {parameters: {rate_hz: 5, lens: {k1: 0.3}}}}\n")
+    (tmp_path / "overlays" / "bare.yaml").write_text("nodes: {world: null, extra: {module: nodes.extra}}\n")
+    return tmp_path
+
+
+def parameters(launch):
+    return launch.file.nodes["camera"].parameters
+
+
+def test_default_overlay_merges_parameters(folder):
+    assert parameters(load(folder, "good")) == {"rate_hz": 5, "lens": {"k1": 0.3, "k2": 0.2}}
+
+
+def test_overlays_given_replace_the_default_one_and_may_add_and_remove_nodes(folder):
+    (folder / "other.yaml").write_text(GOOD.replace("seed_parameters: [world.seed]\n", ""))
+    launch = load(folder, "other", ["bare"])
+    assert list(launch.file.nodes) == ["camera", "extra"]
+    assert parameters(launch)["rate_hz"] == 15
+
+
+def test_settings_come_last_and_are_yaml(folder):
+    launch = load(folder, "good", None, ["camera.rate_hz=7.5", "camera.lens.k2=[1, 2]", "camera.name=left: eye"[:16]])
+    assert parameters(launch) == {"rate_hz": 7.5, "lens": {"k1": 0.3, "k2": [1, 2]}, "name": "left"}
+
+
+def test_seed_goes_where_the_file_says(folder):
+    assert load(folder, "good", seed=7).file.nodes["world"].parameters == {"seed": 7}
+
+
+def test_seed_without_a_taker_is_refused(folder):
+    (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
+    with pytest.raises(LaunchFileError, match="has no 'seed_parameters'"):
+        load(folder, "plain", seed=7)
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("camera", "expected node.parameter=value"),
+        ("camera=3", "expected node.parameter=value"),
+        ("camer.rate_hz=3", "there is no node 'camer'; did you mean 'camera'?"),
+        ("camera.rate_hz=!!python/name:os.system", "tag .* is refused"),
+        ("camera.rate_hz=[1", "expected ',' or ']'"),
+    ],
+)
+def test_wrong_setting_is_named(folder, setting, message):
+    with pytest.raises(LaunchFileError, match=message) as caught:
+        load(folder, "good", None, [setting])
+    assert setting in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "overlays", "message"),
+    [
+        ("god", None, "did you mean 'good'?"),
+        ("../good", None, "no name of a launch file"),
+        ("good", ["slo"], "no such overlay; did you mean 'slow'?"),
+        ("good; rm -rf /", None, "no name of a launch file"),
+    ],
+)
+def test_missing_file_is_told_with_the_nearest_name(folder, name, overlays, message):
+    with pytest.raises(LaunchFileMissingError) as caught:
+        load(folder, name, overlays)
+    assert message in str(caught.value)
+
+
+BAD = [
+    ("", "1:1", "the file is empty"),
+    ("- nodes", "1:1", "expected a mapping at the top level"),
+    ("nodes: {a: {module: m}}\nnode: 3", "2:1", "unknown key 'node'; did you mean 'nodes'?"),
+    ("nodes:\n  a: {modul: m}", "2:7", "unknown key 'modul'; did you mean 'module'?"),
+    ("nodes:\n  a:\n    parameters: {}", "2:3", "nodes.a.module is missing"),
+    ("nodes:\n  a: {module: m, restart: on-failur}", "2:18", "did you mean 'on-failure'?"),
+    ("nodes:\n  a: {module: m, required: 'yes'}", "2:18", "nodes.a.required"),
+    ("nodes:\n  a: {module: m, budget: {restart: 3}}", "2:27", "did you mean 'restarts'?"),
+    ("nodes:\n  a: {module: m, backoff_s: .nan}", "2:18", "nodes.a.backoff_s"),
+    ("nodes:\n  a: {module: m, backoff_s: -1}", "2:18", "greater than or equal to 0"),
+    ("nodes:\n  a: {module: 'm; rm -rf /'}", "2:7", "nodes.a.module"),
+    ("nodes:\n  a: {module: ../m}", "2:7", "nodes.a.module"),
+    ("nodes:\n  A b: {module: m}", "2:3", "pattern"),
+    ("nodes:\n  a: {module: m}\n  a: {module: n}", "3:3", "duplicate key"),
+    ("nodes:\n  a: {module: m, after: [b]}", "2:26", "'a' comes after 'b', no node; there are: a"),
+    (
+        "nodes:\n  a: {module: m, after: [b]}\n  b: {module: m, after: [a]}",
+        "2:18",
+        "wait for each other ('after'): a, b",
+    ),
+    ("nodes: {}", "1:1", "nodes"),
+    ("seed_parameters: [b.seed]\nnodes: {a: {module: m}}", "1:19", "'b.seed' is no node.parameter"),
+    ("nodes: {a: {module: !!python/name:os.system x}}", "1:21", "tag"),
+    ("nodes: &x {a: {module: m}}", "1:8", "anchor"),
+    ("nodes: {a: {module: m}}\nbus: {<<: {clock: x}}", "2:7", "merge keys"),
+    ("%YAML 1.1\n---\nnodes: {}", "2:1", "directives are refused"),
+    ("nodes: [" + "[" * 3000, "1:27", "levels of nesting"),
+    ("nodes: {a: {module: m, parameters: {x: 2020-01-01}}}", "1:37", "write it in quotes"),
+    ("nodes: {a: {module: m}}\n---\nnodes: {}", "2:1", "single document"),
+    ("nodes: {1: {module: m}}", "1:9", "is no string"),
+]
+
+
+@pytest.mark.parametrize(("text", "place", "message"), BAD)
+def test_error_points_at_the_place(tmp_path, text, place, message):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(LaunchFileError) as caught:
+        load(tmp_path, "bad")
+    assert str(caught.value).startswith(f"{path}:{place}: ")
+    assert message in str(caught.value)
+
+
+def test_error_in_an_overlay_points_into_the_overlay(folder):
+    (folder / "overlays" / "slow.yaml").write_text("nodes:\n  camera: {requird: true}\n")
+    with pytest.raises(LaunchFileError, match=r"slow\.yaml:2:12: unknown key 'requird'; did you mean 'required'\?"):
+        load(folder, "good")
+
+
+def test_every_finding_is_told():
+    with pytest.raises(LaunchFileError, match=r"f:2:24: nodes.a.restart: .*\nf:1:1: unknown key 'x'") as caught:
+        validated(read_mapping("x: 1\nnodes: {a: {module: m, restart: 3}}", "f"))
+    assert len(str(caught.value).splitlines()) == 2
+
+
+def test_unreadable_bytes_are_refused(tmp_path):
+    (tmp_path / "bad.yaml").write_bytes(b"\xff\xfe\x00nodes")
+    with pytest.raises(LaunchFileError, match="cannot be read"):
+        load(tmp_path, "bad")
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.data())
+def test_damaged_file_is_refused_or_read_but_never_crashes(data):
+    text = GOOD
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text)))
+        cut = data.draw(st.integers(0, 5))
+        text = (
+            text[:at] + data.draw(st.text(":{}[]#&*!|>'\"%@`-?, \n\t0aé\x00\x85\udc00", max_size=4)) + text[at + cut :]
+        )
+    with contextlib.suppress(LaunchFileError):  # any other exception fails the test
+        validated(read_mapping(text, "damaged.yaml"))
+
+
+def waves_of(text):
+    file = validated(read_mapping(textwrap.dedent(text), "f"))
+    return start_waves(file), stop_waves(file)
+
+
+def test_start_and_stop_waves():
+    start, stop = waves_of("""
+        nodes:
+          arm: {module: m, stop: first, after: [world]}
+          world: {module: m}
+          eyes: {module: m, after: [world]}
+          mind: {module: m, after: [eyes, arm]}
+          tape: {module: m, stop: last}
+    """)
+    assert start == [["world", "tape"], ["arm", "eyes"], ["mind"]]
+    assert stop == [["arm"], ["mind"], ["eyes"], ["world"], ["tape"]]

@@ -1,0 +1,101 @@
+"""Nodes of a launch file fit together, or the error says where they do not."""
+
+import pytest
+
+from paramove.bus import topics
+from paramove.supervision.interfaces import InterfaceError, read_interface
+from paramove.supervision.positions import LaunchFileError
+from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+
+
+def checked(workspace, text):
+    workspace.write(text)
+    launch = workspace.load()
+    interfaces = read_interfaces(launch, workspace.root)
+    check_wiring(launch, interfaces)
+    return interfaces
+
+
+def test_topics_with_a_speaker_pass(workspace):
+    interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
+    assert interfaces["ear"].hears == (topics.SPEECH,)
+    assert interfaces["ear"].parameters == ("loudness", "language")
+    assert clock_speaker(interfaces) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message"),
+    [
+        (
+            "nodes:\n  ear: {module: nodes.listener}",
+            "2:3",
+            "'ear' hears speech, which no node of this launch file says",
+        ),
+        ("nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor}", "3:3", "'b' and 'a' both say speech"),
+        ("nodes:\n  a: {module: nodes.acter}", "2:7", "there is no module 'nodes.acter'"),
+        ("nodes:\n  w: {module: nodes.world}", "2:3", "uses truth/state but has no 'truth: true'"),
+        ("bus: {clock: simulated}\nnodes:\n  a: {module: nodes.actor}", "1:7", "the clock is simulated, but no node"),
+        (
+            "bus: {lockstep: true}\nnodes:\n  w: {module: nodes.world, truth: true}",
+            "1:7",
+            "lockstep needs 'clock: simulated'",
+        ),
+        (
+            "nodes:\n  a: {module: nodes.actor}\n  ear: {module: nodes.listener, parameters: {loudnes: 2}}",
+            "3:46",
+            "'ear' has no parameter 'loudnes'; did you mean 'loudness'?",
+        ),
+        (
+            "nodes:\n  a: {module: nodes.actor}\n  ear: {module: nodes.listener, remaps: {speach: x}}",
+            "3:42",
+            "'ear' does not use speach; did you mean 'speech'?",
+        ),
+    ],
+)
+def test_misfit_is_told_with_its_place(workspace, text, place, message):
+    with pytest.raises(LaunchFileError) as caught:
+        checked(workspace, text)
+    assert f"test.yaml:{place}: " in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_missing_module_names_what_there_is(workspace):
+    with pytest.raises(InterfaceError, match=r"nodes has: actor, listener, silent_actor, world"):
+        read_interface("nodes.nothing", workspace.root)
+
+
+def test_remap_makes_two_speakers_two_topics(workspace):
+    checked(workspace, "nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor, remaps: {speech: speech/b}}")
+
+
+def test_optional_topic_needs_no_speaker(workspace):
+    checked(workspace, "nodes:\n  ear: {module: nodes.listener, optional_topics: [speech]}")
+
+
+@pytest.mark.parametrize(
+    ("source", "hears"),
+    [
+        ("_TWO = (topics.SPEECH, topics.CLOCK)\nHEARS = _TWO + (topics.RULES,)", ["speech", "clock", "rules"]),
+        ("HEARS = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/light", "rules"]),
+        ("HEARS = tuple(t for t in topics.TOPICS if t.name == 'rules')", ["rules"]),
+        ("HEARS = topics.TOPICS", [topic.name for topic in topics.TOPICS]),
+    ],
+)
+def test_interface_is_read_from_the_source_or_by_import(workspace, source, hears):
+    (workspace.root / "nodes" / "odd.py").write_text(f"from paramove.bus import topics\n{source}\nSAYS = ()\n")
+    assert [topic.name for topic in read_interface("nodes.odd", workspace.root).hears] == hears
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("HEARS = ()", "SAYS is missing"),
+        ("HEARS = (topics.CLOK,)\nSAYS = ()", r"odd\.py:1: there is no topic topics.CLOK"),
+        ("HEARS = (\nSAYS = ()", r"odd\.py:1: "),
+        ("HEARS = f()\nSAYS = ()", "cannot be imported: NameError"),
+    ],
+)
+def test_unreadable_interface_is_told(workspace, source, message):
+    (workspace.root / "nodes" / "odd.py").write_text(source)
+    with pytest.raises(InterfaceError, match=message):
+        read_interface("nodes.odd", workspace.root)
