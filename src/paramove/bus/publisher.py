@@ -31,6 +31,11 @@ class Publisher:
         node: Name of the node, for the publisher id and the error a second publisher gets.
         name: Name on the bus where it differs from the topic's (a remap).
 
+    Attributes:
+        epoch: Of this start.
+        sequence: Of the newest message said.
+        subscriptions: How many have been answered since the start.
+
     Raises:
         TopicTakenError, BusFolderError: see `paramove.bus.endpoint`.
     """
@@ -42,6 +47,7 @@ class Publisher:
         self.name = name or topic.name
         self.epoch = secrets.randbits(32)
         self.sequence = 0
+        self.subscriptions = 0
         prepare_folder(folder)
         path = socket_path(folder, self.name)
         self.ownership = Ownership(path, node)
@@ -82,11 +88,10 @@ class Publisher:
 
     def serve(self) -> None:
         """Answers the subscriptions that have come in since the last call."""
-        welcome = False
+        before = self.subscriptions
         while can_read(self.socket):
-            event = self.socket.recv(zmq.NOBLOCK)
-            welcome |= event[:1] == b"\x01"
-        if welcome:
+            self.subscriptions += self.socket.recv(zmq.NOBLOCK)[:1] == b"\x01"
+        if self.subscriptions > before:
             self._welcome()
 
     def close(self) -> None:

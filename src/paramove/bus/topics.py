@@ -104,6 +104,7 @@ WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, record
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
 TRUTH_STATE = Topic("truth/state", TruthState, 15, _QUEUE, "world")
+TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view")
 
 TOPICS: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 """Every topic but the status topics, which exist once per node: see `status`."""

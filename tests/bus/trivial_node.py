@@ -1,0 +1,29 @@
+"""A node that tests start as a process: repeats each gesture as a sentence; `trouble` raises, `given up` gives up."""
+
+from __future__ import annotations
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, main
+from paramove.msgs.rule_pb2 import Speech
+
+HEARS = (topics.GESTURES,)
+SAYS = (topics.SPEECH,)
+
+
+class Config(NodeConfig):
+    greeting: str = "hello"
+
+
+def run(bus: Bus, config: Config) -> None:
+    bus.ready(config.greeting)
+    for heard in bus.events(topics.GESTURES):
+        if heard.message.object == "trouble":
+            raise ValueError("found trouble")
+        if heard.message.object == "given up":
+            bus.failed("cannot go on")
+            return
+        bus.publish(topics.SPEECH, Speech(sentence=heard.message.object), captured_ns=heard.captured_ns)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)
