@@ -49,4 +49,4 @@ def natural_bulge(draw: np.random.Generator, start: FloatArray, goal: FloatArray
     if length < 0.01:
         return np.zeros(3)
     sideways = np.array((-way[1], way[0], 0.0)) / length
-    return np.asarray(length * (draw.normal(0.0, 0.05) * sideways + np.array((0.0, 0.0, draw.uniform(0.02, 0.08)))))
+    return np.asarray(length * (draw.normal(0.0, 0.05) * sideways + np.array((0.0, 0.0, draw.uniform(0.0, 0.03)))))

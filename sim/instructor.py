@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 
 FROM_ABOVE = np.array((0.20, -0.50, 0.84))  # backward direction of the hand that holds something by its top
 AT_REST = np.array((0.20, -0.80, 0.55))
+POINTING = np.array((0.84, -0.38, 0.38))
 BOX_PULLED, BOX_LIFTED = 0.26, 0.13  # m: away from the robot's arm before it is turned
 ABOVE = 0.07  # the fingertip waits so far above a top
 TRAVEL_Z = tool_box.SURFACE_Z + 0.085  # centre of a carried cylinder: over standing ones
@@ -372,7 +373,7 @@ class Instructor:
                 best, best_gap = ahead, gap
         fingertip = centre + distance * best
         fingertip[2] = tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT * self._paths.uniform(0.66, 0.80)
-        return fingertip, np.asarray(best * 0.75 + (0.0, -0.15, 0.65))
+        return fingertip, POINTING
 
     # -- what the person sees ---------------------------------------------------------------------------------------
 

@@ -256,7 +256,7 @@ def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
         ("finger", (0.0, 0.0, 0.0075), (0.0, 0.0, 0.050), 0.0075, "hand"),
         ("thumb", (0.012, -0.014, 0.032), (0.006, -0.012, 0.062), 0.0075, "hand"),
         ("knuckle", (-0.004, 0.014, 0.040), (-0.004, 0.012, 0.062), 0.0085, "hand"),
-        ("sleeve", (0.0, 0.0, 0.135), (0.0, 0.0, 0.240), 0.019, "sleeve"),
+        ("sleeve", (0.0, 0.0, 0.135), (0.0, 0.0, 0.480), 0.019, "sleeve"),
     )
     for name, start, end, radius, look in parts:
         body.add_geom(

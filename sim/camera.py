@@ -1,0 +1,95 @@
+"""What falls on the camera's sensor: MuJoCo's picture, bent by the lens, with the noise of the sensor."""
+
+from __future__ import annotations
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import looks, scene
+from sim.looks import Camera
+
+Image = NDArray[np.uint8]
+NOISE_IMAGES = 8
+
+
+class GraphicsError(RuntimeError):
+    """Nothing can be rendered on this machine as it is; the text says what to install or set."""
+
+
+class Eye:
+    """Renders pictures of a model, RGB [H, W, 3]. Holds a graphics context: use it in one thread and `close` it.
+
+    Raises:
+        GraphicsError: MuJoCo finds no way to render.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width_px: int, height_px: int) -> None:
+        try:
+            self._renderer = mujoco.Renderer(model, height_px, width_px)
+        except Exception as error:  # MuJoCo's back ends raise whatever their libraries raise
+            raise GraphicsError(
+                f"MuJoCo cannot render ({type(error).__name__}: {error}); set MUJOCO_GL=egl (packages libegl1 libgl1) "
+                "or MUJOCO_GL=osmesa (package libosmesa6), or give the simulator the parameters camera: false, video: false"
+            ) from error
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._renderer.scene.flags[flag] = 0
+        self._picture = np.empty((height_px, width_px, 3), dtype=np.uint8)
+
+    def look(self, data: mujoco.MjData, camera: str) -> Image:
+        """The picture of the camera of that name. The array is used again by the next call."""
+        self._renderer.update_scene(data, camera)
+        self._renderer.render(out=self._picture)
+        return self._picture
+
+    def close(self) -> None:
+        """Gives the graphics context back."""
+        self._renderer.close()
+
+
+class Sensor:
+    """Lens and sensor of one seed's camera.
+
+    Args:
+        camera: Its lens.
+        pixel_noise: Standard deviation, of 255.
+        draw: Of the noise.
+    """
+
+    def __init__(self, camera: Camera, pixel_noise: float, draw: np.random.Generator) -> None:
+        columns, rows = undistorting_map(camera)
+        self._columns, self._rows = cv2.convertMaps(columns, rows, cv2.CV_16SC2)
+        shape = (looks.HEIGHT_PX, looks.WIDTH_PX, 3)
+        # Drawing noise costs more than rendering: a few images are drawn once and used from random offsets.
+        values = draw.normal(0.0, pixel_noise, (NOISE_IMAGES, int(np.prod(shape)))).round().astype(np.int8)
+        self._noise = np.concatenate([values, values], axis=1)
+        self._shape = shape
+        self._draw = draw
+
+    def expose(self, picture: Image) -> Image:
+        """The image [H, W, 3] of a rendered picture, which is larger by the margin the lens may pull in."""
+        bent = cv2.remap(picture, self._columns, self._rows, cv2.INTER_LINEAR)
+        number = int(self._draw.integers(NOISE_IMAGES))
+        start = int(self._draw.integers(bent.size))
+        noise = self._noise[number, start : start + bent.size].reshape(self._shape)
+        return np.asarray(cv2.add(bent, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+
+
+def undistorting_map(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """For each pixel of the image, column and row in the rendered picture, each [H, W].
+
+    Solves distorted = undistorted * (1 + k1 r^2) for the undistorted point by Newton's method on r.
+    """
+    centre = np.array(camera.principal_point_px)
+    grid = np.stack(np.meshgrid(np.arange(looks.WIDTH_PX), np.arange(looks.HEIGHT_PX)), axis=-1)
+    distorted = (grid - centre) / camera.focal_px
+    radius = np.linalg.norm(distorted, axis=-1)
+    undistorted = radius.copy()
+    for _ in range(8):
+        excess = undistorted * (1 + camera.k1 * undistorted**2) - radius
+        undistorted -= excess / (1 + 3 * camera.k1 * undistorted**2)
+    scale = np.divide(undistorted, radius, out=np.ones_like(radius), where=radius > 0)
+    middle = (np.array(scene.RENDERED_PX) - 1) / 2
+    picture = (distorted * scale[..., None] * camera.focal_px + middle).astype(np.float32)
+    return np.ascontiguousarray(picture[..., 0]), np.ascontiguousarray(picture[..., 1])

@@ -1,0 +1,123 @@
+"""Simulator: stands where the hardware stands. It is the light that falls on the camera's sensor and the robot's motors.
+
+Hears   wire/hoap3/stream   StreamBatch         events  joint units
+        speech              Speech              events
+Says    clock               Clock               15 Hz
+        camera/light        foxglove.RawImage   15 Hz   camera_optical
+        wire/hoap3/state    Hoap3State          15 Hz   joint units
+        truth/layout        TruthLayout         once, latched   world; only for evaluators
+        truth/state         TruthState          15 Hz   world; only for evaluators
+        truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from pathlib import Path
+
+from pydantic import Field
+
+from paramove.bus import topics
+from paramove.bus.barrier import LockstepBarrier
+from paramove.bus.node import Bus, NodeConfig, main
+from paramove.robots.description import RobotDescription
+from sim import truth
+from sim.simulation import CAMERA_HZ, Simulation
+from sim.world import log_warnings_of_mujoco
+
+HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
+SAYS = (
+    topics.CLOCK,
+    topics.CAMERA_LIGHT,
+    topics.WIRE_HOAP3_STATE,
+    topics.TRUTH_LAYOUT,
+    topics.TRUTH_STATE,
+    topics.TRUTH_VIEW,
+)
+
+_log = logging.getLogger(__name__)
+
+
+class Config(NodeConfig):
+    """Parameters of the simulator.
+
+    Attributes:
+        seed: Of everything random in the world.
+        robot: Folder of the robot's description.
+        camera: Whether the camera's images are rendered; without, no graphics library is needed.
+        video: Whether a view for people is rendered too.
+        max_duration_s: Simulated time after which the run ends.
+        pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
+    """
+
+    seed: int = Field(default=0, ge=0)
+    robot: Path = Path("robot_description/hoap3")
+    camera: bool = True
+    video: bool = False
+    max_duration_s: float = Field(default=600.0, gt=0)
+    pace: float = Field(default=1.0, gt=0)
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes or the simulated time is up."""
+    log_warnings_of_mujoco()
+    simulation = Simulation(config.seed, RobotDescription.load(config.robot), config.camera, config.video)
+    try:
+        _loop(bus, config, simulation)
+    finally:
+        simulation.close()
+
+
+def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
+    barrier = LockstepBarrier(bus)
+    bus.publish(topics.TRUTH_LAYOUT, truth.layout(simulation))
+    bus.ready("waits for the members of the lockstep" if bus.settings.lockstep else "runs in real time")
+    if not barrier.wait_for_members():
+        return
+    started_s = time.perf_counter()
+    while not bus.stopped and simulation.world.time_s < config.max_duration_s:
+        _say(bus, simulation)
+        for heard in barrier.advance(simulation.now_ns):
+            simulation.hear(heard)
+        if bus.stopped:
+            break
+        simulation.run_to_tick(barrier.tick)
+        wall_s = time.perf_counter() - started_s
+        if not bus.settings.lockstep:
+            ahead_s = simulation.world.time_s / config.pace - wall_s
+            if ahead_s > 0:
+                bus.exchange.wait(ahead_s)
+        if barrier.tick % CAMERA_HZ == 0:
+            bus.ready(_sentence(simulation, wall_s))
+    wall_s = time.perf_counter() - started_s
+    barrier.close()
+    _log.info("%s", _sentence(simulation, wall_s))
+    pairs = simulation.world.contacts.unwanted_pairs
+    if pairs:
+        _log.warning("unwanted contacts: %s", ", ".join(f"{name} ({count})" for name, count in sorted(pairs.items())))
+
+
+def _say(bus: Bus, simulation: Simulation) -> None:
+    """Everything that the world shows now. A state that is not finite never gets here: the step raises."""
+    light, view = simulation.light(), simulation.view()
+    if light is not None:
+        bus.publish(topics.CAMERA_LIGHT, light)
+    if view is not None:
+        bus.publish(topics.TRUTH_VIEW, view)
+    bus.publish(topics.WIRE_HOAP3_STATE, simulation.robot_state())
+    bus.publish(topics.TRUTH_STATE, truth.state(simulation))
+
+
+def _sentence(simulation: Simulation, wall_s: float) -> str:
+    time_s = max(simulation.world.time_s, 1e-9)
+    share = 100 / max(wall_s, 1e-9)
+    return (
+        f"{time_s:.0f} s simulated, {time_s / max(wall_s, 1e-9):.2f} times real time "
+        f"(physics {simulation.physics_s * share:.0f} %, rendering {simulation.rendering_s * share:.0f} %); "
+        f"instructor {simulation.instructor.doing}"
+    )
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)
