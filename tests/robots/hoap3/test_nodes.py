@@ -1,0 +1,89 @@
+"""The arm driver's and the operator's nodes on a bus that joins them to a robot without physics."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from nodes import arm_driver, operator
+from paramove.bus import topics
+from paramove.bus.subscriber import Heard
+from paramove.bus.topics import Topic
+from paramove.bus.turns import Tick
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.safety.operator import Operator
+from tests.robots.hoap3.fake_robot import TICK_NS, FakeRobot, trajectory
+
+WORKSPACE = Path(__file__).parents[3]
+
+
+class RobotBus:
+    """Runs 60 ticks; the robot answers at once, the operator by the next tick; a trajectory comes at tick 10."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.robot = FakeRobot()
+        self.operator = Operator(arms_at_start=True)
+        self.pending: list[tuple[Topic, Any]] = []
+        self.said: list[tuple[Topic, Any]] = []
+
+    def ready(self, sentence: str) -> None:
+        assert sentence
+
+    def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
+        assert topic in arm_driver.SAYS
+        assert isinstance(message, topic.type)
+        self.said.append((topic, message))
+        if topic is topics.WIRE_HOAP3_STREAM:
+            assert self.robot.reader.offer(message), self.robot.reader.refusal
+        if topic is topics.ARM_SAFETY and (word := self.operator.update(message, self.now_ns)):
+            self.pending.append((topics.OPERATOR_ARM, word))
+
+    def events(self, *wanted: Topic, tick: bool) -> Iterator[Heard | Tick]:
+        assert wanted == arm_driver.HEARS
+        assert tick
+        for number in range(1, 61):
+            self.now_ns = number * TICK_NS
+            if number == 10:
+                self.pending.append((topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)))
+            self.pending.append((topics.WIRE_HOAP3_STATE, self.robot.state(self.now_ns)))
+            heard, self.pending = self.pending, []
+            for topic, message in heard:
+                yield Heard(topic, message, self.now_ns, self.now_ns, number)
+            yield Tick(number, self.now_ns)
+            self.robot.play()
+
+
+def test_operator_arms_and_the_driver_plays_a_trajectory(monkeypatch: Any) -> None:
+    monkeypatch.chdir(WORKSPACE)
+    bus = RobotBus()
+    arm_driver.run(bus, arm_driver.Config())
+    statuses = [message for topic, message in bus.said if topic is topics.ARM_TRAJECTORY_STATUS]
+    assert statuses[0].state == TrajectoryStatus.STATE_ACCEPTED
+    assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED
+    assert sum(topic is topics.ARM_SAFETY for topic, _ in bus.said) == 60
+    assert sum(topic is topics.ARM_JOINT_STATES for topic, _ in bus.said) == 60
+
+
+def test_with_a_real_robot_the_operator_refuses_to_start(tmp_path: Path) -> None:
+    config = tmp_path / "operator.yaml"
+    config.write_text(
+        f"node: operator\nbus: {{folder: {tmp_path}/bus, clock: monotonic}}\nparameters: {{real: true}}\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "nodes.operator", "--config", str(config)],
+        cwd=WORKSPACE,
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 78, done.stderr
+    assert "a person must" in done.stderr
+    assert operator.SAYS == (topics.OPERATOR_ARM,)
