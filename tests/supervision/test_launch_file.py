@@ -57,6 +57,15 @@ def test_seed_goes_where_the_file_says(folder):
     assert load(folder, "good", seed=7).file.nodes["world"].parameters == {"seed": 7}
 
 
+def test_headless_sets_what_the_file_says_and_settings_win(folder):
+    (folder / "seen.yaml").write_text(
+        "headless: {a.video: false, a.size: 1}\nnodes: {a: {module: m, parameters: {video: true}}}"
+    )
+    assert load(folder, "seen").file.nodes["a"].parameters == {"video": True}
+    launch = load(folder, "seen", None, ["a.size=3"], headless=True)
+    assert launch.file.nodes["a"].parameters == {"video": False, "size": 3}
+
+
 def test_seed_without_a_taker_is_refused(folder):
     (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
     with pytest.raises(LaunchFileError, match="has no 'seed_parameters'"):

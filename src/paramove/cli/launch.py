@@ -32,7 +32,7 @@ def launch(
         typer.Option("--set", metavar="NODE.PARAM=VALUE", help="change one parameter; may be repeated"),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table")] = False,
+    headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
     check: Annotated[bool, typer.Option("--check", help="check the launch file and its nodes, start nothing")] = False,
 ) -> None:
     """Run an application: start its nodes, keep them running, end them in order, judge the run.
@@ -51,7 +51,7 @@ def _launch(
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
     try:
         workspace = application.find_workspace(Path.cwd())
-        loaded = load(workspace / "launch", name, overlays, settings, seed)
+        loaded = load(workspace / "launch", name, overlays, settings, seed, headless)
         if check_only:
             application.check(loaded, workspace)
             console.print(f"{loaded.name}: {len(loaded.file.nodes)} nodes fit together")

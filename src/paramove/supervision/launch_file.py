@@ -44,6 +44,7 @@ def load(
     overlays: Sequence[str] | None = None,
     settings: Sequence[str] = (),
     seed: int | None = None,
+    headless: bool = False,
 ) -> Launch:
     """Reads `<folder>/<name>.yaml` with its overlays and settings and checks the result.
 
@@ -53,6 +54,7 @@ def load(
         overlays: Names or paths likewise; None takes the file's `default_overlays`.
         settings: Each `node.parameter=value`; the value is YAML.
         seed: Written into each of the file's `seed_parameters`.
+        headless: Sets the parameters that the file names under `headless`, before `settings`.
 
     Raises LaunchFileMissingError or LaunchFileError.
     """
@@ -62,6 +64,8 @@ def load(
         raise LaunchFileError(document.position(("default_overlays",)), "expected a list of names of overlays")
     for overlay in chosen:
         document = document.overlaid(_read(_path_of(folder / "overlays", overlay, "overlay")))
+    if headless:
+        document = _made_headless(document)
     for setting in settings:
         document = _with_setting(document, setting)
     if seed is not None:
@@ -135,6 +139,18 @@ def _with_seed(document: Document, seed: int) -> Document:
             raise LaunchFileError(document.position(("seed_parameters",)), f"'{target}': expected node.parameter")
         _known_node(document, node, document.position(("seed_parameters",)))
         document = document.overlaid(_parameter(node, parameters, seed, where))
+    return document
+
+
+def _made_headless(document: Document) -> Document:
+    values = document.data.get("headless", {})
+    for target, value in values.items() if isinstance(values, dict) else ():
+        where = document.position(("headless", target))
+        node, *parameters = target.split(".")
+        if not parameters:
+            raise LaunchFileError(where, f"'{target}': expected node.parameter")
+        _known_node(document, node, where)
+        document = document.overlaid(_parameter(node, parameters, value, where))
     return document
 
 

@@ -62,6 +62,7 @@ class LaunchFile(_Checked):
     nodes: dict[Name, NodeSettings] = Field(min_length=1)
     default_overlays: list[str] = Field(default_factory=list, description="laid over it where --with is not given")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
+    headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")
     after_run: Module | None = Field(
         default=None, description="module called with the run folder when all nodes have ended"
     )
