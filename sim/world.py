@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 
 import mujoco
@@ -226,14 +227,26 @@ def log_warnings_of_mujoco(say: Callable[[str], None] = _log.warning) -> None:
     mujoco.set_mju_user_warning(say)
 
 
-def hand_quaternion(backward: FloatArray) -> FloatArray:
-    """Rotation (w, x, y, z) of the hand whose z axis is `backward` and whose back looks up."""
-    z = np.asarray(backward, dtype=np.float64) / np.linalg.norm(backward)
-    x = np.array((0.0, 0.0, 1.0)) - z[2] * z
-    if np.linalg.norm(x) < 1e-6:
-        x = np.array((0.0, 1.0, 0.0))
-    x /= np.linalg.norm(x)
-    return scene.quaternion_of(np.column_stack((x, np.cross(z, x), z)))
+def hand_quaternion(backward: FloatArray) -> tuple[float, float, float, float]:
+    """Rotation (w, x, y, z) of the hand whose z axis is `backward` and whose back, the x axis, looks up.
+
+    Plain floats: it is called every millisecond, and numpy takes longer for three numbers than the physics step.
+    """
+    x, y, z = (float(value) for value in backward)
+    length, flat = math.sqrt(x * x + y * y + z * z), math.hypot(x, y)
+    if length < 1e-9 or flat < 1e-6 * length:
+        raise ValueError(f"backward direction {backward} of the hand: a direction that is not vertical expected")
+    # A turn about z to where the hand points, then a pitch about y: columns (-up, side, backward).
+    yaw, pitch = math.atan2(y, x), math.atan2(flat, z)
+    cos_yaw, sin_yaw, cos_pitch, sin_pitch = (
+        math.cos(yaw / 2),
+        math.sin(yaw / 2),
+        math.cos(pitch / 2),
+        math.sin(pitch / 2),
+    )
+    # R_z(yaw) R_y(pitch) has its x axis downwards; half a turn about z puts the back of the hand up.
+    w, i, j, k = cos_yaw * cos_pitch, -sin_yaw * sin_pitch, cos_yaw * sin_pitch, sin_yaw * cos_pitch
+    return -k, j, -i, w
 
 
 def _upright_near(turn: FloatArray) -> FloatArray:

@@ -1,0 +1,119 @@
+"""Judge: records the truth of a simulated run and says at its end whether the robot did what it should.
+
+Hears   truth/layout   TruthLayout         once, latched   world
+        truth/state    TruthState          15 Hz           world
+        truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
+
+Writes `truth.mcap` (the view as JPEG) and `truth.json` (the verdict, renewed every few seconds) into the run folder.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from pydantic import Field
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, main
+from sim.truth_recording import TruthRecording
+from sim.verdict import Verdict
+
+HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
+SAYS = ()
+
+RENEW_STATES = 75
+
+
+class Config(NodeConfig):
+    """Parameters of the judge.
+
+    Attributes:
+        record: Whether `truth.mcap` is written besides `truth.json`.
+        jpeg_quality: Of the view's images.
+    """
+
+    record: bool = True
+    jpeg_quality: int = Field(default=88, ge=10, le=100)
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes, then write the verdict."""
+    cv2.setNumThreads(1)
+    recording = TruthRecording(bus.run_folder / "truth.mcap") if config.record else None
+    judge = Judge(bus.run_folder / "truth.json")
+    bus.ready("waits for the truth")
+    try:
+        for heard in bus.events(*HEARS):
+            if heard.topic is topics.TRUTH_LAYOUT:
+                judge.begin(heard.message)
+            elif heard.topic is topics.TRUTH_STATE:
+                sentence = judge.take(heard.message)
+                if sentence:
+                    bus.ready(sentence)
+            if recording is not None:
+                kept = _compressed(heard.message, config) if heard.topic is topics.TRUTH_VIEW else heard.message
+                recording.write(heard.topic.name, kept, heard.captured_ns)
+    finally:
+        judge.write()
+        if recording is not None:
+            recording.close()
+
+
+class Judge:
+    """A verdict and the file it is kept in."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._verdict: Verdict | None = None
+        self._begun_s = 0.0
+
+    def begin(self, layout: Any) -> None:
+        """The run's layout is known."""
+        self._verdict = Verdict(layout)
+
+    def take(self, state: Any) -> str:
+        """Take in a state; now and then write the verdict and return it as a sentence, else ""."""
+        if self._verdict is None:
+            raise RuntimeError("truth/state came before truth/layout; the simulator says the layout first")
+        if self._verdict.states == 0:
+            self._begun_s = time.monotonic()
+        self._verdict.take(state)
+        if self._verdict.states % RENEW_STATES:
+            return ""
+        summary = self.write()
+        return f"{summary['placed']} of {len(summary['objects'])} objects rest where the robot should put them"
+
+    def write(self) -> dict[str, Any]:
+        """Write the verdict as it stands; returns it."""
+        if self._verdict is None:
+            summary: dict[str, Any] = {"success": False, "reason": "the simulator never said its layout"}
+        else:
+            summary = self._verdict.summary()
+            wall_s = time.monotonic() - self._begun_s if self._verdict.states else 0.0
+            summary["wall_s"] = round(wall_s, 3)
+            summary["realtime_factor"] = round(summary.get("simulated_s", 0.0) / wall_s, 3) if wall_s > 0 else None
+        beside = self._path.with_suffix(".json.new")
+        beside.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        beside.replace(self._path)
+        return summary
+
+
+def _compressed(image: RawImage, config: Config) -> CompressedImage:
+    pixels = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
+    _, encoded = cv2.imencode(
+        ".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality]
+    )
+    return CompressedImage(
+        timestamp=image.timestamp, frame_id=image.frame_id, data=encoded.tobytes(), format="jpeg"
+    )
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)
