@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from paramove.robots.description import RobotDescription
 from tests.robots.hoap3.movements import HOAP3, ROBOT_DESCRIPTION
 
 MODEL = mujoco.MjModel.from_xml_path(str(ROBOT_DESCRIPTION / "hoap3.xml"))
@@ -131,7 +132,8 @@ def test_joint_ranges_torques_and_base_pose_are_those_of_robot_yaml() -> None:
         np.testing.assert_allclose(joint.range, [HOAP3.lower[place], HOAP3.upper[place]], rtol=0, atol=1e-8)
         assert MODEL.actuator(place).name == name
         np.testing.assert_allclose(MODEL.actuator_ctrlrange[place, 1], HOAP3.torque_peak[place], rtol=1e-9, atol=0)
-    np.testing.assert_allclose(MODEL.key("base").qpos[PLACES], HOAP3.base_pose, rtol=0, atol=1e-6)
+    base_pose = RobotDescription.load(ROBOT_DESCRIPTION).base_pose
+    np.testing.assert_allclose(MODEL.key("base").qpos[PLACES], base_pose, rtol=0, atol=1e-6)
 
 
 def test_heights_and_mass_are_those_of_the_manual() -> None:

@@ -14,7 +14,7 @@ from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription
 Floats = NDArray[np.float64]
 logger = logging.getLogger(__name__)
 
-DEMONSTRATOR_VERSION = 1  # raise it with every change of the synthetic movements: cached models then train again
+DEMONSTRATOR_VERSION = 2  # raise it with every change of the synthetic movements: cached models then train again
 
 
 @dataclass(frozen=True)

@@ -197,10 +197,10 @@ def grasping(progress: Floats, timing: Timing) -> Floats:
 
 
 def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, share: Floats) -> Floats:
-    """Bezier curve from the hanging hand up beside the table and down to the target from behind and above. (T, 3)."""
-    lifted = RESTING_SHOULDER + np.array([0.18, -0.34, -0.28]) + 0.15 * (reached - COMFORTABLE_TARGET) + sway_low
+    """Bezier curve from the hanging hand out to the side, over the table's edge, and down to the target. (T, 3)."""
+    lifted = RESTING_SHOULDER + np.array([0.05, -0.40, 0.0]) + 0.15 * (reached - COMFORTABLE_TARGET) + sway_low
     away = (RESTING_SHOULDER - reached) * np.array([1.0, 1.0, 0.0])
-    above = reached + 0.10 * away + 0.22 * UPWARD + sway_high
+    above = reached + 0.10 * away + 0.20 * UPWARD + sway_high
     s = share[:, None]
     result: Floats = (1 - s) ** 3 * base + 3 * s * (1 - s) ** 2 * lifted + 3 * s**2 * (1 - s) * above + s**3 * reached
     return result
@@ -222,7 +222,7 @@ def leaning(target: Floats, arm_length: float) -> Floats:
 def kept_away(effector: Floats, shoulder: Floats, target: Floats) -> Floats:
     """The path with places nearer to the shoulder than a bent arm likes moved outward; the target stays. (T, 3)."""
     width = 0.03
-    least = min(0.40, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)
+    least = min(0.26, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)
     line = effector - shoulder
     distance = np.linalg.norm(line, axis=1)
     beyond = distance - least

@@ -79,16 +79,16 @@ class ArmPoseSolver:
     ) -> JointSolution:
         """Joint angles that place the gripper exactly and the elbow near the one given.
 
-        Where the elbow of 5.2.4 breaks a joint limit it is turned about the shoulder-gripper line by the smallest angle
-        that breaks none. If the smallest angles of one sequence lie on both sides, the side that suits all poses is kept,
-        so that the elbow never jumps.
+        Where the elbow of 5.2.4 breaks a joint limit it is turned about the shoulder-gripper line by the smallest
+        angle that breaks none. If the smallest angles of one sequence lie on both sides, the side that suits all poses
+        is kept, so that the elbow never jumps.
 
         Args:
             elbow: The person's elbow scaled to the robot, [K, 3], m, shoulder frame.
             gripper: Where the gripper site shall be, [K, 3].
             finger_to_thumb: Direction from index finger to thumb (o of 5.2.3), [K, 3].
-            level: Share 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the table
-                plane, thumb on the left (5.2.5).
+            level: Share 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the
+                table plane, thumb on the left (5.2.5).
             smoothing: Over how many poses a turn of the elbow comes and goes; 0 for poses that are no sequence in time.
 
         Raises:
@@ -167,7 +167,7 @@ class ArmPoseSolver:
 
     def _excess(self, angles: FloatArray) -> FloatArray:
         """How far the worst joint lies outside its limits, rad; not positive inside."""
-        return np.maximum(self._lower - angles, angles - self._upper).max(axis=-1)  # type: ignore[no-any-return]
+        return np.asarray(np.maximum(self._lower - angles, angles - self._upper).max(axis=-1))
 
     def _broken(self, angles: FloatArray) -> str:
         worst = int(np.argmax(np.maximum(self._lower - angles, angles - self._upper)))
@@ -196,7 +196,7 @@ class ArmPoseSolver:
         sin_beta = np.sqrt(1.0 - cos_beta**2)
         w3 = np.cross(w1, w2)
         side = np.cos(turn)[..., None] * w2 + np.sin(turn)[..., None] * w3
-        return a * (cos_beta * w1 + sin_beta * side)  # (5.10)
+        return np.asarray(a * (cos_beta * w1 + sin_beta * side))  # (5.10)
 
     def _hand(self, q: FloatArray, r: FloatArray, o: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Unit forearm axis b and the hand's sideward axis y (towards the thumb), with r = q + along b + aside y.

@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 
 _FAR = 0.05  # distances beyond are not told apart, m
 _HIDDEN = 10.0
+_GRASPED_ABOVE_MIDDLE = 0.011
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class ClearanceChecker:
             body.add_geom(name=f"standing_{k}", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
         gripper = spec.site(self._arm.sites.gripper)
         held = gripper.parent.add_geom(name="held", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=gripper.pos, size=size)
-        held.pos = np.array(gripper.pos) + [0.0, 0.0, -0.011]  # grasped above the middle
+        held.pos = np.array(gripper.pos) + np.array([0.0, 0.0, -_GRASPED_ABOVE_MIDDLE])  # grasped above the middle
         self._shoulder = shoulder
         return spec.compile()
 
@@ -107,6 +108,16 @@ class ClearanceChecker:
             and model.body(int(model.geom_bodyid[g])).name not in own_shoulder
         ]
         return moving, fixed
+
+    @property
+    def surface_z(self) -> float:
+        """Height of the working plane, m, shoulder frame."""
+        return self._surface.z
+
+    @property
+    def cylinder(self) -> UprightCylinder:
+        """Shape of the standing objects."""
+        return self._cylinder
 
     def smallest(self, angles: ArrayLike, standing: ArrayLike, holding: ArrayLike, every: int = 2) -> Clearance:
         """The closest approach along a path.

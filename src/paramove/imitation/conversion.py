@@ -1,7 +1,7 @@
 """A person's movement model converted to a robot's arm (thesis 5.2.3).
 
-The converted model keeps the correspondence between the parameter and the place that is reached: a movement synthesised for
-a target in the robot's shoulder frame brings the gripper to that target.
+The converted model keeps the correspondence between the parameter and the place that is reached: a movement synthesised
+for a target in the robot's shoulder frame brings the gripper to that target.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ class RobotMovement:
             )
         if not 0.0 < description.arrival < description.grasp < 1.0:
             raise ValueError(
-                f"the model of {description.action!r} gives arrival {description.arrival} and grasp {description.grasp}; "
+                f"the model of {description.action!r} gives arrival {description.arrival} and grasp "
+                f"{description.grasp}; "
                 "a reaching action has 0 < arrival < grasp < 1"
             )
         points = model.means_.reshape(*model.means_.shape[:2], -1, 3)  # [G, N, points, 3]
@@ -159,10 +160,10 @@ class RobotMovement:
     def opening(self, finger_to_thumb: ArrayLike) -> FloatArray:
         """Normalised opening ξ of the gripper, [K], 1 open (after 5.24, corrected)."""
         size = np.linalg.norm(np.asarray(finger_to_thumb, dtype=np.float64), axis=-1)
-        return np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0)
+        return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
 
     def _means(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
         indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
         if state is None:
-            return np.einsum("mc,mcnd->mnd", weights, self.means[indices])
-        return np.einsum("mc,mcd->md", weights, self.means[indices, state])
+            return np.asarray(np.einsum("mc,mcnd->mnd", weights, self.means[indices]))
+        return np.asarray(np.einsum("mc,mcd->md", weights, self.means[indices, state]))

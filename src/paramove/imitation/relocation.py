@@ -1,7 +1,7 @@
 """The relocation action: fetch an object and put it elsewhere with a learned reaching movement (thesis 5.2.5).
 
-Approach and retreat are the synthesised movement; in between, the state T in which the gripper has reached the target is kept
-and only the parameter t varies.
+Approach and retreat are the synthesised movement; in between, the state T in which the gripper has reached the target
+is kept and only the parameter t varies.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class RelocationPlanner:
     def _approach(self, path: _Path, target: FloatArray) -> None:
         """States 1..T of the movement for `target`, started from the base pose."""
         o, m = self.options, self.movement
-        target = self._far_enough(target)
+        target = self.far_enough(target)
         states = m.poses(m.parameter_for(m.reach_state, target)[0])[: m.reach_state + 1]
         opening = np.maximum(m.opening(states.finger_to_thumb), 0.0)
         n = len(states)
@@ -196,7 +196,7 @@ class RelocationPlanner:
         self._fingers(path, "release", opening, o.work_opening)
         aside = target + o.release_aside * self._right(target)
         before = self._before(target)
-        high = self._far_enough(before + o.entry_height * _UP)
+        high = self.far_enough(before + o.entry_height * _UP)
         self._move(path, "withdraw", [aside], o.careful_speed, o.work_opening)
         self._move(path, "withdraw", [before], o.speed, o.work_opening)
         self._move(path, "withdraw", [high], o.speed, o.work_opening)
@@ -225,7 +225,7 @@ class RelocationPlanner:
         poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
         path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
 
-    def _far_enough(self, point: FloatArray) -> FloatArray:
+    def far_enough(self, point: FloatArray) -> FloatArray:
         """The point moved away from the shoulder until `_outward` leaves it where it is."""
         least = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
         return point * max(1.0, least / float(np.linalg.norm(point)))

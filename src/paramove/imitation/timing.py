@@ -62,4 +62,4 @@ def resampled(times: FloatArray, values: FloatArray, period: float) -> tuple[Flo
     """A curve through `values` [K, J] at `times` [K], sampled every `period` and at its end."""
     n = max(1, int(np.ceil(times[-1] / period - 1e-9)))
     at = np.linspace(0.0, times[-1], n + 1)
-    return period * np.arange(n + 1), CubicSpline(times, values, axis=0)(at)
+    return np.asarray(period * np.arange(n + 1)), np.asarray(CubicSpline(times, values, axis=0)(at))

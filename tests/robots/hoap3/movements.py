@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,26 @@ import numpy as np
 from paramove.robots.description import RobotDescription
 
 ROBOT_DESCRIPTION = Path(__file__).parents[3] / "robot_description" / "hoap3"
-HOAP3 = RobotDescription.load(ROBOT_DESCRIPTION)
+
+# Tests start with the right forearm folded up and the hand open, wherever the description's own base pose is.
+FOLDED_DEG = {
+    "right_shoulder_pitch": 90.0,
+    "right_shoulder_roll": -10.0,
+    "right_shoulder_torsion": 0.0,
+    "right_elbow": -110.0,
+    "right_wrist": 0.0,
+    "right_fingers": -60.0,
+}
+
+
+def _folded(robot: RobotDescription) -> RobotDescription:
+    pose = robot.base_pose.copy()
+    for joint, degrees in FOLDED_DEG.items():
+        pose[robot.index(joint)] = np.deg2rad(degrees)
+    return replace(robot, base_pose=pose)
+
+
+HOAP3 = _folded(RobotDescription.load(ROBOT_DESCRIPTION))
 
 SWING_DEG = {
     "right_shoulder_pitch": -75.0,

@@ -1,0 +1,353 @@
+"""From goals to trajectories: plays one goal after the other with the learned movement and says how it fares."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from numpy.typing import NDArray
+
+from paramove.imitation.arm_pose import UnreachablePoseError
+from paramove.imitation.clearance import ClearanceChecker
+from paramove.imitation.relocation import PlannedMotion, RelocationPlanner
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+
+FloatArray = NDArray[np.float64]
+
+FRAME = "right_shoulder"
+LEAST_CLEARANCE = 0.005  # m, of planned paths from table, box and standing objects
+FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
+RESEND_NS = 400_000_000
+REMEMBERED_GOALS = 200
+
+_Ending = TrajectoryStatus.State
+_ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
+
+
+class GoalRefusedError(ValueError):
+    """A goal cannot be done; the message says why and what would work."""
+
+
+@dataclass(frozen=True)
+class SynthesizerSays:
+    """What one tick gives."""
+
+    trajectories: tuple[JointTrajectory, ...]
+    statuses: tuple[RelocationStatus, ...]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    done: bool
+    reason: str = ""
+
+
+_Course = Generator[PlannedMotion, None, _Outcome]
+
+
+@dataclass
+class _Running:
+    """The goal being done: its course, the motion under way and what is known of it."""
+
+    goal: RelocationGoal
+    course: _Course
+    motion: PlannedMotion | None = None
+    message: JointTrajectory | None = None
+    acknowledged: bool = False
+    sent_ns: int = 0
+    time_s: float = 0.0
+    phase: str = ""
+    motions: int = 0
+    elbow_turn: float = 0.0
+
+
+@dataclass
+class _Hand:
+    """What the robot knows of its arm between goals: None where an unplanned stop left it."""
+
+    at_base: bool = True
+    gripper: FloatArray | None = None  # where it waits, if not at the base pose
+    opening: float = 0.0
+    measured: float = 1.0  # ξ of the measured fingers
+    lost: bool = False
+    known: bool = field(default=True)
+
+
+class Synthesizer:
+    """Does one goal at a time. Hear messages with the `on_…` methods, then call `tick` once per turn.
+
+    Args:
+        planner: Builds motions from the converted movement.
+        checker: Keeps them clear of table, body and standing objects.
+    """
+
+    def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
+        self._planner, self._checker = planner, checker
+        self._arm = planner.arm
+        self._hand = _Hand()
+        self._running: _Running | None = None
+        self._newest: dict[str, RelocationStatus] = {}
+        self._statuses: list[RelocationStatus] = []
+        self._trajectories: list[JointTrajectory] = []
+        self._now_ns = 0
+        self._courses: dict[int, Callable[[RelocationGoal], _Course]] = {
+            RelocationGoal.KIND_RELOCATE: self._relocate,
+            RelocationGoal.KIND_OFFER_HAND: self._offer_hand,
+            RelocationGoal.KIND_TAKE: self._take,
+            RelocationGoal.KIND_RELEASE: self._release,
+            RelocationGoal.KIND_PLACE_HELD: self._place_held,
+            RelocationGoal.KIND_REST: self._rest,
+        }
+
+    @property
+    def holding(self) -> bool:
+        """Whether the fingers of the closed hand feel something."""
+        return self._hand.measured > FELT_OPENING
+
+    def on_goal(self, goal: RelocationGoal) -> None:
+        """Accept or refuse a goal. The same id again is answered with its newest status and not done twice."""
+        known = self._newest.get(goal.id)
+        if known is not None:
+            self._statuses.append(known)
+            return
+        try:
+            self._begin(goal)
+        except (GoalRefusedError, UnreachablePoseError) as refusal:
+            self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
+
+    def on_joint_states(self, message: JointStates) -> None:
+        """Hear the measured joints: the fingers tell whether something is held."""
+        for joint in message.joints:
+            if joint.name == self._arm.fingers:
+                span = self._arm.fingers_open - self._arm.fingers_closed
+                self._hand.measured = (joint.position - self._arm.fingers_closed) / span
+        running = self._running
+        if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
+            self._hand.lost |= not self.holding
+
+    def on_trajectory_status(self, status: TrajectoryStatus) -> None:
+        """Hear how the driver fares with the motion under way."""
+        running = self._running
+        if running is None or running.message is None or status.trajectory_id != running.message.id:
+            return
+        running.acknowledged = True
+        running.time_s = status.time_s
+        if status.state == TrajectoryStatus.STATE_SUCCEEDED:
+            self._next_motion(running)
+        elif status.state in _ENDED:
+            self._hand.known = status.state == TrajectoryStatus.STATE_REFUSED
+            self._end(running, _Outcome(False, f"the arm driver ended the motion: {status.reason}"))
+        else:
+            self._say_phase(running)
+
+    def tick(self, now_ns: int) -> SynthesizerSays:
+        """Once per turn: what is to be said."""
+        self._now_ns = now_ns
+        running = self._running
+        unheard = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
+        if running is not None and running.message is not None and unheard:
+            running.message.captured.FromNanoseconds(now_ns)
+            self._trajectories.append(running.message)
+            running.sent_ns = now_ns
+        says = SynthesizerSays(tuple(self._trajectories), tuple(self._statuses))
+        self._trajectories, self._statuses = [], []
+        return says
+
+    # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
+
+    def _relocate(self, goal: RelocationGoal) -> _Course:
+        source, target = _point(goal, "from"), _point(goal, "to")
+        yield self._clear_fetch(source, goal)
+        lifted = self._waits_at()
+        if not self.holding:
+            yield self._clear(goal, [lambda: self._planner.leave(lifted, 0.0)])
+            return _Outcome(False, f"felt nothing in the hand at {_cm(source)} cm")
+        yield self._clear_deliver(lifted, target, goal)
+        return self._placed(target)
+
+    def _offer_hand(self, goal: RelocationGoal) -> _Course:
+        place = _point(goal, "from")
+        yield self._clear(goal, [lambda: self._planner.offer(place)])
+        return _Outcome(True)
+
+    def _take(self, goal: RelocationGoal) -> _Course:
+        here, opening = self._waits_at(), self._hand.opening
+        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, 0.0)])
+        if self.holding:
+            return _Outcome(True)
+        yield self._clear(goal, [lambda: self._planner.fingers(here, 0.0, self._planner.options.work_opening)])
+        return _Outcome(False, "closed the hand and felt nothing")
+
+    def _release(self, goal: RelocationGoal) -> _Course:
+        here, opening = self._waits_at(), self._hand.opening
+        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, self._planner.options.work_opening)])
+        return _Outcome(True)
+
+    def _place_held(self, goal: RelocationGoal) -> _Course:
+        target = _point(goal, "to")
+        if not self.holding:
+            raise GoalRefusedError("nothing is held; take an object first")
+        yield self._clear_deliver(self._waits_at(), target, goal)
+        return self._placed(target)
+
+    def _rest(self, goal: RelocationGoal) -> _Course:
+        if not self._hand.at_base:
+            here, opening = self._waits_at(), self._hand.opening
+            yield self._clear(goal, [lambda: self._planner.leave(here, opening)])
+        return _Outcome(True)
+
+    def _placed(self, target: FloatArray) -> _Outcome:
+        if self._hand.lost:
+            return _Outcome(False, f"the object slipped out of the hand on the way to {_cm(target)} cm")
+        return _Outcome(True)
+
+    def _clear_fetch(self, source: FloatArray, goal: RelocationGoal) -> PlannedMotion:
+        if not self._hand.at_base:
+            raise GoalRefusedError("the arm is not at its base pose; send a goal of kind REST first")
+        heights = (self._planner.options.entry_height, 0.06, 0.075)
+        return self._clear(goal, [partial(self._planner.fetch, source, height) for height in heights])
+
+    def _clear_deliver(self, start: FloatArray, target: FloatArray, goal: RelocationGoal) -> PlannedMotion:
+        """Straight if that is clear; else first back towards the row of the target; else higher."""
+        high = np.array([0.0, 0.0, 0.012])
+        back = np.array([target[0] + 0.004, start[1], start[2]])
+        detours: list[list[FloatArray]] = [[], [back], [back + high]]
+        plans = [
+            partial(self._planner.deliver, start, target, [self._planner.far_enough(point) for point in detour])
+            for detour in detours
+        ]
+        return self._clear(goal, plans)
+
+    def _clear(self, goal: RelocationGoal, plans: Sequence[Callable[[], PlannedMotion]]) -> PlannedMotion:
+        """The first plan that can be done and keeps its distance from everything."""
+        middle = self._checker.surface_z + self._checker.cylinder.height / 2
+        standing = np.array([[p.x, p.y, middle] for p in goal.avoid]).reshape(-1, 3)
+        reasons = []
+        for plan in plans:
+            try:
+                motion = plan()
+            except UnreachablePoseError as error:
+                reasons.append(str(error))
+                continue
+            closest = self._checker.smallest(motion.angles, standing, motion.holding, every=6)
+            if closest.distance >= LEAST_CLEARANCE:
+                return motion
+            phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
+            reasons.append(
+                f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
+                f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
+            )
+        raise GoalRefusedError("; ".join(dict.fromkeys(reasons)))
+
+    def _begin(self, goal: RelocationGoal) -> None:
+        if self._running is not None:
+            raise GoalRefusedError(f"busy with goal {self._running.goal.id}; one goal at a time")
+        if not self._hand.known:
+            raise GoalRefusedError("the arm was stopped at an unplanned place; a person must bring it to its base pose")
+        if goal.frame != FRAME:
+            raise GoalRefusedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
+        course = self._courses.get(goal.kind)
+        if course is None:
+            kinds = [name.removeprefix("KIND_") for name in RelocationGoal.Kind.keys()[1:]]
+            raise GoalRefusedError(f"kind {goal.kind} is none of {', '.join(kinds)}")
+        running = _Running(goal, course(goal))
+        first = self._advance(running)
+        self._running = running
+        self._hand.lost = False
+        self._say(goal.id, RelocationStatus.STATE_ACCEPTED)
+        self._start_or_end(running, first)
+
+    def _advance(self, running: _Running) -> PlannedMotion | _Outcome:
+        try:
+            return next(running.course)
+        except StopIteration as end:
+            outcome: _Outcome = end.value
+            return outcome
+
+    def _next_motion(self, running: _Running) -> None:
+        motion = running.motion
+        assert motion is not None
+        base = motion.phases[-1][0] == "retreat"
+        self._hand.at_base = base
+        self._hand.gripper = None if base else motion.gripper[-1]
+        span = self._arm.fingers_open - self._arm.fingers_closed
+        self._hand.opening = float(np.clip((motion.angles[-1, 5] - self._arm.fingers_closed) / span, 0.0, 1.0))
+        try:
+            self._start_or_end(running, self._advance(running))
+        except (GoalRefusedError, UnreachablePoseError) as error:
+            self._end(running, _Outcome(False, str(error)))
+
+    def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
+        if isinstance(step, _Outcome):
+            self._end(running, step)
+            return
+        running.motions += 1
+        running.motion, running.acknowledged, running.time_s = step, False, 0.0
+        running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
+        running.message = self._trajectory(f"{running.goal.id}/{running.motions}", step)
+        running.sent_ns = self._now_ns
+        self._trajectories.append(running.message)
+
+    def _end(self, running: _Running, outcome: _Outcome) -> None:
+        running.course.close()
+        self._running = None
+        state = RelocationStatus.STATE_SUCCEEDED if outcome.done else RelocationStatus.STATE_FAILED
+        self._say(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
+
+    def _trajectory(self, name: str, motion: PlannedMotion) -> JointTrajectory:
+        message = JointTrajectory(id=name, joints=[*self._arm.joints, self._arm.fingers])
+        message.captured.FromNanoseconds(self._now_ns)
+        message.points.extend(
+            TrajectoryPoint(time_s=t, position_rad=q) for t, q in zip(motion.times, motion.angles, strict=True)
+        )
+        message.phases.extend(TrajectoryPhase(name=name, start_s=start) for name, start in motion.phases)
+        return message
+
+    def _say_phase(self, running: _Running) -> None:
+        assert running.motion is not None
+        phase = [name for name, start in running.motion.phases if start <= running.time_s][-1]
+        if phase != running.phase:
+            running.phase = phase
+            self._say(running.goal.id, RelocationStatus.STATE_EXECUTING, phase, "", running.elbow_turn)
+
+    def _say(
+        self, goal_id: str, state: RelocationStatus.State, phase: str = "", reason: str = "", elbow_turn: float = 0.0
+    ) -> None:
+        status = RelocationStatus(
+            goal_id=goal_id, state=state, phase=phase, reason=reason, holding=self.holding, elbow_turn_rad=elbow_turn
+        )
+        status.captured.FromNanoseconds(self._now_ns)
+        self._statuses.append(status)
+        self._newest[goal_id] = status
+        while len(self._newest) > REMEMBERED_GOALS:
+            del self._newest[next(iter(self._newest))]
+
+    def _should_hold(self, motion: PlannedMotion, time_s: float) -> bool:
+        """Whether the motion holds an object from half a second before to half a second after `time_s`."""
+        around = np.searchsorted(motion.times, [time_s - 0.5, time_s + 0.5])
+        return bool(motion.holding[around[0] : max(around[1], around[0] + 1)].all()) and around[0] > 0
+
+    def _waits_at(self) -> FloatArray:
+        if self._hand.gripper is None:
+            raise GoalRefusedError("the arm is at its base pose; offer the hand first")
+        return self._hand.gripper
+
+
+def _point(goal: RelocationGoal, name: str) -> FloatArray:
+    if not goal.HasField(name):
+        near = difflib.get_close_matches(name, ["from", "to"], n=1)
+        raise GoalRefusedError(f"the goal lacks its position {near[0]!r}")
+    position: Position = getattr(goal, name)
+    point = np.array([position.x, position.y, position.z])
+    if not np.isfinite(point).all():
+        raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
+    return point
+
+
+def _cm(point: FloatArray) -> str:
+    return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"
