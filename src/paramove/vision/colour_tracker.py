@@ -58,7 +58,10 @@ DEFAULT_COLOURS = (
 
 @dataclass(frozen=True)
 class Region:
-    """One measured region. Pixels; u right, v down; the middle of the first pixel is 0."""
+    """One measured region. Pixels; u right, v down; the middle of the first pixel is 0.
+
+    (u, v) is the centre of gravity, for a hand the middle of its palm.
+    """
 
     u_px: float
     v_px: float
@@ -235,10 +238,14 @@ def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) ->
     columns, rows = weight.sum(axis=0), weight.sum(axis=1)
     left_edge, right_edge = _extent(columns)
     top_edge, bottom_edge = _extent(rows)
-    outline = _outline(weight, left, top) if outlined else np.zeros((0, 2))
+    u, v = float(columns @ np.arange(columns.size)) / area, float(rows @ np.arange(rows.size)) / area
+    outline = np.zeros((0, 2))
+    if outlined:
+        outline = _outline(weight, left, top)
+        u, v = _palm(weight)
     return Region(
-        u_px=left + float(columns @ np.arange(columns.size)) / area,
-        v_px=top + float(rows @ np.arange(rows.size)) / area,
+        u_px=left + u,
+        v_px=top + v,
         area_px=area,
         left_px=left + left_edge,
         top_px=top + top_edge,
@@ -246,6 +253,13 @@ def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) ->
         height_px=bottom_edge - top_edge,
         outline=outline,
     )
+
+
+def _palm(weight: NDArray[np.float64]) -> tuple[float, float]:
+    """Middle of the largest circle within the region: of a hand the palm, wherever its fingers and its sleeve are."""
+    inside = np.pad((weight > 0.5).astype(np.uint8), 1)
+    _, _, _, (u, v) = cv2.minMaxLoc(cv2.distanceTransform(inside, cv2.DIST_L2, 3))
+    return u - 1.0, v - 1.0
 
 
 def _outline(weight: NDArray[np.float64], left: int, top: int) -> NDArray[np.float64]:

@@ -137,7 +137,7 @@ def _fingertip(hand: TrackedObject, place: Sample) -> Point:
     reach = np.linalg.norm(outline - centre, axis=1)
     tip = outline[int(np.argmax(reach))]
     opposite = float(np.max(-(outline - centre) @ (tip - centre))) / float(reach.max() or 1.0)
-    if reach.max() >= 1.25 * opposite:  # a palm with one finger; the palm's far side is nearer to the centre
+    if reach.max() >= 1.25 * opposite:  # one finger out of the palm, whose other side is nearer to its middle
         return np.asarray(tip, dtype=np.float64)
     towards = np.array([place.u_px, place.v_px]) - centre
     return np.asarray(outline[int(np.argmax((outline - centre) @ towards))], dtype=np.float64)
