@@ -53,10 +53,11 @@ def _wait_for_state(bus: Bus, state: NodeStatus.State) -> Any:
 
 
 def _say(bus: Bus, name: str, starts: int = 1) -> None:
-    """Says a gesture once the node, in its so-manieth start, hears it."""
+    """Says a gesture once the node, in its so-manieth start, hears it and can be heard."""
     publisher = bus.exchange.publishers["gestures"]
+    speech = bus.exchange.subscribers["speech"].counter
     for _ in bus.events(STATUS, tick=True):
-        if publisher.subscriptions >= starts:
+        if publisher.subscriptions >= starts and speech.epochs >= starts:
             break
     bus.publish(topics.GESTURES, Gesture(object=name), captured_ns=42)
 

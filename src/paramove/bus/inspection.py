@@ -1,0 +1,157 @@
+"""Looks at a running bus from outside, without taking part. For the command line and the dashboard.
+
+Nothing here waits longer than it is told to: a topic whose speaker is dead, busy or absent is shown as what it is.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.endpoint import is_alive, socket_path
+from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus.topics import Topic
+
+_POLL_MS = 50
+
+
+@dataclass(frozen=True)
+class Speaker:
+    """Whether and by whom a topic is said.
+
+    Attributes:
+        topic: Row of the table.
+        alive: Whether a process listens at the topic's socket.
+        holder: What the holder of the topic's lock wrote, such as "pid 12 (camera)"; "" if nobody ever said it.
+    """
+
+    topic: Topic
+    alive: bool
+    holder: str
+
+
+@dataclass
+class Measurement:
+    """What was heard of a topic within some seconds. Times are of this process's monotonic clock.
+
+    Attributes:
+        topic: Row of the table.
+        welcomed: Whether the speaker answered.
+        messages: How many were heard; a latched value that was said before counts, too.
+        lost: Gaps in the sequence.
+        refused: Messages that were not what the topic carries.
+        sequence: Of the newest message of the speaker.
+        epoch: Of the speaker.
+        bytes_total: Of the payloads.
+        arrivals_s: When messages arrived.
+    """
+
+    topic: Topic
+    welcomed: bool = False
+    messages: int = 0
+    lost: int = 0
+    refused: int = 0
+    sequence: int = 0
+    epoch: int = 0
+    bytes_total: int = 0
+    arrivals_s: list[float] = field(default_factory=list)
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages per second between the first and the last arrival; 0 with fewer than two."""
+        if len(self.arrivals_s) < 2:
+            return 0.0
+        return (len(self.arrivals_s) - 1) / (self.arrivals_s[-1] - self.arrivals_s[0])
+
+    @property
+    def longest_gap_s(self) -> float:
+        """Longest time between two messages."""
+        return max((b - a for a, b in zip(self.arrivals_s, self.arrivals_s[1:], strict=False)), default=0.0)
+
+    @property
+    def mean_bytes(self) -> float:
+        """Mean size of a payload."""
+        return self.bytes_total / self.messages if self.messages else 0.0
+
+
+def speakers(folder: Path) -> list[Speaker]:
+    """Every topic of the table, and every status topic that was said in the folder."""
+    nodes = sorted(path.name.removeprefix("status.") for path in folder.glob("status.*") if path.suffix != ".lock")
+    public = [topic for topic in topics.TOPICS if not topic.truth]
+    return [speaker(folder, topic) for topic in (*public, *(topics.status(node) for node in nodes))]
+
+
+def speaker(folder: Path, topic: Topic) -> Speaker:
+    """Who says one topic."""
+    path = socket_path(folder, topic.name)
+    try:
+        holder = path.with_name(path.name + ".lock").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        holder = ""
+    return Speaker(topic, is_alive(path), holder)
+
+
+def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Heard]:
+    """Messages of the topics, decoded, as they arrive within `seconds`."""
+    end_s = time.monotonic() + seconds
+    with zmq.Context() as context:
+        subscribers = [Subscriber(context, folder, topic) for topic in wanted]
+        try:
+            while time.monotonic() < end_s:
+                for subscriber in subscribers:
+                    while (heard := subscriber.receive()) is not None:
+                        yield heard
+                _poll(subscribers, end_s)
+        finally:
+            for subscriber in subscribers:
+                subscriber.close()
+
+
+def measure(folder: Path, wanted: Sequence[Topic], seconds: float) -> list[Measurement]:
+    """Counts what is said on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
+    end_s = time.monotonic() + seconds
+    found = [Measurement(topic) for topic in wanted]
+    with zmq.Context() as context:
+        subscribers = [Subscriber(context, folder, topic) for topic in wanted]
+        while time.monotonic() < end_s:
+            for subscriber, measurement in zip(subscribers, found, strict=True):
+                while (raw := subscriber.receive_raw()) is not None:
+                    measurement.arrivals_s.append(time.monotonic())
+                    measurement.bytes_total += len(raw[1])
+            _poll(subscribers, end_s)
+        for subscriber, measurement in zip(subscribers, found, strict=True):
+            counter = subscriber.counter
+            measurement.welcomed = subscriber.welcomed
+            measurement.messages, measurement.lost = counter.messages, counter.lost
+            measurement.sequence, measurement.epoch = counter.sequence, counter.epoch or 0
+            measurement.refused = counter.refused.total()
+            subscriber.close()
+    return found
+
+
+def statuses(folder: Path, seconds: float) -> dict[str, Any]:
+    """Newest `NodeStatus` of each node whose status topic has a living speaker; None if it did not answer in time."""
+    alive = [item.topic for item in speakers(folder) if item.alive and item.topic.name.startswith("status/")]
+    found: dict[str, Any] = {topic.name.removeprefix("status/"): None for topic in alive}
+    if alive:
+        for heard in listen(folder, alive, seconds):
+            found[heard.topic.name.removeprefix("status/")] = heard.message
+            if None not in found.values():
+                break
+    return found
+
+
+def _poll(subscribers: list[Subscriber], end_s: float) -> None:
+    """Waits until something can be read, not beyond `end_s`; opens sockets anew that have gone deaf."""
+    poller = zmq.Poller()
+    for subscriber in subscribers:
+        if subscriber.is_deaf():
+            subscriber.reopen()
+        poller.register(subscriber.socket, zmq.POLLIN)
+    poller.poll(max(0, min(_POLL_MS, int(1000 * (end_s - time.monotonic())))))

@@ -1,0 +1,59 @@
+"""Options and output that the commands about the bus share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from paramove.bus import topics
+from paramove.bus.settings import default_folder
+from paramove.bus.topics import Topic
+
+DomainOption = Annotated[
+    str | None, typer.Option("--domain", help="domain of the bus; default $PARAMOVE_DOMAIN, else 'default'")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON")]
+
+
+def bus_folder(domain: str | None) -> Path:
+    """Folder of the domain's sockets; ends the command if there is none, since nothing runs there."""
+    folder = default_folder(domain)
+    if not folder.is_dir():
+        typer.echo(f"no bus at {folder}: nothing is running in this domain; start it with `paramove launch`", err=True)
+        raise typer.Exit(1)
+    return folder
+
+
+def topic_named(name: str) -> Topic:
+    """Row of the table; ends the command with the nearest names if there is none."""
+    try:
+        return topics.by_name(name)
+    except (KeyError, ValueError) as error:
+        typer.echo(str(error.args[0]), err=True)
+        raise typer.Exit(2) from None
+
+
+def show(rows: Sequence[dict[str, Any]], as_json: bool) -> None:
+    """Prints rows that have the same keys, as JSON or as a table."""
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    if not rows:
+        return
+    texts = [[str(key) for key in rows[0]], *([_text(value) for value in row.values()] for row in rows)]
+    widths = [max(len(row[column]) for row in texts) for column in range(len(texts[0]))]
+    for row in texts:
+        typer.echo("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _text(value: object) -> str:
+    if value is None or value == "":
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    # What others have written may hold control characters that a terminal would obey.
+    return "".join(letter if letter.isprintable() else "?" for letter in str(value))

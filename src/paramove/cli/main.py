@@ -1,0 +1,74 @@
+"""The `paramove` command. Mounts the sub-commands; each lies in a file of its own.
+
+A module named here has an attribute `app`, a `typer.Typer`: with a name (`Typer(name="topic")`) it becomes a group of
+commands, without one its commands are mounted as they are. Only the module of the command that is called is imported,
+so that `paramove topic list` does not wait for what training needs.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    "launch": ("paramove.cli.launch", "Run an application from its launch file."),
+    "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
+    "node": ("paramove.cli.node", "Look at the nodes on the bus."),
+    "demos": ("paramove.cli.demos", "List, show, plot, label, import and split demonstrations."),
+    "train": ("paramove.cli.train", "Train movement models from demonstrations."),
+    "record": ("paramove.cli.record", "Record, inspect and replay what is said on the bus."),
+    "evaluate": ("paramove.cli.evaluate", "Repeat the thesis's experiments and write a report."),
+    "doctor": ("paramove.cli.doctor", "Check this machine and its installation."),
+}
+"""Name -> module and one line of help. A command whose module does not exist is not offered."""
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"paramove {version('paramove')}")
+        raise typer.Exit
+
+
+def _callback(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Learns parametric human movements from a few demonstrations; recognises, tracks and synthesises them."""
+
+
+def build(wanted: str | None) -> typer.Typer:
+    """The command line with the command `wanted` in full and the others by their help only."""
+    app = typer.Typer(name="paramove", no_args_is_help=True, pretty_exceptions_enable=False)
+    app.callback()(_callback)
+    for name, (module, sentence) in COMMANDS.items():
+        if importlib.util.find_spec(module) is None:
+            continue
+        if name == wanted:
+            app.add_typer(importlib.import_module(module).app)
+        else:
+            app.command(name, help=sentence)(_placeholder(name))
+    return app
+
+
+def _placeholder(name: str) -> Callable[[], None]:
+    def command() -> None:
+        raise RuntimeError(f"{name} is called without its module")
+
+    return command
+
+
+def main() -> None:
+    """Entry point of the `paramove` script."""
+    build(next((argument for argument in sys.argv[1:] if not argument.startswith("-")), None))()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,146 @@
+"""`paramove topic`: what is said on the bus."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import typer
+
+from paramove.bus import inspection, topics
+from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show, topic_named
+
+app = typer.Typer(name="topic", help="Look at what is said on the bus.", no_args_is_help=True)
+
+NameArgument = Annotated[str, typer.Argument(help="name of the topic, such as camera/image")]
+LONGEST_BYTES = 32
+"""Longer byte fields are shown by their length."""
+
+
+@app.command("list")
+def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> None:
+    """List every topic, its type and who says it. `silent`: nobody does."""
+    rows = [
+        {
+            "topic": item.topic.name,
+            "type": item.topic.type_name,
+            "rate_hz": item.topic.rate_hz,
+            "profile": item.topic.profile.value,
+            "recorded": item.topic.recorded,
+            "said by": item.holder if item.alive else "silent",
+        }
+        for item in inspection.speakers(bus_folder(domain))
+    ]
+    show(rows, as_json)
+
+
+@app.command()
+def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = False, wait_s: float = 1.0) -> None:
+    """Show one topic: its row of the table, who says it and how much has been said."""
+    folder, topic = bus_folder(domain), topic_named(name)
+    found = inspection.speaker(folder, topic)
+    row: dict[str, Any] = {
+        "topic": topic.name,
+        "type": topic.type_name,
+        "rate_hz": topic.rate_hz,
+        "profile": topic.profile.value,
+        "frame": topic.frame,
+        "recorded": topic.recorded,
+        "alive": found.alive,
+        "said by": found.holder if found.alive else "silent",
+    }
+    if found.alive:
+        (measured,) = inspection.measure(folder, [topic], wait_s)
+        row |= {"answers": measured.welcomed, "epoch": measured.epoch, "said so far": measured.sequence}
+    if as_json:
+        typer.echo(json.dumps(row, indent=2))
+    else:
+        show([{"": key, " ": value} for key, value in row.items()], as_json=False)
+
+
+@app.command()
+def echo(
+    name: NameArgument,
+    domain: DomainOption = None,
+    as_json: JsonOption = False,
+    count: Annotated[int, typer.Option(min=1, help="end after so many messages")] = 10,
+    seconds: Annotated[float, typer.Option(min=0.1, help="end after so long")] = 10.0,
+) -> None:
+    """Print messages as they arrive: one per block, or with --json one JSON object per line."""
+    folder, topic = bus_folder(domain), topic_named(name)
+    messages = 0
+    for heard in inspection.listen(folder, [topic], seconds):
+        messages += 1
+        content = readable(heard.message)
+        head = {"sequence": heard.sequence, "captured_ns": heard.captured_ns, "published_ns": heard.published_ns}
+        if as_json:
+            typer.echo(json.dumps(head | {"message": content}))
+        else:
+            typer.echo(f"--- {topic.name} {heard.sequence}, captured at {heard.captured_ns * 1e-9:.3f} s")
+            typer.echo(json.dumps(content, indent=2, ensure_ascii=True))
+        if messages == count:
+            return
+    if messages == 0:
+        state = inspection.speaker(folder, topic)
+        reason = f"{state.holder} said nothing" if state.alive else "silent, nobody says it"
+        typer.echo(f"{topic.name}: {reason} within {seconds:g} s", err=True)
+        raise typer.Exit(1)
+
+
+@app.command()
+def hz(
+    names: Annotated[list[str] | None, typer.Argument(help="topics; default: all that are said")] = None,
+    domain: DomainOption = None,
+    as_json: JsonOption = False,
+    seconds: Annotated[float, typer.Option(min=0.1, help="how long to listen")] = 3.0,
+) -> None:
+    """Measure rates, losses, the longest gap and sizes. Reads envelopes only."""
+    folder = bus_folder(domain)
+    said = {item.topic.name for item in inspection.speakers(folder) if item.alive}
+    wanted = [topic_named(name) for name in names] if names else [topics.by_name(name) for name in sorted(said)]
+    rows = [
+        {
+            "topic": item.topic.name,
+            "rate_hz": round(item.rate_hz, 2),
+            "nominal_hz": item.topic.rate_hz,
+            "messages": item.messages,
+            "lost": item.lost,
+            "refused": item.refused,
+            "longest_gap_s": round(item.longest_gap_s, 4),
+            "mean_bytes": round(item.mean_bytes),
+            "state": _state(item.topic.name in said, item.welcomed),
+        }
+        for item in inspection.measure(folder, wanted, seconds)
+    ]
+    show(rows, as_json)
+
+
+def readable(message: Any) -> dict[str, Any]:
+    """A message as JSON values; long byte fields only by their length."""
+    found: dict[str, Any] = {}
+    for field, value in message.ListFields():
+        repeated = not isinstance(value, str | bytes) and hasattr(value, "__len__") and not field.message_type
+        if field.message_type and hasattr(value, "ListFields"):
+            found[field.name] = readable(value)
+        elif field.message_type:
+            found[field.name] = [readable(item) for item in value]
+        elif repeated:
+            found[field.name] = [_scalar(field, item) for item in value]
+        else:
+            found[field.name] = _scalar(field, value)
+    return found
+
+
+def _scalar(field: Any, value: Any) -> Any:
+    if isinstance(value, bytes):
+        return f"<{len(value)} bytes>" if len(value) > LONGEST_BYTES else value.hex()
+    if field.enum_type:
+        known = field.enum_type.values_by_number.get(value)
+        return known.name if known else value
+    return value if not isinstance(value, float) or value - value == 0 else str(value)
+
+
+def _state(said: bool, welcomed: bool) -> str:
+    if not said:
+        return "silent"
+    return "said" if welcomed else "does not answer"

@@ -1,0 +1,176 @@
+"""`paramove topic` and `paramove node` on a real bus."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from paramove.bus import topics
+from paramove.bus.bus import Bus
+from paramove.bus.settings import BusSettings
+from paramove.cli.main import COMMANDS, build
+from paramove.cli.topic import readable
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.hoap3_wire_pb2 import StreamBatch
+from paramove.msgs.rule_pb2 import Rules
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch) -> Iterator[Run]:
+    with tempfile.TemporaryDirectory(prefix="run-") as runtime:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
+        monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
+
+        def invoke(*arguments: str) -> Any:
+            return CliRunner().invoke(build(arguments[0]), arguments)
+
+        yield invoke
+
+
+@pytest.fixture
+def speaking(run: Run) -> Iterator[Path]:
+    """A node that says ten gestures a second or so, in a thread of its own as if it were a process."""
+    folder = Path(os.environ["XDG_RUNTIME_DIR"]) / "paramove" / "default"
+    made: list[Bus] = []
+    ready = threading.Event()
+
+    def speak() -> None:
+        with Bus("recognizer", BusSettings(folder=folder), (), (topics.GESTURES, topics.RULES)) as bus:
+            made.append(bus)
+            bus.publish(topics.RULES, Rules(frame="right_shoulder"))
+            bus.ready("recognising\x1b[2J")
+            ready.set()
+            for _ in bus.events(tick=True):
+                bus.publish(topics.GESTURES, Gesture(object="red"))
+
+    thread = threading.Thread(target=speak)
+    thread.start()
+    assert ready.wait(10)
+    yield folder
+    made[0].stop()
+    thread.join()
+
+
+def test_without_a_bus_the_commands_say_so(run: Run) -> None:
+    for arguments in (("topic", "list"), ("node", "list"), ("topic", "echo", "gestures"), ("topic", "hz")):
+        result = run(*arguments)
+        assert result.exit_code == 1
+        assert "nothing is running in this domain" in result.output
+
+
+def test_list_shows_who_says_what(run: Run, speaking: Path) -> None:
+    rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
+    assert rows["gestures"]["said by"] == f"pid {os.getpid()} (recognizer)"
+    assert rows["camera/image"]["said by"] == "silent"
+    assert rows["status/recognizer"]["type"] == "paramove.msgs.NodeStatus"
+    assert not any(name.startswith("truth/") for name in rows)
+    text = run("topic", "list").output.splitlines()
+    assert text[0].split() == ["topic", "type", "rate_hz", "profile", "recorded", "said", "by"]
+    assert any(line.startswith("gestures ") and "(recognizer)" in line for line in text)
+
+
+def test_info_shows_what_was_said(run: Run, speaking: Path) -> None:
+    row = json.loads(run("topic", "info", "rules", "--json").output)
+    assert (row["alive"], row["answers"], row["said so far"]) == (True, True, 1)
+    lines = [line.split() for line in run("topic", "info", "calibration/plane").output.splitlines()]
+    assert ["frame", "right_shoulder"] in lines
+    assert ["said", "by", "silent"] in lines
+    wrong = run("topic", "info", "camera/imgae")
+    assert wrong.exit_code == 2
+    assert "camera/image" in wrong.output
+
+
+def test_echo_prints_messages_and_ends(run: Run, speaking: Path) -> None:
+    result = run("topic", "echo", "gestures", "--count", "2", "--json")
+    lines = [json.loads(line) for line in result.output.splitlines()]
+    assert [line["message"] for line in lines] == [{"object": "red"}] * 2
+    assert lines[1]["sequence"] == lines[0]["sequence"] + 1
+    assert "--- rules 1, captured at" in run("topic", "echo", "rules", "--count", "1").output
+
+
+def test_echo_of_a_silent_topic_ends_and_says_so(run: Run, speaking: Path) -> None:
+    result = run("topic", "echo", "speech", "--seconds", "0.2")
+    assert result.exit_code == 1
+    assert "speech: silent, nobody says it within 0.2 s" in result.output
+
+
+def test_hz_measures_rate_and_size(run: Run, speaking: Path) -> None:
+    rows = {row["topic"]: row for row in json.loads(run("topic", "hz", "--seconds", "1.5", "--json").output)}
+    assert set(rows) == {"gestures", "rules", "status/recognizer"}
+    gestures = rows["gestures"]
+    assert 5 < gestures["rate_hz"] < 20
+    assert (gestures["lost"], gestures["refused"], gestures["state"]) == (0, 0, "said")
+    assert gestures["mean_bytes"] == Gesture(object="red").ByteSize()
+    assert rows["rules"]["messages"] == 1
+    silent = json.loads(run("topic", "hz", "speech", "--seconds", "0.1", "--json").output)[0]
+    assert (silent["state"], silent["messages"]) == ("silent", 0)
+
+
+def test_a_dead_and_a_busy_speaker_are_shown_as_such(run: Run, speaking: Path) -> None:
+    program = (
+        "import sys, os; from pathlib import Path; from paramove.bus import topics; from paramove.bus.bus import Bus;"
+        "from paramove.bus.settings import BusSettings;"
+        "bus = Bus(sys.argv[2], BusSettings(folder=Path(sys.argv[1])), (), (getattr(topics, sys.argv[3]),));"
+        "sys.stdout.write('x'); sys.stdout.flush(); sys.stdin.read()"
+    )
+    started = []
+    for node, topic in (("dead", "SPEECH"), ("busy", "CLOCK")):
+        command = [sys.executable, "-c", program, str(speaking), node, topic]
+        started.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE))
+        assert started[-1].stdout is not None
+        assert started[-1].stdout.read(1) == b"x"
+    try:
+        started[0].kill()
+        started[0].wait()
+        rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
+        assert rows["speech"]["said by"] == "silent"
+        assert rows["clock"]["said by"] == f"pid {started[1].pid} (busy)"
+        hz = json.loads(run("topic", "hz", "clock", "--seconds", "0.2", "--json").output)[0]
+        assert hz["state"] == "does not answer"
+        nodes = {row["node"]: row for row in json.loads(run("node", "list", "--seconds", "0.5", "--json").output)}
+        assert set(nodes) == {"recognizer", "busy"}
+        assert nodes["busy"]["state"] == "busy"
+        assert "did not answer" in nodes["busy"]["sentence"]
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+
+
+def test_node_list_shows_states_and_no_control_characters(run: Run, speaking: Path) -> None:
+    (row,) = json.loads(run("node", "list", "--json").output)
+    assert (row["node"], row["state"], row["pid"]) == ("recognizer", "ready", os.getpid())
+    assert "recognising?[2J" in run("node", "list").output
+
+
+def test_long_bytes_and_enums_are_readable() -> None:
+    message = StreamBatch(epoch=3, frames=b"\0" * 56_000)
+    assert readable(message) == {"epoch": 3, "frames": "<56000 bytes>"}
+    gesture = Gesture(kind=Gesture.KIND_MOVED, x=float("nan"))
+    gesture.captured.FromNanoseconds(2_000_000_003)
+    assert readable(gesture) == {"captured": {"seconds": 2, "nanos": 3}, "kind": "KIND_MOVED", "x": "nan"}
+    assert readable(topics.CLOCK.type(said=[{"topic": "a"}])) == {"said": [{"topic": "a"}]}
+
+
+def test_only_the_called_command_is_imported() -> None:
+    program = "import sys; from paramove.cli.main import build; build('topic'); sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_help_and_version_need_no_command() -> None:
+    result = CliRunner().invoke(build(None), ["--help"])
+    assert result.exit_code == 0
+    assert COMMANDS["topic"][1] in result.output
+    assert CliRunner().invoke(build(None), ["--version"]).output.startswith("paramove ")
