@@ -1,8 +1,10 @@
 """Real processes under real supervision."""
 
 import os
+import re
 from pathlib import Path
 
+import pytest
 from ruamel.yaml import YAML
 
 from paramove.supervision import exit_codes
@@ -185,3 +187,36 @@ nodes:
     assert not list(Path(os.environ["XDG_RUNTIME_DIR"]).glob("paramove/truth-*"))
     _, second, _ = workspace.run()
     assert second.path != folder.path
+
+
+def test_node_over_its_memory_limit_is_given_up_with_the_figure(workspace):
+    workspace.write("""
+nodes:
+  greedy: {module: nodes.silent_actor, memory_limit_mb: 200, parameters: {ballast_mb: 200}}
+""")
+    outcome, _, _ = workspace.run()
+    assert outcome.code == exit_codes.FAILURE
+    assert re.search(r"greedy has ended: used \d{3} MB of memory, its limit is 200 MB", outcome.reason)
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"LC_ALL": "C"},
+        {"LC_ALL": "tr_TR.ISO8859-9", "PYTHONIOENCODING": "latin-1"},
+        {"TZ": "No/Where"},
+        {"PYTHONSAFEPATH": "1"},
+        {"TERM": "", "COLUMNS": "zero"},
+    ],
+    ids=lambda odd: next(iter(odd)),
+)
+def test_odd_environment_does_no_harm(workspace, odd):
+    workspace.write("""
+nodes:
+  robot: {module: nodes.actor, ends_run: true, parameters: {say: "ξ = 1 is open", lasts_s: 1.0}}
+""")
+    environment = {key: value for key, value in os.environ.items() if key != "HOME"} | odd
+    launcher = workspace.start(env=environment, encoding="utf-8", errors="replace")
+    shown = launcher.communicate(timeout=60)[0]
+    assert launcher.returncode == exit_codes.OK, shown
+    assert "= 1 is open" in shown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from pathlib import Path
@@ -47,6 +48,8 @@ def launch(
 def _launch(
     name: str, overlays: list[str] | None, settings: list[str], seed: int | None, headless: bool, check_only: bool
 ) -> int:
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a sentence must not end a run where a letter is unknown
     console = Console(highlight=False, markup=False, emoji=False)
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
     try:

@@ -43,6 +43,9 @@ class NodeSettings(_Checked):
     required: bool = Field(default=True, description="the run fails when this node ends before the run does")
     after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
     ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 30.0
+    memory_limit_mb: Annotated[float, Field(gt=0.0)] | None = Field(
+        default=None, description="a node that uses more is killed, and restarted as `restart` says"
+    )
     ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
     lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
     optional_topics: list[str] = Field(

@@ -52,7 +52,7 @@ class Guard:
         self._say(f"-{group}")
 
     def _say(self, line: str) -> None:
-        if self._process.stdin is not None:
+        if self._process.stdin is not None and not self._process.stdin.closed:
             with contextlib.suppress(BrokenPipeError):  # the guard was killed: the kernel's SIGTERM remains
                 self._process.stdin.write(line + "\n")
                 self._process.stdin.flush()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable
 
+import psutil
+
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision.exit_codes import FAILURE, OK
 from paramove.supervision.launch_schema import NodeSettings
@@ -33,6 +35,9 @@ _SAID = {
     NodeStatus.STATE_DEGRADED: State.DEGRADED,
     NodeStatus.STATE_FAILED: State.FAILED,
 }
+
+
+MEASURE_PERIOD_S = 1.0
 
 
 class SupervisedNode:
@@ -69,7 +74,8 @@ class SupervisedNode:
         self._on_change = on_change
         self._policy = RestartPolicy(settings)
         self._deadline_s = 0.0  # of readiness while starting, of the next start while restarting
-        self._late = False
+        self._measure_due_s = 0.0
+        self._killed_for = ""
 
     @property
     def is_up(self) -> bool:
@@ -84,7 +90,7 @@ class SupervisedNode:
     def start(self, now_s: float) -> None:
         """Starts the process."""
         self.status = NodeStatus()
-        self._late = False
+        self._killed_for = ""
         self._deadline_s = now_s + self.settings.ready_timeout_s
         self.process = self._spawn(self.name)
         self._become(State.STARTING, f"pid {self.process.pid}")
@@ -114,18 +120,30 @@ class SupervisedNode:
         if code is not None:
             self.process = None
             return code
-        if self.state is State.STARTING and now_s >= self._deadline_s and not self._late:
-            self._late = True
-            self.process.kill()
+        if self.state is not State.STOPPING and not self._killed_for:
+            self._killed_for = self._fault(self.process.pid, now_s)
+            if self._killed_for:
+                self.process.kill()
         return None
+
+    def _fault(self, pid: int, now_s: float) -> str:
+        """Why the process has to be killed; empty if it is well."""
+        if self.state is State.STARTING and now_s >= self._deadline_s:
+            said = printable(self.status.sentence) or "nothing"
+            return f"not ready within {self.settings.ready_timeout_s:g} s, last said: {said}"
+        limit_mb = self.settings.memory_limit_mb
+        if limit_mb is not None and now_s >= self._measure_due_s:
+            self._measure_due_s = now_s + MEASURE_PERIOD_S
+            used_mb = _memory_mb(pid)
+            if used_mb > limit_mb:
+                return f"used {used_mb:.0f} MB of memory, its limit is {limit_mb:g} MB"
+        return ""
 
     def conclude(self, code: int, now_s: float) -> None:
         """Draws the consequence of an end that nobody asked for: restart, finished or given up."""
-        self.exit_code = FAILURE if self._late else code
+        self.exit_code = FAILURE if self._killed_for else code
         verdict = self._policy.after_exit(self.exit_code, now_s)
-        said = self.status.sentence or "nothing"
-        late = f"not ready within {self.settings.ready_timeout_s:g} s, last said: {printable(said)}; "
-        sentence = (late if self._late else "") + verdict.sentence
+        sentence = f"{self._killed_for}; {verdict.sentence}" if self._killed_for else verdict.sentence
         if verdict.restart_after_s is not None:
             self._deadline_s = now_s + verdict.restart_after_s
             self._become(State.RESTARTING, sentence)
@@ -154,3 +172,10 @@ class SupervisedNode:
     def _become(self, state: State, sentence: str) -> None:
         self.state, self.sentence = state, sentence
         self._on_change(self)
+
+
+def _memory_mb(pid: int) -> float:
+    try:
+        return float(psutil.Process(pid).memory_info().rss) / 2**20
+    except psutil.Error:  # it has just ended
+        return 0.0

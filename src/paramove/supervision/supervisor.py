@@ -239,7 +239,9 @@ def node_environment(own: Mapping[str, str]) -> dict[str, str]:
     Ten processes with a thread per core each would only hinder one another.
     """
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**threads, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
+    environment = {**threads, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
+    environment.pop("PYTHONSAFEPATH", None)  # nodes are found in the workspace, their working directory
+    return environment
 
 
 def _drain(wake_fd: int) -> None:

@@ -48,6 +48,8 @@ class Actor:
         self.event("started")
         if parameters.get("child"):
             subprocess.Popen([sys.executable, "-c", STUBBORN_CHILD])
+        ballast = bytearray(int(parameters.get("ballast_mb", 0) * 2**20))
+        ballast[::4096] = b"x" * len(ballast[::4096])  # so that the pages exist
         starts = self.events.read_text().splitlines().count(f"{self.name} started")
         if starts <= parameters.get("crashes", 0):
             raise RuntimeError(f"crash number {starts}")

@@ -1,0 +1,50 @@
+"""The launch files that come with the project: their nodes exist and fit together."""
+
+from pathlib import Path
+
+import pytest
+
+from paramove.supervision import application
+from paramove.supervision.launch_file import load
+
+ROOT = Path(__file__).parents[2]
+LAUNCH_FILES = sorted(path.stem for path in (ROOT / "launch").glob("*.yaml"))
+
+
+def missing_modules(launch):
+    return [
+        node.module
+        for node in launch.file.nodes.values()
+        if not (ROOT / f"{node.module.replace('.', '/')}.py").exists()
+    ]
+
+
+@pytest.mark.parametrize("overlay", ["sim", "real"])
+@pytest.mark.parametrize("name", LAUNCH_FILES)
+def test_nodes_fit_together(name, overlay):
+    launch = load(ROOT / "launch", name, [overlay])
+    if missing := missing_modules(launch):
+        pytest.skip(f"to be written: {', '.join(missing)}")
+    application.check(launch, ROOT)
+
+
+def test_only_simulator_and_judge_get_the_truth():
+    launch = load(ROOT / "launch", "rule_learning", ["sim"])
+    assert {name for name, node in launch.file.nodes.items() if node.truth} == {"simulator", "judge"}
+
+
+def test_truth_is_nowhere_with_a_real_robot():
+    launch = load(ROOT / "launch", "rule_learning", ["real"])
+    assert not any(node.truth for node in launch.file.nodes.values())
+
+
+def test_recorder_ends_last_and_arm_first():
+    launch = load(ROOT / "launch", "rule_learning", ["sim"])
+    assert [name for name, node in launch.file.nodes.items() if node.stop == "first"] == ["arm_driver"]
+    assert launch.file.nodes["recorder"].stop == "last"
+
+
+def test_seed_goes_to_the_simulator_alone():
+    launch = load(ROOT / "launch", "rule_learning", ["sim"], seed=4711)
+    seeded = [name for name, node in launch.file.nodes.items() if node.parameters.get("seed") == 4711]
+    assert seeded == ["simulator"]
