@@ -174,7 +174,7 @@ class Instructor:
         yield from self._withdraw()
 
     def _show_rules(self, _: str) -> Script:
-        self._drop_what_is_held()
+        yield from self._empty_hand()
         for colour in tool_box.COLOURS:
             if not self._is_parked(colour):
                 yield from self._take_away(colour)
@@ -183,14 +183,14 @@ class Instructor:
             yield from self._show(tool_box.COLOURS[place])
 
     def _show_again(self, name: str) -> Script:
-        self._drop_what_is_held()
+        yield from self._empty_hand()
         if name not in self._opening:
             return
         yield from self._turn_box()
         yield from self._show(name)
 
     def _point(self, _: str) -> Script:
-        self._drop_what_is_held()
+        yield from self._empty_hand()
         if not self._arranged:
             self._arranged = True
             yield from self._arrange()
@@ -209,17 +209,19 @@ class Instructor:
         yield from self._withdraw()
 
     def _help(self, name: str) -> Script:
-        self._drop_what_is_held()
+        yield from self._empty_hand()
         if name not in self._opening:
             return
         self.doing = f"stands {name} up at another place"
-        others = [self._table.position(other)[:2] for other in tool_box.COLOURS if other != name and self._stands(other)]
+        others = [
+            self._table.position(other)[:2] for other in tool_box.COLOURS if other != name and self._stands(other)
+        ]
         yield from self._bring(name, places.draw_place(self._places, others))
         yield from self._withdraw()
 
     def _end(self, _: str) -> Script:
-        self._drop_what_is_held()
         self.finished = True
+        yield from self._empty_hand()
         yield from self._withdraw()
         self.doing = "has finished"
 
@@ -237,7 +239,9 @@ class Instructor:
         target = opening.centre + np.array((*self._paths.normal(0.0, 0.001, 2), 0.0))
         height = tool_box.CYLINDER_HALF_HEIGHT + SHOWN_LIFT
         yield self._move(self._tip_over(target, height), seconds=(1.0, 2.2), rise=False)
-        yield self._move(self._tip_over(target, tool_box.CYLINDER_HALF_HEIGHT - 0.010), seconds=(0.8, 1.2), straight=True)
+        yield self._move(
+            self._tip_over(target, tool_box.CYLINDER_HALF_HEIGHT - 0.010), seconds=(0.8, 1.2), straight=True
+        )
         yield from self._put_down()
         yield from self._withdraw()
         yield Step(1.5)
@@ -265,6 +269,10 @@ class Instructor:
     def _take_away(self, name: str) -> Script:
         self.doing = f"takes {name} away"
         yield from self._pick_up(name)
+        yield from self._park(name)
+
+    def _park(self, name: str) -> Script:
+        """Carry what is held to its place out of sight."""
         place = places.PARKED[tool_box.COLOURS.index(name)]
         yield self._move(self._tip_over(place, TRAVEL_Z - place[2]), seconds=(1.2, 2.6))
         yield self._move(self._tip_over(place, 0.0005), seconds=(0.7, 1.0), straight=True)
@@ -274,19 +282,19 @@ class Instructor:
     def _pick_up(self, name: str, lift: float | None = None) -> Script:
         """Grasp a cylinder by its top and lift it by `lift`, or to the height of travel; it hangs upright then."""
         top = self._top_of(name)
-        yield self._move(top + (0.0, 0.0, ABOVE), FROM_ABOVE, (1.0, 2.0))
+        yield self._move(_raised(top, ABOVE), FROM_ABOVE, (1.0, 2.0))
         yield self._move(self._top_of(name), FROM_ABOVE, (0.6, 0.9), straight=True)
         self._table.grasp(name)
         yield Step(0.1)
         rise = TRAVEL_Z - self._table.position(name)[2] if lift is None else lift
-        yield self._move(self._fingertip + (0.0, 0.0, max(0.0, rise)), seconds=(0.6, 1.0), straight=True, upright=True)
+        yield self._move(_raised(self._fingertip, max(0.0, rise)), seconds=(0.6, 1.0), straight=True, upright=True)
 
     def _put_down(self) -> Script:
         """Let go of what is held and raise the hand."""
         yield Step(0.1)
         self._table.release()
         yield Step(0.15)
-        yield self._move(self._fingertip + (0.0, 0.0, ABOVE), seconds=(0.5, 0.8), straight=True)
+        yield self._move(_raised(self._fingertip, ABOVE), seconds=(0.5, 0.8), straight=True)
 
     def _withdraw(self) -> Script:
         yield self._move(places.IDLE_FINGERTIP, AT_REST, (1.0, 1.8))
@@ -309,10 +317,13 @@ class Instructor:
         self._fingertip = front + offset
         self._table.move_hand(self._fingertip, self._backward)
 
-    def _drop_what_is_held(self) -> None:
-        """A new task begins: what is still held is let go where it is, as it stands in the robot's hand."""
-        if self._table.held_by_instructor is not None:
-            self._table.release()
+    def _empty_hand(self) -> Script:
+        """A new task begins: what is still held is put away."""
+        held = self._table.held_by_instructor
+        if held is not None:
+            self.doing = f"takes {held} away"
+            yield self._move(_raised(self._fingertip, ABOVE), seconds=(0.6, 0.9), straight=True)
+            yield from self._park(held)
 
     # -- moves and places -------------------------------------------------------------------------------------------
 
@@ -346,17 +357,17 @@ class Instructor:
         centre = self._table.position(name)
         standing = abs(self._height_over(centre)) < 0.004 or self._is_parked(name) or self._in_compartment(name)
         over = tool_box.CYLINDER_HALF_HEIGHT if standing else tool_box.CYLINDER_RADIUS
-        return np.asarray(centre + (0.0, 0.0, over))
+        return _raised(centre, over)
 
     def _tip_over(self, point: FloatArray, height: float) -> FloatArray:
         """Fingertip when the held cylinder's centre is `height` over `point`."""
-        return np.asarray(point + (0.0, 0.0, height + tool_box.CYLINDER_HALF_HEIGHT))
+        return _raised(point, height + tool_box.CYLINDER_HALF_HEIGHT)
 
     def _into_hand(self, above: float) -> FloatArray:
         """Fingertip when the held cylinder stands in the robot's open hand, or `above` it."""
         gripper, rotation = self._table.gripper()
         centre = gripper + ASIDE_IN_HAND * rotation[:, 1]
-        centre = centre + (*self._paths.normal(0.0, 0.001, 2), 0.0)
+        centre[:2] += self._paths.normal(0.0, 0.001, 2)
         centre[2] = gripper[2] - self._paths.uniform(0.007, 0.009)
         return self._tip_over(centre, above)
 
@@ -417,3 +428,7 @@ class Instructor:
         if not self._to_point:
             self._to_point = [left[place] for place in self._order.permutation(len(left))]
         return self._to_point.pop(0) if self._to_point else None
+
+
+def _raised(point: FloatArray, height: float) -> FloatArray:
+    return np.asarray(point + np.array((0.0, 0.0, height)))

@@ -110,9 +110,7 @@ def _compressed(image: RawImage, config: Config) -> CompressedImage:
     _, encoded = cv2.imencode(
         ".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality]
     )
-    return CompressedImage(
-        timestamp=image.timestamp, frame_id=image.frame_id, data=encoded.tobytes(), format="jpeg"
-    )
+    return CompressedImage(timestamp=image.timestamp, frame_id=image.frame_id, data=encoded.tobytes(), format="jpeg")
 
 
 if __name__ == "__main__":

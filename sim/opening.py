@@ -39,7 +39,7 @@ def wedges(radius: float, chamfer: float, depth: float, count: int = 16) -> list
 
 
 def lining(radius: float, chamfer: float, depth: float, count: int = 16) -> tuple[FloatArray, NDArray[np.int32]]:
-    """Visible inside of one opening: chamfer, wall and floor. Vertices [n, 3] and triangles [m, 3], seen from inside."""
+    """Visible inside of one opening: chamfer, wall, floor. Vertices [n, 3] and triangles [m, 3], seen from inside."""
     rings = np.array([_profile(2 * np.pi * k / count, radius, chamfer, depth, count) for k in range(count)])
     vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -depth]]])
     triangles = []
@@ -75,7 +75,7 @@ def cover(
     quads.append(_flat(row_x - TILE_HALF, row_x + TILE_HALF, edge, hy, hz))
     corners = np.concatenate(quads)
     first = 4 * np.arange(len(quads))[:, None]
-    triangles = np.concatenate([first + (0, 1, 2), first + (0, 2, 3)])
+    triangles = np.concatenate([first + np.array((0, 1, 2)), first + np.array((0, 2, 3))])
     return corners, triangles.astype(np.int32)
 
 

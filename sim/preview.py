@@ -1,6 +1,6 @@
 """Pictures of a seed's world at some moments of the story: what the camera sees, and the view for people.
 
-    MUJOCO_GL=egl python -m sim.preview --seed 3 --out preview.png
+    python -m sim.preview --seed 3 --out preview.png
 
 The robot rests in its base pose.
 """

@@ -143,14 +143,13 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> N
         width=32,
         height=192,
     )
-    spec.worldbody.add_geom(  # to look at: the robot hangs above it
+    spec.worldbody.add_geom(  # the robot hangs above it; what falls off the table stays on it
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=(0.0, 0.0, -0.36),
         size=(3.0, 3.0, 0.1),
         rgba=RGBA["floor"],
-        contype=0,
-        conaffinity=0,
+        **_touchable(),
     )
 
 
@@ -185,9 +184,7 @@ def _add_box(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
     _add_box_surfaces(spec, body, places_in_box)
 
 
-def _add_block(
-    body: Any, name: str, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]
-) -> None:
+def _add_block(body: Any, name: str, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> None:
     ends = np.array((x, y, z))
     body.add_geom(
         name=name,
@@ -248,7 +245,7 @@ def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None
 
 
 def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
-    """The instructor's hand. Origin: the tip of the pointing finger; z from there towards the wrist. Touches nothing."""
+    """The instructor's hand, which touches nothing. Origin: tip of the pointing finger; z from there to the wrist."""
     body = spec.worldbody.add_body(name="hand", mocap=True, pos=world_from_shoulder + places.IDLE_FINGERTIP)
     capsule, ellipsoid = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID
     looks_only = {"contype": 0, "conaffinity": 0, "mass": 0.0}

@@ -1,4 +1,4 @@
-"""Simulator: stands where the hardware stands. It is the light that falls on the camera's sensor and the robot's motors.
+"""Simulator: stands where the hardware stands. It is the light on the camera's sensor and the robot's motors.
 
 Hears   wire/hoap3/stream   StreamBatch         events  joint units
         speech              Speech              events
@@ -35,6 +35,8 @@ SAYS = (
     topics.TRUTH_STATE,
     topics.TRUTH_VIEW,
 )
+
+REPORT_S = 5
 
 _log = logging.getLogger(__name__)
 
@@ -88,7 +90,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
             ahead_s = simulation.world.time_s / config.pace - wall_s
             if ahead_s > 0:
                 bus.exchange.wait(ahead_s)
-        if barrier.tick % CAMERA_HZ == 0:
+        if barrier.tick % (REPORT_S * CAMERA_HZ) == 0:
             bus.ready(_sentence(simulation, wall_s))
     wall_s = time.perf_counter() - started_s
     barrier.close()

@@ -1,4 +1,4 @@
-"""Measures of the tool box and of the places on it, in the frame of the robot's right shoulder (x forward, y left, z up; m).
+"""Measures of the tool box, in the frame of the robot's right shoulder (x forward, y left, z up; m).
 
 The upper face of the box is the working plane. One side is closed, the other has four openings with compartments; the
 box turns about the x axis through its centre and is equally high either way up.

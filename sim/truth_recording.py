@@ -6,8 +6,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from google.protobuf.descriptor import FileDescriptor
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor import FileDescriptor  # type: ignore[import-untyped]
+from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
 from mcap.writer import CompressionType, Writer
 
 
@@ -43,7 +43,7 @@ class TruthRecording:
     def close(self) -> None:
         """Writes the index and closes the file."""
         if not self._file.closed:
-            self._writer.finish()
+            self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
     def __enter__(self) -> TruthRecording:

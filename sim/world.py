@@ -111,7 +111,7 @@ class World:
         return [self._watch.name_of(pair) for pair in self.contacts.present]
 
     def gripper(self) -> tuple[FloatArray, FloatArray]:
-        """Where the gripper is: position [3] and rotation [3, 3] (x along the forearm, y from the pads to the thumb)."""
+        """Where the gripper is: position [3], rotation [3, 3] (x along the forearm, y from the pads to the thumb)."""
         position = self.data.site_xpos[self._gripper] - self.world_from_shoulder
         return np.asarray(position), self.data.site_xmat[self._gripper].reshape(3, 3).copy()
 
@@ -210,7 +210,9 @@ class World:
             if kind not in kinds:
                 found.append(f"{kind.name.removeprefix('mjWARN_').lower()} ({place})")
                 continue
-            name = self.model.actuator(place).name if kind == mujoco.mjtWarning.mjWARN_BADCTRL else self._dof(kind, place)
+            name = (
+                self.model.actuator(place).name if kind == mujoco.mjtWarning.mjWARN_BADCTRL else self._dof(kind, place)
+            )
             found.append(f"{kinds[kind]} of {name} is not finite or larger than 1e10")
         return f"simulation stopped at {self.time_s:.3f} s: {'; '.join(found)}; nothing after it can be believed"
 
@@ -219,7 +221,9 @@ class World:
         joint = int(np.searchsorted(starts, place, side="right")) - 1
         within = place - int(starts[joint])
         kind_name = "qpos" if kind == mujoco.mjtWarning.mjWARN_BADQPOS else "dof"
-        return f"joint {self.model.joint(joint).name} ({kind_name} {place}" + (f", its part {within})" if within else ")")
+        return f"joint {self.model.joint(joint).name} ({kind_name} {place}" + (
+            f", its part {within})" if within else ")"
+        )
 
 
 def log_warnings_of_mujoco(say: Callable[[str], None] = _log.warning) -> None:
