@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def test_what_no_loop_asks_for_is_bounded_and_counted(speaker: Bus, listener: Bu
         wait(lambda wanted=wanted, gestures=gestures: gestures.messages == wanted, lambda: listener.exchange.wait(0.01))
         speaker.publish(topics.RULES, Rules())
         next(listener.events(topics.RULES))
-    next(listener.events(topics.RULES, tick=True))
+    list(itertools.islice(listener.events(topics.RULES, tick=True), 2))
     assert listener.dropped == {"gestures": 500}
 
 
@@ -124,6 +125,15 @@ def test_processing_time_is_that_between_message_and_return(speaker: Bus, listen
     events.close()
     assert listener._status.processed == 2
     assert listener._status.processing_ns > 0
+
+
+def test_idling_ends_no_earlier_than_asked_although_messages_arrive(speaker: Bus, listener: Bus) -> None:
+    for _ in range(10):
+        speaker.publish(topics.GESTURES, Gesture())
+    started_s = time.monotonic()
+    listener.idle(0.1)
+    assert time.monotonic() - started_s >= 0.1
+    assert len(list(itertools.islice(listener.events(topics.GESTURES), 10))) == 10
 
 
 def test_remaps_change_the_name_on_the_bus(folder: Path, wait: Wait) -> None:

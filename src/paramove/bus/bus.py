@@ -184,6 +184,15 @@ class Bus:
             self._turns.leave()
         self.exchange.close()
 
+    def idle(self, seconds: float) -> None:
+        """Does nothing for so long but what the bus needs: answers subscriptions, says the status, drains sockets.
+
+        For a process with a pace of its own, such as the simulator in real time. Ends early only if the bus is stopped.
+        """
+        end_s = time.monotonic() + seconds
+        while not self.stopped and (left_s := end_s - time.monotonic()) > 0:
+            self.exchange.wait(left_s)
+
     def read_up_to(self, marks: Marks, keep: bool = False) -> list[Heard]:
         """Waits for everything heard up to the marks; returns it in the order of publish time, then of HEARS.
 
