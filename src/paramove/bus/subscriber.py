@@ -157,11 +157,3 @@ class Subscriber:
         self.counter.refused[error.reason] += 1
         if self.counter.refused[error.reason] == 1:
             _log.warning("topic %s: message refused (%s): %s", self.name, error.reason.value, error)
-
-
-def drain(subscriber: Subscriber, limit: int) -> list[Heard]:
-    """Up to `limit` messages that are waiting, oldest first."""
-    found: list[Heard] = []
-    while len(found) < limit and (heard := subscriber.receive()) is not None:
-        found.append(heard)
-    return found
