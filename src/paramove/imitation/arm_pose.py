@@ -63,6 +63,11 @@ class ArmPoseSolver:
         self._forearm = float(np.hypot(along, aside))  # elbow to gripper site
 
     @property
+    def length(self) -> float:
+        """l = a + b, upper arm and forearm up to the gripper, m (5.2.3)."""
+        return self._upper_arm + self._along
+
+    @property
     def reach(self) -> tuple[float, float]:
         """Least and greatest distance of the gripper from the shoulder, m, by the elbow's limits."""
         bend = np.array([self._lower[3], min(self._upper[3], 0.0)])

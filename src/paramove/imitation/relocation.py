@@ -106,7 +106,8 @@ class RelocationPlanner:
         movement: The converted reaching movement.
         solver: Inverse kinematics of the arm.
         arm: The arm's joints and fingers.
-        base_angles: The arm's base pose, [5], rad; every motion starts or ends there or where the last one ended.
+        base_angles: Base pose of the five joints and the fingers, [6], rad; every motion starts or ends there or where
+            the last one ended.
         velocity: Largest speed of the five joints and the fingers, [6], rad/s.
         acceleration: Largest acceleration of them, [6], rad/s².
         options: Sizes.
@@ -126,7 +127,9 @@ class RelocationPlanner:
         self.options = options or RelocationOptions()
         self._velocity = np.asarray(velocity, dtype=np.float64)
         self._acceleration = np.asarray(acceleration, dtype=np.float64)
-        self._base = self._pose_of(np.asarray(base_angles, dtype=np.float64))
+        base = np.asarray(base_angles, dtype=np.float64)
+        self._base = self._pose_of(base[:5])
+        self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
     def fetch(self, target: ArrayLike, entry_height: float | None = None) -> PlannedMotion:
         """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5)."""
@@ -184,8 +187,9 @@ class RelocationPlanner:
         o, m = self.options, self.movement
         target = self.far_enough(target)
         states = m.poses(m.parameter_for(m.reach_state, target)[0])[: m.reach_state + 1]
-        opening = np.maximum(m.opening(states.finger_to_thumb), 0.0)
+        opening = m.opening(states.finger_to_thumb)
         n = len(states)
+        opening = opening + fade_in(n, n)[::-1] * (self._base_opening - opening[0])
         level = fade_in(n, o.level_states)
         opening = opening + fade_in(n, n) * (o.work_opening - opening)
         states = self._blended(states, o.blend_share)
@@ -203,7 +207,8 @@ class RelocationPlanner:
         states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
         opening_path = m.opening(states.finger_to_thumb)
         n = len(states)
-        opening_path = opening_path + fade_in(n, n)[::-1] * (o.work_opening - opening_path)
+        opening_path = opening_path + fade_in(n, n)[::-1] * (o.work_opening - opening_path[0])
+        opening_path = opening_path + fade_in(n, n) * (self._base_opening - opening_path[-1])
         level = fade_in(n, o.level_states)[::-1]
         backwards = self._blended(ArmPoses.from_stacked(states.stacked()[::-1]), o.blend_share)
         states = ArmPoses.from_stacked(backwards.stacked()[::-1])

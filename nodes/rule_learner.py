@@ -1,0 +1,56 @@
+"""Rule learner: calibrates the camera with the robot's own hand, watches the rules, and applies them.
+
+Hears   gestures             Gesture            event    pixels, and metres once calibrated
+        relocation/status    RelocationStatus   event
+Says    relocation/goal      RelocationGoal     event    right_shoulder
+        calibration/plane    PlaneCalibration   event    right_shoulder
+        rules                Rules              event    right_shoulder
+        application/stage    ApplicationStage   1 Hz
+        speech               Speech             event
+"""
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.rules.rule_learner import RuleLearner
+from paramove.rules.stage import RuleLearnerOptions
+from paramove.rules.table import Surface
+
+HEARS = (topics.GESTURES, topics.RELOCATION_STATUS)
+SAYS = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH)
+
+
+class Config(NodeConfig):
+    """Places in the right shoulder's frame, m."""
+
+    objects: tuple[str, ...] = ("yellow", "green", "blue")
+    corners: tuple[tuple[float, float], ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
+    offer: tuple[float, float, float] = (0.155, -0.02, -0.05)
+    grasp_z: float = -0.098
+    surface_x: tuple[float, float] = (0.100, 0.240)
+    surface_y: tuple[float, float] = (-0.170, 0.130)
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until all objects are put away or the bus closes."""
+    surface = Surface(config.surface_x, config.surface_y)
+    options = RuleLearnerOptions(config.objects, config.corners, config.offer, config.grasp_z, surface)
+    learner = RuleLearner(options, f"goal-{bus.now_ns}")
+    bus.ready("waiting for the arm")
+    for event in bus.events(*HEARS, tick=True):
+        if not isinstance(event, Tick):
+            hear = learner.on_gesture if event.topic is topics.GESTURES else learner.on_goal_status
+            hear(event.message)
+            continue
+        said = learner.tick(event.now_ns * 1e-9)
+        for topic, messages in zip(
+            SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech), strict=True
+        ):
+            for message in messages:
+                bus.publish(topic, message)
+        if learner.finished:
+            return
+        bus.ready(learner.sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

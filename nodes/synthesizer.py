@@ -1,0 +1,51 @@
+"""Synthesizer: turns relocation goals into trajectories of the learned reaching movement.
+
+Hears   relocation/goal         RelocationGoal          event   right_shoulder
+        arm/joint_states        foxglove.JointStates    15 Hz   rad
+        arm/trajectory_status   TrajectoryStatus        event
+Says    arm/trajectory          JointTrajectory         event   rad
+        relocation/status       RelocationStatus        event
+"""
+
+from pathlib import Path
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.imitation.setup import MovementSource, SurfaceParameters, synthesizer_for
+
+HEARS = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
+SAYS = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)
+
+
+class Config(NodeConfig):
+    """`robot`: folder of the description. `movement`: a model file, or the demonstrations to train from."""
+
+    robot: Path = Path("robot_description/hoap3")
+    side: str = "right"
+    movement: MovementSource = MovementSource()
+    surface: SurfaceParameters = SurfaceParameters()
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes."""
+    bus.starting("training or reading the reaching movement")
+    synthesizer = synthesizer_for(config.robot, config.side, config.movement, config.surface)
+    hear = {
+        topics.RELOCATION_GOAL: synthesizer.on_goal,
+        topics.ARM_JOINT_STATES: synthesizer.on_joint_states,
+        topics.ARM_TRAJECTORY_STATUS: synthesizer.on_trajectory_status,
+    }
+    bus.ready("waiting for a goal")
+    for event in bus.events(*HEARS, tick=True):
+        if not isinstance(event, Tick):
+            hear[event.topic](event.message)
+            continue
+        says = synthesizer.tick(event.now_ns)
+        for trajectory in says.trajectories:
+            bus.publish(topics.ARM_TRAJECTORY, trajectory)
+        for status in says.statuses:
+            bus.publish(topics.RELOCATION_STATUS, status)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

@@ -1,0 +1,66 @@
+"""A synthesizer put together from a robot's folder, a movement and a working surface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from platformdirs import user_cache_path
+from pydantic import BaseModel, ConfigDict
+
+from paramove.demonstrations.reaching import train_reaching_model
+from paramove.imitation.arm_pose import ArmPoseSolver
+from paramove.imitation.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.imitation.conversion import RobotMovement
+from paramove.imitation.relocation import RelocationPlanner
+from paramove.imitation.synthesizer import Synthesizer
+from paramove.phmm import InterpolativePHMM
+from paramove.robots.description import RobotDescription
+
+
+class MovementSource(BaseModel):
+    """Where the reaching movement comes from: `file`, or else the synthetic demonstrator's demonstrations (`seed`)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    file: Path | None = None
+    seed: int = 0
+
+    def model(self) -> InterpolativePHMM:
+        """The trained model; trained ones are kept in the user's cache folder."""
+        if self.file is not None:
+            return InterpolativePHMM.load(self.file)
+        cache = user_cache_path("paramove") / f"reaching_{self.seed}.npz"
+        cache.parent.mkdir(parents=True, exist_ok=True)
+        return train_reaching_model(self.seed, cache=cache)
+
+
+class SurfaceParameters(BaseModel):
+    """The working surface in the shoulder's frame, m, and the upright objects on it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    x: tuple[float, float] = (0.100, 0.240)
+    y: tuple[float, float] = (-0.170, 0.130)
+    z: float = -0.134
+    object_radius: float = 0.010
+    object_height: float = 0.050
+
+
+def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> Synthesizer:
+    """Everything that a synthesizer needs, from files."""
+    robot = RobotDescription.load(robot_folder)
+    arm = robot.arms[side]
+    solver = ArmPoseSolver(robot, arm)
+    converted = RobotMovement.from_model(movement.model(), solver.length)
+    joints = [*arm.indices, arm.fingers_index]
+    planner = RelocationPlanner(
+        converted,
+        solver,
+        arm,
+        robot.base_pose[joints],
+        robot.operating_velocity[joints],
+        robot.operating_acceleration[joints],
+    )
+    box = WorkSurface(surface.x, surface.y, surface.z)
+    cylinder = UprightCylinder(surface.object_radius, surface.object_height)
+    return Synthesizer(planner, ClearanceChecker(robot, side, box, cylinder))

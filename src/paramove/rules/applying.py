@@ -1,0 +1,135 @@
+"""Stage 3: the robot puts each object away that the instructor points at (thesis 5.2.6, step 4)."""
+
+from __future__ import annotations
+
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from paramove.rules.stage import Mind, Place, Stage, cm
+
+HAND_AWAY_S = 0.3
+HAND_PATIENCE_S = 6.0
+
+
+class Applying(Stage):
+    """States: waiting (for a pointing hand), letting_hand_leave, relocating, looking, helped."""
+
+    stage = ApplicationStage.STAGE_APPLY
+
+    def __init__(self, mind: Mind) -> None:
+        super().__init__(mind)
+        self._object = ""
+        self._source: Place = (0.0, 0.0)
+        self._attempt = 0
+
+    def enter(self) -> None:
+        """Ask the instructor to point."""
+        self._ask()
+
+    def on_gesture(self, gesture: Gesture) -> None:
+        """Remember who is pointed at while waiting for that."""
+        if gesture.kind == Gesture.KIND_POINTED_AT and self.state == "waiting":
+            self._pointed_at(gesture.object)
+
+    def step(self) -> ApplicationStage.Stage | None:
+        """One tick."""
+        steps = {
+            "waiting": self._waiting,
+            "letting_hand_leave": self._letting_hand_leave,
+            "relocating": self._relocating,
+            "looking": self._looking,
+            "helped": self._helped,
+        }
+        return steps[self.state]()
+
+    def _ask(self) -> None:
+        self.mind.tell("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
+        self.go("waiting")
+
+    def _waiting(self) -> None:
+        if self.for_s > self.mind.options.patience_s:
+            self._ask()
+
+    def _pointed_at(self, name: str) -> None:
+        place = self.mind.table.standing().get(name)
+        if name not in self.mind.rules or place is None:
+            self.mind.tell(f"You point at {name or 'something'}, but I do not know where it stands or belongs.")
+            return
+        self._object, self._source, self._attempt = name, place, 0
+        self.mind.tell(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.mind.rules[name])}.")
+        self.go("letting_hand_leave")
+
+    def _letting_hand_leave(self) -> None:
+        away = self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S
+        if away or self.for_s > HAND_PATIENCE_S:
+            self._relocate()
+
+    def _relocate(self) -> None:
+        self._attempt += 1
+        mind = self.mind
+        mind.errand.start(
+            RelocationGoal.KIND_RELOCATE,
+            mind.now_s,
+            self._object,
+            source=mind.goals.position(self._source),
+            target=mind.goals.position(mind.rules[self._object]),
+            avoid=mind.table.standing(but=self._object).values(),
+            attempt=self._attempt,
+        )
+        self.go("relocating")
+
+    def _relocating(self) -> None:
+        outcome = self.mind.errand.outcome
+        if outcome is None:
+            return
+        if outcome.state == RelocationStatus.STATE_REFUSED:
+            self._ask_for_help(f"I cannot do that: {outcome.reason}.")
+        else:
+            self.go("looking")
+
+    def _looking(self) -> ApplicationStage.Stage | None:
+        """The arm has left: is the object gone, or does it stand or lie somewhere?"""
+        if self.for_s < self.mind.options.settle_s:
+            return None
+        seen = self.mind.table.objects.get(self._object)
+        began_s = self.mind.errand.started_s
+        if self.mind.errand.succeeded and seen is not None and seen.kind == Gesture.KIND_VANISHED:
+            return self._put_away()
+        if seen is not None and seen.at_rest and seen.place is not None:
+            if self.mind.errand.succeeded and seen.time_s < began_s and self.for_s < 2 * self.mind.options.settle_s:
+                return None  # not seen since: the view is not settled yet
+            self._try_again(seen.place)
+            return None
+        if self.for_s > 3 * self.mind.options.settle_s:
+            self._ask_for_help(f"I have lost sight of {self._object}.")
+        return None
+
+    def _try_again(self, place: Place) -> None:
+        reason = self.mind.errand.outcome.reason if self.mind.errand.outcome else ""
+        if self._attempt >= self.mind.options.attempts:
+            self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
+            return
+        self._source = place
+        self.mind.tell(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
+        self._relocate()
+
+    def _ask_for_help(self, sentence: str) -> None:
+        self.mind.tell(f"{sentence} Please put it to another place.", Speech.REQUEST_HELP, self._object)
+        self.go("helped")
+
+    def _helped(self) -> None:
+        seen = self.mind.table.objects.get(self._object)
+        came = seen is not None and seen.at_rest and seen.time_s > self.mind.now_s - self.for_s
+        if came and self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S:
+            self._ask()
+        elif self.for_s > self.mind.options.patience_s:
+            self._ask_for_help(f"I still need help with {self._object}.")
+
+    def _put_away(self) -> ApplicationStage.Stage | None:
+        self.mind.done.add(self._object)
+        self.mind.tell(f"{self._object} is put away.")
+        if set(self.mind.options.objects) <= self.mind.done:
+            self.mind.tell("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
+            return ApplicationStage.STAGE_DONE
+        self._ask()
+        return None

@@ -1,0 +1,101 @@
+"""What the rule learner says: goals to the arm, requests to the instructor, and its beliefs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
+
+RESEND_S = 0.5
+_LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED}
+
+
+@dataclass
+class Outbox:
+    """Messages to be said at the end of this tick."""
+
+    goals: list[RelocationGoal] = field(default_factory=list)
+    speech: list[Speech] = field(default_factory=list)
+    calibrations: list[PlaneCalibration] = field(default_factory=list)
+    rules: list[Rules] = field(default_factory=list)
+    stages: list[ApplicationStage] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Goals:
+    """Where goals take place: the frame of positions and the height at which objects are grasped, m."""
+
+    frame: str
+    grasp_z: float
+
+    def position(self, place: tuple[float, float], above: float = 0.0) -> Position:
+        """A place on the working plane as a position of the gripper."""
+        return Position(x=place[0], y=place[1], z=self.grasp_z + above)
+
+
+class Errand:
+    """One goal after the other, each sent again until it is acknowledged.
+
+    Attributes:
+        grasps: How many times an object was to be grasped.
+        retries: How many of them were not the first try.
+    """
+
+    def __init__(self, goals: Goals, run_name: str) -> None:
+        self._goals, self._run_name = goals, run_name
+        self._count = 0
+        self._goal: RelocationGoal | None = None
+        self._status: RelocationStatus | None = None
+        self._sent_s = 0.0
+        self.started_s = 0.0
+        self.grasps = 0
+        self.retries = 0
+
+    def start(
+        self,
+        kind: RelocationGoal.Kind,
+        now_s: float,
+        name: str = "",
+        source: Position | None = None,
+        target: Position | None = None,
+        avoid: Iterable[tuple[float, float]] = (),
+        attempt: int = 1,
+    ) -> None:
+        """Set a goal; it is sent with the next `step`."""
+        self._count += 1
+        goal = RelocationGoal(
+            id=f"{self._run_name}-{self._count}", kind=kind, object=name, frame=self._goals.frame, attempt=attempt
+        )
+        if source is not None:
+            getattr(goal, "from").CopyFrom(source)
+        if target is not None:
+            goal.to.CopyFrom(target)
+        goal.avoid.extend(self._goals.position(place) for place in avoid)
+        self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
+        if kind == RelocationGoal.KIND_RELOCATE:
+            self.grasps += 1
+            self.retries += attempt > 1
+
+    def on_status(self, status: RelocationStatus) -> None:
+        """Hear how a goal fares."""
+        if self._goal is not None and status.goal_id == self._goal.id:
+            self._status = status
+
+    def step(self, now_s: float, outbox: Outbox) -> None:
+        """Send the goal, again if nobody acknowledged it."""
+        if self._goal is not None and self._status is None and now_s - self._sent_s >= RESEND_S:
+            outbox.goals.append(self._goal)
+            self._sent_s = now_s
+
+    @property
+    def outcome(self) -> RelocationStatus | None:
+        """The last status of the goal, None while it is being done."""
+        return self._status if self._status is not None and self._status.state in _LAST else None
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the goal has been done."""
+        return self.outcome is not None and self.outcome.state == RelocationStatus.STATE_SUCCEEDED
