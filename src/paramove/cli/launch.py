@@ -34,6 +34,7 @@ def launch(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
     headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
+    runs: Annotated[Path | None, typer.Option(help="where the run folder is made (default: runs/)")] = None,
     check: Annotated[bool, typer.Option("--check", help="check the launch file and its nodes, start nothing")] = False,
 ) -> None:
     """Run an application: start its nodes, keep them running, end them in order, judge the run.
@@ -42,11 +43,17 @@ def launch(
     78 the launch file is wrong; 124 time limit; 129, 130, 143 ended by a closed terminal, Ctrl-C, SIGTERM.
     Ctrl-C once ends the run in order, twice at once.
     """
-    raise typer.Exit(_launch(name, overlays, settings or [], seed, headless, check))
+    raise typer.Exit(_launch(name, overlays, settings or [], seed, headless, runs, check))
 
 
 def _launch(
-    name: str, overlays: list[str] | None, settings: list[str], seed: int | None, headless: bool, check_only: bool
+    name: str,
+    overlays: list[str] | None,
+    settings: list[str],
+    seed: int | None,
+    headless: bool,
+    runs: Path | None,
+    check_only: bool,
 ) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a sentence must not end a run where a letter is unknown
@@ -59,7 +66,7 @@ def _launch(
             application.check(loaded, workspace)
             console.print(f"{loaded.name}: {len(loaded.file.nodes)} nodes fit together")
             return exit_codes.OK
-        outcome, folder = application.run(loaded, workspace, lambda folder: _view(console, folder, headless))
+        outcome, folder = application.run(loaded, workspace, lambda folder: _view(console, folder, headless), runs)
     except (LaunchFileMissingError, FileNotFoundError) as error:
         errors.print(str(error))
         return exit_codes.INPUT_MISSING

@@ -37,13 +37,16 @@ def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
     return interfaces
 
 
-def run(launch: Launch, workspace: Path, make_view: Callable[[RunFolder], View]) -> tuple[Outcome, RunFolder]:
+def run(
+    launch: Launch, workspace: Path, make_view: Callable[[RunFolder], View], runs: Path | None = None
+) -> tuple[Outcome, RunFolder]:
     """Checks the launch file, makes the run folder and runs to the end.
 
     Args:
         launch: From `launch_file.load`.
-        workspace: Root of the workspace; the run folder is made in its `runs`.
+        workspace: Root of the workspace, working directory of the nodes.
         make_view: Gets the run folder, so that it can be shown.
+        runs: Where the run folder is made; default `runs` in the workspace.
 
     Raises LaunchFileError, DomainError (another run holds the domain) or OSError (run folder).
     """
@@ -51,7 +54,7 @@ def run(launch: Launch, workspace: Path, make_view: Callable[[RunFolder], View])
     name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     with held_domain(name, f"paramove launch {launch.name}") as domain:
         begun = datetime.datetime.now().astimezone()
-        folder = RunFolder.create(workspace / "runs", begun)
+        folder = RunFolder.create((runs or workspace / "runs").resolve(), begun)
         folder.write_effective(launch)
         folder.write_configs(launch, domain.folder, domain.truth_folder, clock_speaker(interfaces))
         facts = _facts(launch, workspace, domain.name, begun)

@@ -6,18 +6,23 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from paramove.bus.topics import CLOCK
-from paramove.supervision.interfaces import Interface, InterfaceError, read_interface
+from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch, nearest
 
 
 def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:
-    """Interface of every node; raises LaunchFileError at the `module` of the first that has none."""
+    """Interface of every node; raises LaunchFileError at the first `module` or `after_run` that does not exist."""
     interfaces = {}
     for name, node in launch.file.nodes.items():
         try:
             interfaces[name] = read_interface(node.module, workspace)
         except InterfaceError as error:
             raise launch.error(("nodes", name, "module"), str(error)) from error
+    if launch.file.after_run is not None:
+        try:
+            source_of(launch.file.after_run, workspace)
+        except InterfaceError as error:
+            raise launch.error(("after_run",), str(error)) from error
     return interfaces
 
 

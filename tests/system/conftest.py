@@ -1,0 +1,53 @@
+"""Runs the project's own launch files as a person does."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+WATCHING = str(Path(__file__).parent / "overlays" / "watching.yaml")
+
+
+class Launcher:
+    """`paramove launch` in a domain and with run folders of its own."""
+
+    def __init__(self, folder, runtime):
+        self.folder = folder
+        self.environment = os.environ | {"XDG_RUNTIME_DIR": runtime, "PARAMOVE_DOMAIN": "test"}
+        self.started = []
+
+    def start(self, *arguments):
+        command = [sys.executable, "-m", "paramove.cli.main", "launch", *arguments, "--runs", str(self.folder)]
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        self.started.append(subprocess.Popen(command, cwd=ROOT, env=self.environment, **options))
+        return self.started[-1]
+
+    def run(self, *arguments, timeout_s=120):
+        process = self.start(*arguments)
+        shown = process.communicate(timeout=timeout_s)[0]
+        return process.returncode, shown
+
+    @property
+    def latest(self):
+        return self.folder / "latest"
+
+    def truth(self):
+        return json.loads((self.latest / "truth.json").read_text())
+
+
+@pytest.fixture
+def launcher(tmp_path):
+    runtime = tempfile.mkdtemp(prefix="pm-", dir="/tmp")
+    made = Launcher(tmp_path, runtime)
+    yield made
+    for process in made.started:
+        if process.poll() is None:
+            process.terminate()
+        process.communicate()
+    shutil.rmtree(runtime)
