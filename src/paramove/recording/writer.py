@@ -1,0 +1,111 @@
+"""Recordings: MCAP files with protobuf schemas, which Foxglove, rerun and the mcap tools open unmodified.
+
+Chunks are small, so that a process that is killed loses little; the file bears the ending `.part` until it is finished.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from google.protobuf.descriptor import FileDescriptor  # type: ignore[import-untyped]
+from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
+from mcap.writer import CompressionType, Writer
+
+CHUNK_BYTES = 64 * 1024
+
+
+class RecordingExistsError(FileExistsError):
+    """A recording is never written over another."""
+
+
+class RecordingWriter:
+    """An MCAP file being written; finished by `close` or at the end of a `with` block.
+
+    Args:
+        path: Of the finished file.
+        library: What wrote it, for people.
+
+    Raises:
+        RecordingExistsError: There is a file of that name already.
+    """
+
+    def __init__(self, path: Path, library: str) -> None:
+        if path.exists():
+            raise RecordingExistsError(f"{path} exists; recordings are never overwritten: choose another name")
+        self.path = path
+        self._part = path.with_name(path.name + ".part")
+        self._file = self._part.open("wb")
+        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer.start(profile="", library=library)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+
+    def write(self, topic: str, message: Any, log_ns: int, publish_ns: int, sequence: int) -> None:
+        """Append a protobuf message.
+
+        Args:
+            topic: Name of its topic.
+            message: The message.
+            log_ns: Time by which the recording is ordered.
+            publish_ns: When it was said.
+            sequence: Of the publisher.
+        """
+        self._writer.add_message(
+            channel_id=self._channel(topic, message),
+            log_time=log_ns,
+            publish_time=publish_ns,
+            sequence=sequence % 2**32,
+            data=message.SerializeToString(deterministic=True),
+        )
+
+    def note(self, name: str, values: dict[str, str]) -> None:
+        """Add a metadata record."""
+        self._writer.add_metadata(name, values)
+
+    def close(self) -> None:
+        """Write the index, close the file and give it its name."""
+        if self._file.closed:
+            return
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._file.close()
+        self._part.rename(self.path)
+
+    def __enter__(self) -> RecordingWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _channel(self, topic: str, message: Any) -> int:
+        if topic not in self._channels:
+            descriptor = message.DESCRIPTOR
+            if descriptor.full_name not in self._schemas:
+                self._schemas[descriptor.full_name] = self._writer.register_schema(
+                    name=descriptor.full_name, encoding="protobuf", data=_schema_of(descriptor.file).SerializeToString()
+                )
+            self._channels[topic] = self._writer.register_channel(
+                topic=topic, message_encoding="protobuf", schema_id=self._schemas[descriptor.full_name]
+            )
+        return self._channels[topic]
+
+
+def _schema_of(file: FileDescriptor) -> FileDescriptorSet:
+    """The file of a message and every file it imports, imported ones first."""
+    found: dict[str, FileDescriptor] = {}
+
+    def add(one: FileDescriptor) -> None:
+        if one.name in found:
+            return
+        for needed in one.dependencies:
+            add(needed)
+        found[one.name] = one
+
+    add(file)
+    files = FileDescriptorSet()
+    for one in found.values():
+        one.CopyToProto(files.file.add())
+    return files
