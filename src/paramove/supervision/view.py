@@ -72,6 +72,7 @@ class TableView(LineView):
         self._live = Live(console=console, auto_refresh=False)
         self._live.start()
         self._gauges: dict[str, _Gauge] = {}
+        self._nodes: list[SupervisedNode] = []
         self._refreshed_s = 0.0
 
     def changed(self, node: SupervisedNode) -> None:
@@ -81,18 +82,20 @@ class TableView(LineView):
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
         """Draws the table anew, at most twice a second."""
+        self._nodes = list(nodes)
         now_s = time.monotonic()
         if self._closed or now_s - self._refreshed_s < REFRESH_S:
             return
         self._refreshed_s = now_s
         try:
-            self._live.update(self._table(nodes, now_s), refresh=True)
+            self._live.update(self._table(self._nodes, now_s), refresh=True)
         except OSError:
             self._closed = True
 
     def close(self) -> None:
         """Leaves the last table standing."""
         try:
+            self._live.update(self._table(self._nodes, time.monotonic()), refresh=True)
             self._live.stop()
         except OSError:
             self._closed = True
