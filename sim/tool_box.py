@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SURFACE_Z = -0.134  # the working plane
-X_RANGE = (0.075, 0.240)
+X_RANGE = (0.100, 0.240)
 Y_RANGE = (-0.170, 0.130)
 THICKNESS = 0.105
 FLOOR_THICKNESS = 0.005

@@ -1,0 +1,23 @@
+"""Worlds for the tests of the simulation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from paramove.robots.description import RobotDescription
+from sim.looks import Looks
+from sim.world import World
+
+ROBOT = Path(__file__).resolve().parents[2] / "robot_description" / "hoap3"
+
+
+@pytest.fixture(scope="session")
+def description() -> RobotDescription:
+    return RobotDescription.load(ROBOT)
+
+
+@pytest.fixture
+def world(description: RobotDescription) -> World:
+    return World(Looks.draw(0), description)
