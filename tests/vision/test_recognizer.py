@@ -148,7 +148,7 @@ def test_a_hand_that_stays_near_points_once() -> None:
 def test_after_leaving_the_hand_can_point_again() -> None:
     play = _resting(*THREE)
     for _ in range(2):
-        play.show(*_three(), hand_with_tip(190, 140), ticks=15).show(*_three(), hand_with_tip(*AWAY), ticks=5)
+        play.show(*_three(), hand_with_tip(190, 140), ticks=25).show(*_three(), hand_with_tip(*AWAY), ticks=5)
     assert play.kinds("blue").count("POINTED_AT") == 2
 
 
@@ -172,7 +172,7 @@ def test_the_hand_that_puts_an_object_down_does_not_point_at_it() -> None:
     play.show(standing("blue", 200, 150), hand_with_tip(190, 140), ticks=30)
     assert "POINTED_AT" not in play.kinds("blue")
     play.show(standing("blue", 200, 150), hand_with_tip(*AWAY), ticks=5)
-    play.show(standing("blue", 200, 150), hand_with_tip(190, 140), ticks=15)
+    play.show(standing("blue", 200, 150), hand_with_tip(190, 140), ticks=25)
     assert play.kinds("blue")[-1] == "POINTED_AT"
 
 

@@ -5,9 +5,7 @@ import pytest
 
 from paramove.msgs.gesture_pb2 import Gesture
 from tests.vision.scene import Look, Scene
-from tests.vision.stories import OPENING, Story, segment, show_rule
-
-RIM_RADIUS = 0.020  # an opening of 28 mm with a chamfer of 6 mm
+from tests.vision.stories import OPENING, RIM_RADIUS, Story, segment, show_rule
 
 
 @pytest.mark.parametrize(
@@ -39,7 +37,7 @@ def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
         for centre in segment((0.40, 0.20, 0.12), (x + 0.085, y, 0.055), 20):
             scene.put("hand", tuple(centre))
             story.step()
-        story.step(12)
+        story.step(22)
     pointed = [g for g in story.gestures if g.kind == Gesture.KIND_POINTED_AT]
     assert [g.object for g in pointed] == ["green"]
     assert np.hypot(pointed[0].x - x, pointed[0].y - y) < 0.003

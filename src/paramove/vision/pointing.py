@@ -24,20 +24,20 @@ class PointingThresholds:
     """When a hand points at an object.
 
     Attributes:
-        near: Distance of fingertip and object, m: objects stand 50 mm apart or more, and a finger that comes from
-            outside stays well on its own side of the middle.
+        near: Distance of fingertip and object's axis, m: a finger that points ends about 1 cm from the object's side,
+            and objects stand 5 cm apart or more.
         near_px: The same while there is no calibration, at about 1.4 mm per px.
         clearer_by: The second closest object must be farther by this share of `near`.
-        hold_s: How long: a hand that passes by is near for less.
+        hold_s: How long: a hand that passes by, or lets go of one object beside another, stays for up to 0.7 s.
         still: The fingertip stays within this share of `near` meanwhile.
         away: The hand has left beyond this multiple of `near`.
         gap_s: Such a gap in the view of the hand is a flicker.
     """
 
-    near: float = 0.035
+    near: float = 0.028
     near_px: float = 25.0
     clearer_by: float = 0.25
-    hold_s: float = 0.6
+    hold_s: float = 1.2
     still: float = 0.45
     away: float = 1.3
     gap_s: float = 0.15

@@ -24,13 +24,13 @@ class RecognizerOptions:
     Attributes:
         rim_clearance: Horizontal gap between the lower border of a standing object and an opening's near rim, m.
             A sinking object is first cut off by that rim, so it is seen this much nearer to the camera than it is.
-            For a cylinder of 20 mm in an opening of 28 mm with a chamfer of 6 mm: 20 mm - 10 mm, and 1 mm as borders
-            are measured at half of the width, where the cylinder's front is rounder than the rim.
+            Cylinder of 20 mm, opening of 28 mm with a chamfer of 6 mm at 45 degrees, seen from 52 degrees above the
+            plane: the chamfer's lower end cuts, seen on the plane at 14 mm + 6 mm / tan 52 degrees; less the radius of 10 mm.
     """
 
     motion: MotionThresholds = field(default_factory=MotionThresholds)
     pointing: PointingThresholds = field(default_factory=PointingThresholds)
-    rim_clearance: float = 0.011
+    rim_clearance: float = 0.0087
 
 
 class Recognizer:

@@ -25,6 +25,8 @@ LEAST_HEIGHT_SHARE = 0.1
 """Below this share of the height before sinking, the border is scatter."""
 LAST_SAMPLES = 20
 """A second and a half: longer than any lowering into an opening."""
+LOWERED_PX = 6.0
+"""An object that came down this far in one place and is gone then has gone into an opening, falling between images."""
 STEEPEST_AXIS = 0.15
 """Largest du/dv of a standing object's axis: the camera's roll of 6 degrees and the perspective at the image's side."""
 
@@ -110,13 +112,20 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> Las
     carried_px = median(heights[len(heights) // 2 :])  # less than the full height where a hand holds the upper end
     seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * carried_px] or [samples[-1]]
     on_rim = _on_rim(seen)
-    sunk = min(samples[-1].height_px, *(s.height_px for s in on_rim)) < SHRUNK_SHARE * carried_px
+    shrunk = min(samples[-1].height_px, *(s.height_px for s in on_rim)) < SHRUNK_SHARE * carried_px
+    sunk = shrunk or _came_down(seen[-LAST_SAMPLES:])
     on_rim = on_rim if sunk else seen[-1:]
     bottom_px = median(s.bottom_px for s in on_rim)
     at_place = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
     middle_px = bottom_px - at_place.lower_px
     u_px = _on_axis(seen[-len(on_rim) - 8 :], on_rim, middle_px)
-    return LastPlace(u_px, middle_px, sunk, confidence=1.0 if sunk and len(on_rim) > 1 else 0.7)
+    return LastPlace(u_px, middle_px, sunk, confidence=1.0 if shrunk and len(on_rim) > 1 else 0.7)
+
+
+def _came_down(recent: Sequence[Sample]) -> bool:
+    """Whether the object was lowered where it was last seen."""
+    there = [s.bottom_px for s in recent if abs(s.u_px - recent[-1].u_px) <= 2 * BORDER_PX]
+    return recent[-1].bottom_px - min(there) > LOWERED_PX
 
 
 def _on_rim(seen: Sequence[Sample]) -> list[Sample]:
