@@ -22,7 +22,7 @@ from pydantic import Field
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
-from sim.truth_recording import TruthRecording
+from paramove.recording.writer import RecordingWriter
 from sim.verdict import Verdict
 
 HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
@@ -46,7 +46,7 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then write the verdict."""
     cv2.setNumThreads(1)
-    recording = TruthRecording(bus.run_folder / "truth.mcap") if config.record else None
+    recording = RecordingWriter(bus.run_folder / "truth.mcap", "paramove judge") if config.record else None
     judge = Judge(bus.run_folder / "truth.json")
     bus.ready("waits for the truth")
     try:
@@ -59,7 +59,7 @@ def run(bus: Bus, config: Config) -> None:
                     bus.ready(sentence)
             if recording is not None:
                 kept = _compressed(heard.message, config) if heard.topic is topics.TRUTH_VIEW else heard.message
-                recording.write(heard.topic.name, kept, heard.captured_ns)
+                recording.write(heard.topic.name, kept, heard.captured_ns, heard.published_ns, heard.sequence)
     finally:
         judge.write()
         if recording is not None:

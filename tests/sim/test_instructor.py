@@ -62,7 +62,7 @@ def test_hands_over_an_object_below_the_gripper_and_lets_go(seed: int) -> None:
     assert_allclose(below[:2], (0.0, -0.004), rtol=0, atol=0.004)  # 1 mm of noise, towards the thumb
     assert story.instructor.doing == f"holds {held} in the robot's hand"
 
-    story.table.gripper_position = story.table.gripper_position + np.array((0.01, 0.02, 0.0))
+    story.table.gripper_position = story.table.gripper_position + np.array((0.005, 0.010, 0.0))
     story.ask(Speech.REQUEST_HAND_ME_AN_OBJECT)
     assert story.run() < 2.0
     below = story.table.gripper_position - story.table.position(held)
