@@ -2,7 +2,7 @@
 
     python benchmarks/simulator.py [--ticks 150]
 
-Prints milliseconds per camera period for the physics (67 steps with firmware, stream and instructor), the camera's image
+Prints milliseconds per period for the physics (67 steps with firmware, stream and instructor), the camera's image
 and the view for people, and how many times faster than real time that is. Goal: below 20 ms with the camera.
 """
 
