@@ -28,7 +28,6 @@ ABOVE = 0.07  # the fingertip waits so far above a top
 TRAVEL_Z = tool_box.SURFACE_Z + 0.085  # centre of a carried cylinder: over standing ones
 SHOWN_LIFT = 0.025
 ASIDE_IN_HAND = 0.004  # from the gripper's centre towards the thumb: between pads and open thumb
-FAR_FROM_HAND = 0.02  # a held cylinder so far from its place in the robot's hand is brought there from above
 POINTING_S = 4.0
 
 
@@ -162,11 +161,10 @@ class Instructor:
             held = name or self._to_hand_over()
             self.doing = f"fetches {held}"
             yield from self._pick_up(held)
-        elif np.linalg.norm(self._into_hand(0.0) - self._fingertip) > FAR_FROM_HAND:
+        else:  # asked again: out of the hand and in anew, which also shows the robot that something happens
             yield self._move(_raised(self._fingertip, ABOVE), seconds=(0.6, 0.9), straight=True)
-        if np.linalg.norm(self._into_hand(0.0) - self._fingertip) > FAR_FROM_HAND:
-            self.doing = f"brings {held} to the robot's hand"
-            yield self._move(self._into_hand(0.09), seconds=(1.2, 2.4))
+        self.doing = f"brings {held} to the robot's hand"
+        yield self._move(self._into_hand(ABOVE), seconds=(1.0, 2.4))
         self.doing = f"holds {held} in the robot's hand"
         yield self._move(self._into_hand(0.0), seconds=(1.0, 1.5), straight=True)
 
