@@ -106,6 +106,7 @@ def test_vanished_where_it_stood_at_full_height(step: float, cut_above: float, u
     play = _resting(("blue", 100, 150))
     for place in line((100, 150), (u, v - 40), 15):
         play.show(standing("blue", *place, cut_above=cut_above))
+    play.show(standing("blue", u, v - 40, cut_above=cut_above), ticks=3)  # people stop before they change direction
     _sink(play, u, v, step, cut_above)
     play.show(ticks=12)
     assert play.kinds("blue") == ["APPEARED", "MOVED", "VANISHED"]

@@ -29,7 +29,7 @@ class PointingThresholds:
         near_px: The same while there is no calibration, at about 1.4 mm per px.
         clearer_by: The second closest object must be farther by this share of `near`.
         hold_s: How long: a hand that passes by, or lets go of one object beside another, stays for up to 0.7 s.
-        still: The fingertip stays within this share of `near` meanwhile.
+        still: The palm stays within this share of `near` meanwhile (the fingertip jumps to a knuckle at times).
         away: The hand has left beyond this multiple of `near`.
         gap_s: Such a gap in the view of the hand is a flicker.
     """
@@ -56,7 +56,7 @@ class Pointing:
         self._candidate: str | None = None
         self._since_s = 0.0
         self._last_near_s = 0.0
-        self._tip_then: Point | None = None
+        self._palm_then: Point | None = None
 
     def update(
         self,
@@ -81,16 +81,16 @@ class Pointing:
         if nearest is None:
             self._forget_after_gap(now_s)
             return None
-        return self._hold(nearest, _fingertip(hand, resting[nearest]), now_s, resting[nearest], homography)
+        return self._hold(nearest, np.array([hand.u_px, hand.v_px]), now_s, resting[nearest], homography)
 
     def _hold(
-        self, name: str, tip: Point, now_s: float, place: Sample, homography: PlaneHomography | None
+        self, name: str, palm: Point, now_s: float, place: Sample, homography: PlaneHomography | None
     ) -> str | None:
-        moved = self._tip_then is not None and (
-            np.linalg.norm(tip - self._tip_then) / self._near_px(place, homography) > self._limits.still
+        moved = self._palm_then is not None and (
+            np.linalg.norm(palm - self._palm_then) / self._near_px(place, homography) > self._limits.still
         )
         if name != self._candidate or moved:
-            self._candidate, self._since_s, self._tip_then = name, now_s, tip
+            self._candidate, self._since_s, self._palm_then = name, now_s, palm
         self._last_near_s = now_s
         if name not in self._free or now_s - self._since_s + 1e-6 < self._limits.hold_s:
             return None
@@ -99,7 +99,7 @@ class Pointing:
 
     def _forget_after_gap(self, now_s: float) -> None:
         if now_s - self._last_near_s > self._limits.gap_s:
-            self._candidate = self._tip_then = None
+            self._candidate = self._palm_then = None
 
     def _clearly_nearest(self, distances: Mapping[str, float]) -> str | None:
         """The closest object if it is near and no other is about as close."""

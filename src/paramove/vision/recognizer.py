@@ -25,7 +25,8 @@ class RecognizerOptions:
         rim_clearance: Horizontal gap between the lower border of a standing object and an opening's near rim, m.
             A sinking object is first cut off by that rim, so it is seen this much nearer to the camera than it is.
             Cylinder of 20 mm, opening of 28 mm with a chamfer of 6 mm at 45 degrees, seen from 52 degrees above the
-            plane: the chamfer's lower end cuts, seen on the plane at 14 mm + 6 mm / tan 52 degrees; less the radius of 10 mm.
+            plane: the chamfer's lower end cuts, which on the plane is seen at 14 mm + 6 mm / tan 52 degrees; less the
+            radius of 10 mm.
     """
 
     motion: MotionThresholds = field(default_factory=MotionThresholds)

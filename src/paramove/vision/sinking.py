@@ -27,8 +27,10 @@ LAST_SAMPLES = 20
 """A second and a half: longer than any lowering into an opening."""
 LOWERED_PX = 6.0
 """An object that came down this far in one place and is gone then has gone into an opening, falling between images."""
-STEEPEST_AXIS = 0.15
-"""Largest du/dv of a standing object's axis: the camera's roll of 6 degrees and the perspective at the image's side."""
+STEEPEST_AXIS = 0.6
+"""Largest du/dv of a standing object's axis: a near camera looking down sees axes lean by 0.4 at its sides."""
+ASIDE_PX = 8.0
+"""u of an object's visible part changes by less than this while it sinks along a leaning axis."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> Las
 
 def _came_down(recent: Sequence[Sample]) -> bool:
     """Whether the object was lowered where it was last seen."""
-    there = [s.bottom_px for s in recent if abs(s.u_px - recent[-1].u_px) <= 2 * BORDER_PX]
+    there = [s.bottom_px for s in recent if abs(s.u_px - recent[-1].u_px) <= ASIDE_PX]
     return recent[-1].bottom_px - min(there) > LOWERED_PX
 
 
@@ -133,7 +135,7 @@ def _on_rim(seen: Sequence[Sample]) -> list[Sample]:
     on_rim = [seen[-1]]
     for sample in reversed(seen[:-1]):
         lifted = abs(sample.bottom_px - median(s.bottom_px for s in on_rim)) > BORDER_PX
-        if lifted or abs(sample.u_px - seen[-1].u_px) > 2 * BORDER_PX:
+        if lifted or abs(sample.u_px - seen[-1].u_px) > ASIDE_PX:
             break
         on_rim.append(sample)
     return on_rim[::-1]
@@ -143,7 +145,7 @@ def _on_axis(recent: Sequence[Sample], on_rim: Sequence[Sample], v_px: float) ->
     """u at height v of the image line along which the object came down: its own axis, as it stands upright."""
     u0, v0 = median(s.u_px for s in on_rim), median(s.v_px for s in on_rim)
     du, dv = np.array([s.u_px - u0 for s in recent]), np.array([s.v_px - v0 for s in recent])
-    steep = np.abs(du) > 2 + 2 * STEEPEST_AXIS * np.abs(dv)  # still carried sideways
+    steep = np.abs(du) > 3 + 1.2 * STEEPEST_AXIS * np.abs(dv)  # still carried sideways
     slope = float(du[~steep] @ dv[~steep]) / (float(dv[~steep] @ dv[~steep]) + 10.0**2)
     return u0 + float(np.clip(slope, -STEEPEST_AXIS, STEEPEST_AXIS)) * (v_px - v0)
 
