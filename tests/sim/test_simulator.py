@@ -1,0 +1,90 @@
+"""The simulator's loop on a real bus, and the judge's file."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from paramove.bus import topics
+from paramove.bus.bus import Bus
+from paramove.bus.settings import BusSettings
+from paramove.robots.description import RobotDescription
+from sim import judge, simulator
+from sim.judge import Judge
+from sim.simulation import Simulation
+from sim.truth import layout, state
+from sim.world import SimulationError
+from tests.sim.conftest import ROBOT
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="pm", dir="/tmp") as path:  # paths of sockets are short
+        yield Path(path)
+
+
+def _bus(folder: Path) -> Bus:
+    for name in ("bus", "truth"):
+        (folder / name).mkdir(mode=0o700)
+    settings = BusSettings(folder=folder / "bus", truth_folder=folder / "truth", clock="simulated")
+    return Bus("simulator", settings, simulator.HEARS, simulator.SAYS, folder)
+
+
+def test_runs_to_its_longest_duration_and_says_every_topic_at_15_hz(folder: Path) -> None:
+    with _bus(folder) as bus:
+        simulator.run(bus, simulator.Config(seed=1, robot=ROBOT, camera=False, max_duration_s=1.0, pace=1000.0))
+        said = {name: publisher.sequence for name, publisher in bus.exchange.publishers.items()}
+    assert said["clock"] == said["truth/state"] == said["wire/hoap3/state"] == 15
+    assert said["truth/layout"] == 1
+    assert said["camera/light"] == said["truth/view"] == 0
+    assert bus.now_ns == 934_000_000  # of the newest beat
+
+
+def test_a_state_that_is_not_finite_is_never_published(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(self: Simulation, tick: int) -> None:
+        if tick == 4:
+            raise SimulationError("velocity of joint right_elbow is not finite")
+
+    monkeypatch.setattr(Simulation, "run_to_tick", fail)
+    with _bus(folder) as bus:
+        with pytest.raises(SimulationError, match="right_elbow"):
+            simulator.run(bus, simulator.Config(robot=ROBOT, camera=False, max_duration_s=1.0, pace=1000.0))
+        assert bus.exchange.publishers["truth/state"].sequence == 4
+
+
+@pytest.mark.parametrize("parameters", [{"seed": -1}, {"pace": 0.0}, {"max_duration_s": -1.0}, {"sed": 1}])
+def test_wrong_parameters_are_refused(parameters: dict[str, float]) -> None:
+    with pytest.raises(ValidationError):
+        simulator.Config.model_validate(parameters)
+
+
+def test_only_evaluators_hear_of_the_truth() -> None:
+    assert all(topic.truth for topic in judge.HEARS)
+    assert judge.SAYS == ()
+    assert topics.TRUTH_STATE not in simulator.HEARS
+
+
+def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> None:
+    simulation = Simulation(3, RobotDescription.load(ROBOT), camera=False)
+    file = folder / "truth.json"
+    found = Judge(file)
+    assert not found.write()["success"]
+    with pytest.raises(RuntimeError, match="layout first"):
+        found.take(state(simulation))
+    found.begin(layout(simulation))
+    sentences = []
+    for tick in range(1, judge.RENEW_STATES + 1):
+        simulation.run_to_tick(min(tick, 5))
+        sentences.append(found.take(state(simulation)))
+    assert sentences[-1] == "0 of 3 objects rest where the robot should put them"
+    assert not any(sentences[:-1])
+    summary = json.loads(file.read_text(encoding="utf-8"))
+    assert summary["seed"] == 3
+    assert summary["unwanted_contacts"] == 0
+    assert set(summary["objects"]) == {"yellow", "green", "blue"}
+    assert summary["realtime_factor"] > 0
