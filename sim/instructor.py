@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,33 +16,18 @@ from numpy.typing import NDArray
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.hand_path import HandPath, minimum_jerk, natural_bulge
+from sim.sights import Sights, Table
 
 FloatArray = NDArray[np.float64]
 
 FROM_ABOVE = np.array((0.20, -0.50, 0.84))  # backward direction of the hand that holds something by its top
 AT_REST = np.array((0.20, -0.80, 0.55))
-POINTING = np.array((0.84, -0.38, 0.38))
 BOX_PULLED, BOX_LIFTED = 0.26, 0.13  # m: away from the robot's arm before it is turned
 ABOVE = 0.07  # the fingertip waits so far above a top
 TRAVEL_Z = tool_box.SURFACE_Z + 0.085  # centre of a carried cylinder: over standing ones
 SHOWN_LIFT = 0.025
 ASIDE_IN_HAND = 0.004  # from the gripper's centre towards the thumb: between pads and open thumb
 POINTING_S = 4.0
-
-
-class Table(Protocol):
-    """What the instructor sees and moves; `sim.world.World` is one. Right shoulder's frame."""
-
-    held_by_instructor: str | None
-
-    def position(self, name: str) -> FloatArray: ...
-    def gripper(self) -> tuple[FloatArray, FloatArray]: ...
-    def openings_up(self) -> bool: ...
-    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None: ...
-    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None: ...
-    def grasp(self, name: str) -> None: ...
-    def straighten(self, share: float) -> None: ...
-    def release(self) -> None: ...
 
 
 @dataclass
@@ -82,6 +66,7 @@ class Instructor:
         self._table = table
         openings = {item.name: item for item in tool_box.OPENINGS}
         self._opening = {colour: openings[name] for colour, name in rules.items()}
+        self._sees = Sights(table, self._opening)
         self._places, self._order, self._paths = draws["places"], draws["order"], draws["paths"]
         self._fingertip = places.IDLE_FINGERTIP.copy()
         self._backward = AT_REST
@@ -178,7 +163,7 @@ class Instructor:
     def _show_rules(self, _: str) -> Script:
         yield from self._empty_hand()
         for colour in tool_box.COLOURS:
-            if not self._is_parked(colour):
+            if not self._sees.is_parked(colour):
                 yield from self._take_away(colour)
         yield from self._turn_box()
         for place in self._order.permutation(len(tool_box.COLOURS)):
@@ -202,7 +187,7 @@ class Instructor:
             yield Step(1.0)
             return
         self.doing, self.pointed_at = f"points at {name}", name
-        fingertip, backward = self._pointing_pose(name)
+        fingertip, backward = self._sees.pointing_pose(name, self._paths)
         yield self._move(fingertip + 0.05 * backward / np.linalg.norm(backward), backward, (1.0, 2.0))
         yield self._move(fingertip, backward, (0.5, 0.8), straight=True)
         self._acknowledged = False
@@ -216,7 +201,7 @@ class Instructor:
             return
         self.doing = f"stands {name} up at another place"
         others = [
-            self._table.position(other)[:2] for other in tool_box.COLOURS if other != name and self._stands(other)
+            self._table.position(other)[:2] for other in tool_box.COLOURS if other != name and self._sees.stands(other)
         ]
         yield from self._bring(name, places.draw_place(self._places, others))
         yield from self._withdraw()
@@ -231,7 +216,7 @@ class Instructor:
 
     def _show(self, name: str) -> Script:
         self.doing = f"shows {name} in view"
-        if not self._stands(name):
+        if not self._sees.stands(name):
             yield from self._bring(name, places.draw_place(self._places, []))
             yield from self._withdraw()
             yield Step(1.5)
@@ -250,7 +235,7 @@ class Instructor:
 
     def _arrange(self) -> Script:
         for colour in tool_box.COLOURS:
-            if self._stands(colour):
+            if self._sees.stands(colour):
                 yield from self._take_away(colour)
         layout, _ = places.draw_layout(self._places, len(tool_box.COLOURS))
         for place in self._order.permutation(len(tool_box.COLOURS)):
@@ -283,9 +268,9 @@ class Instructor:
 
     def _pick_up(self, name: str, lift: float | None = None) -> Script:
         """Grasp a cylinder by its top and lift it by `lift`, or to the height of travel; it hangs upright then."""
-        top = self._top_of(name)
+        top = self._sees.top_of(name)
         yield self._move(_raised(top, ABOVE), FROM_ABOVE, (1.0, 2.0))
-        yield self._move(self._top_of(name), FROM_ABOVE, (0.6, 0.9), straight=True)
+        yield self._move(self._sees.top_of(name), FROM_ABOVE, (0.6, 0.9), straight=True)
         self._table.grasp(name)
         yield Step(0.1)
         rise = TRAVEL_Z - self._table.position(name)[2] if lift is None else lift
@@ -354,13 +339,6 @@ class Instructor:
 
         return Step(duration_s, during)
 
-    def _top_of(self, name: str) -> FloatArray:
-        """Fingertip on top of a cylinder, standing or lying."""
-        centre = self._table.position(name)
-        standing = abs(self._height_over(centre)) < 0.004 or self._is_parked(name) or self._in_compartment(name)
-        over = tool_box.CYLINDER_HALF_HEIGHT if standing else tool_box.CYLINDER_RADIUS
-        return _raised(centre, over)
-
     def _tip_over(self, point: FloatArray, height: float) -> FloatArray:
         """Fingertip when the held cylinder's centre is `height` over `point`."""
         return _raised(point, height + tool_box.CYLINDER_HALF_HEIGHT)
@@ -373,59 +351,18 @@ class Instructor:
         centre[2] = gripper[2] - self._paths.uniform(0.007, 0.009)
         return self._tip_over(centre, above)
 
-    def _pointing_pose(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Fingertip beside the upper third of a cylinder, on the camera's side, as far as may be from the others."""
-        centre = self._table.position(name)
-        distance = tool_box.CYLINDER_RADIUS + 0.0075 + self._paths.uniform(0.008, 0.012)
-        others = [self._table.position(other)[:2] for other in tool_box.COLOURS if other != name]
-        best, best_gap = np.zeros(3), -1.0
-        for azimuth in np.deg2rad(np.arange(-50.0, -27.0, 4.0)):
-            ahead = np.array((np.cos(azimuth), np.sin(azimuth), 0.0))
-            gap = min(float(np.linalg.norm((centre + distance * ahead)[:2] - other)) for other in others)
-            if gap > best_gap:
-                best, best_gap = ahead, gap
-        fingertip = centre + distance * best
-        fingertip[2] = tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT * self._paths.uniform(0.66, 0.80)
-        return fingertip, POINTING
-
-    # -- what the person sees ---------------------------------------------------------------------------------------
-
-    def _height_over(self, centre: FloatArray) -> float:
-        """How far a centre lies over that of a cylinder that stands on the working plane."""
-        return float(centre[2] - tool_box.SURFACE_Z - tool_box.CYLINDER_HALF_HEIGHT)
-
-    def _stands(self, name: str) -> bool:
-        """Whether the cylinder is on the working plane (standing or lying), not in a compartment and not parked."""
-        centre = self._table.position(name)
-        over_box = all(
-            low <= value <= high
-            for value, (low, high) in zip(centre, (tool_box.X_RANGE, tool_box.Y_RANGE), strict=False)
-        )
-        return over_box and centre[2] > tool_box.SURFACE_Z + 0.5 * tool_box.CYLINDER_RADIUS
-
-    def _in_compartment(self, name: str) -> bool:
-        centre = self._table.position(name)
-        return centre[2] < tool_box.SURFACE_Z and any(
-            np.hypot(centre[0] - item.x, centre[1] - item.y) < tool_box.OPENING_RADIUS for item in tool_box.OPENINGS
-        )
-
-    def _is_parked(self, name: str) -> bool:
-        place = places.PARKED[tool_box.COLOURS.index(name)]
-        return bool(np.linalg.norm(self._table.position(name) - place) < 0.02)
-
-    def _is_done(self, name: str) -> bool:
-        centre, opening = self._table.position(name), self._opening[name]
-        near = np.hypot(centre[0] - opening.x, centre[1] - opening.y) < tool_box.OPENING_RADIUS
-        return bool(near and centre[2] + tool_box.CYLINDER_HALF_HEIGHT < tool_box.SURFACE_Z)
+    # -- what to take next --------------------------------------------------------------------------------------------
 
     def _to_hand_over(self) -> str:
         """A cylinder on the box if there is one, else a parked one."""
-        on_box = [colour for colour in tool_box.COLOURS if self._stands(colour)]
-        candidates = on_box or [colour for colour in tool_box.COLOURS if self._is_parked(colour)] or tool_box.COLOURS
+        on_box = [colour for colour in tool_box.COLOURS if self._sees.stands(colour)]
+        candidates = (
+            on_box or [colour for colour in tool_box.COLOURS if self._sees.is_parked(colour)] or tool_box.COLOURS
+        )
         return candidates[int(self._order.integers(len(candidates)))]
 
     def _next_to_point(self) -> str | None:
-        left = [colour for colour in tool_box.COLOURS if not self._is_done(colour)]
+        left = [colour for colour in tool_box.COLOURS if not self._sees.is_done(colour)]
         self._to_point = [colour for colour in self._to_point if colour in left]
         if not self._to_point:
             self._to_point = [left[place] for place in self._order.permutation(len(left))]

@@ -1,0 +1,96 @@
+"""What the instructor sees of the table: the truth, as a person would put it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import places, tool_box
+from sim.tool_box import Opening
+
+FloatArray = NDArray[np.float64]
+
+POINTING = np.array((0.84, -0.38, 0.38))  # backward direction of the pointing hand: its owner sits at the far side
+
+
+class Table(Protocol):
+    """What the instructor sees and moves; `sim.world.World` is one. Right shoulder's frame."""
+
+    held_by_instructor: str | None
+
+    def position(self, name: str) -> FloatArray: ...
+    def gripper(self) -> tuple[FloatArray, FloatArray]: ...
+    def openings_up(self) -> bool: ...
+    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None: ...
+    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None: ...
+    def grasp(self, name: str) -> None: ...
+    def straighten(self, share: float) -> None: ...
+    def release(self) -> None: ...
+
+
+class Sights:
+    """A person's view of a table.
+
+    Args:
+        table: What is looked at.
+        openings: Colour -> the opening where it belongs.
+    """
+
+    def __init__(self, table: Table, openings: dict[str, Opening]) -> None:
+        self._table = table
+        self._opening = openings
+
+    def _height_over(self, centre: FloatArray) -> float:
+        """How far a centre lies over that of a cylinder that stands on the working plane."""
+        return float(centre[2] - tool_box.SURFACE_Z - tool_box.CYLINDER_HALF_HEIGHT)
+
+    def stands(self, name: str) -> bool:
+        """Whether the cylinder is on the working plane (standing or lying), not in a compartment and not parked."""
+        centre = self._table.position(name)
+        over_box = all(
+            low <= value <= high
+            for value, (low, high) in zip(centre, (tool_box.X_RANGE, tool_box.Y_RANGE), strict=False)
+        )
+        return over_box and centre[2] > tool_box.SURFACE_Z + 0.5 * tool_box.CYLINDER_RADIUS
+
+    def in_compartment(self, name: str) -> bool:
+        """Whether the cylinder is in any opening."""
+        centre = self._table.position(name)
+        return centre[2] < tool_box.SURFACE_Z and any(
+            np.hypot(centre[0] - item.x, centre[1] - item.y) < tool_box.OPENING_RADIUS for item in tool_box.OPENINGS
+        )
+
+    def is_parked(self, name: str) -> bool:
+        """Whether the cylinder is at its place out of sight."""
+        place = places.PARKED[tool_box.COLOURS.index(name)]
+        return bool(np.linalg.norm(self._table.position(name) - place) < 0.02)
+
+    def is_done(self, name: str) -> bool:
+        """Whether the cylinder is in its own opening, wholly below the working plane."""
+        centre, opening = self._table.position(name), self._opening[name]
+        near = np.hypot(centre[0] - opening.x, centre[1] - opening.y) < tool_box.OPENING_RADIUS
+        return bool(near and centre[2] + tool_box.CYLINDER_HALF_HEIGHT < tool_box.SURFACE_Z)
+
+    def top_of(self, name: str) -> FloatArray:
+        """Fingertip on top of a cylinder, standing or lying."""
+        centre = self._table.position(name)
+        standing = abs(self._height_over(centre)) < 0.004 or self.is_parked(name) or self.in_compartment(name)
+        over = tool_box.CYLINDER_HALF_HEIGHT if standing else tool_box.CYLINDER_RADIUS
+        return np.asarray(centre + np.array((0.0, 0.0, over)))
+
+    def pointing_pose(self, name: str, draw: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+        """Fingertip beside the upper third of a cylinder, on the camera's side, as far as may be from the others."""
+        centre = self._table.position(name)
+        distance = tool_box.CYLINDER_RADIUS + 0.0075 + draw.uniform(0.008, 0.012)
+        others = [self._table.position(other)[:2] for other in tool_box.COLOURS if other != name]
+        best, best_gap = np.zeros(3), -1.0
+        for azimuth in np.deg2rad(np.arange(-50.0, -27.0, 4.0)):
+            ahead = np.array((np.cos(azimuth), np.sin(azimuth), 0.0))
+            gap = min(float(np.linalg.norm((centre + distance * ahead)[:2] - other)) for other in others)
+            if gap > best_gap:
+                best, best_gap = ahead, gap
+        fingertip = centre + distance * best
+        fingertip[2] = tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT * draw.uniform(0.66, 0.80)
+        return fingertip, POINTING
