@@ -41,6 +41,7 @@ class RelocationOptions:
     finger_duration: float = 0.5
     settle_duration: float = 0.3
     work_opening: float = 0.85  # ξ while approaching and leaving an object
+    closed_opening: float = 0.02  # ξ of the hand that closes on an object, which stops it earlier
     level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
     limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
     reach_margin: float = 0.002  # the synthesised path keeps this much outside the least reach of the arm
@@ -141,8 +142,8 @@ class RelocationPlanner:
         self._approach(path, before + (o.entry_height if entry_height is None else entry_height) * _UP)
         self._move(path, "lower", [before], o.speed, o.work_opening)
         self._move(path, "reach", [grasp], o.careful_speed, o.work_opening)
-        self._fingers(path, "grasp", o.work_opening, 0.0)
-        self._move(path, "lift", [grasp + o.lift * _UP], o.careful_speed, 0.0, holding=True)
+        self._fingers(path, "grasp", o.work_opening, o.closed_opening)
+        self._move(path, "lift", [grasp + o.lift * _UP], o.careful_speed, o.closed_opening, holding=True)
         return self._finish(path)
 
     def deliver(self, start: ArrayLike, target: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
@@ -152,10 +153,17 @@ class RelocationPlanner:
         path = self._new_path()
         here = np.asarray(start, dtype=np.float64)
         above = t + o.lift * _UP
-        self._stay(path, "carry", here, 0.0, holding=True)
-        self._move(path, "carry", [*(np.asarray(v, dtype=np.float64) for v in via), above], o.speed, 0.0, holding=True)
-        self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, 0.0, holding=True)
-        self._leave(path, t)
+        self._stay(path, "carry", here, o.closed_opening, holding=True)
+        self._move(
+            path,
+            "carry",
+            [*(np.asarray(v, dtype=np.float64) for v in via), above],
+            o.speed,
+            o.closed_opening,
+            holding=True,
+        )
+        self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
+        self._leave(path, t, o.closed_opening)
         return self._finish(path)
 
     def leave(self, start: ArrayLike, opening: float) -> PlannedMotion:
@@ -189,13 +197,13 @@ class RelocationPlanner:
         states = m.poses(m.parameter_for(m.reach_state, target)[0])[: m.reach_state + 1]
         opening = m.opening(states.finger_to_thumb)
         n = len(states)
-        opening = opening + fade_in(n, n)[::-1] * (self._base_opening - opening[0])
+        opening = _crossfaded(np.full(n, self._base_opening), opening, n)
         level = fade_in(n, o.level_states)
-        opening = opening + fade_in(n, n) * (o.work_opening - opening)
+        opening = _crossfaded(opening, np.full(n, o.work_opening), n)
         states = self._blended(states, o.blend_share)
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
-    def _leave(self, path: _Path, target: FloatArray, opening: float = 0.0) -> None:
+    def _leave(self, path: _Path, target: FloatArray, opening: float) -> None:
         o, m = self.options, self.movement
         self._fingers(path, "release", opening, o.work_opening)
         aside = target + o.release_aside * self._right(target)
@@ -207,8 +215,8 @@ class RelocationPlanner:
         states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
         opening_path = m.opening(states.finger_to_thumb)
         n = len(states)
-        opening_path = opening_path + fade_in(n, n)[::-1] * (o.work_opening - opening_path[0])
-        opening_path = opening_path + fade_in(n, n) * (self._base_opening - opening_path[-1])
+        opening_path = _crossfaded(np.full(n, o.work_opening), opening_path, n)
+        opening_path = _crossfaded(opening_path, np.full(n, self._base_opening), n)
         level = fade_in(n, o.level_states)[::-1]
         backwards = self._blended(ArmPoses.from_stacked(states.stacked()[::-1]), o.blend_share)
         states = ArmPoses.from_stacked(backwards.stacked()[::-1])
@@ -323,3 +331,9 @@ class RelocationPlanner:
             phases=tuple(phases),
             elbow_turn=float(np.abs(solution.elbow_turn).max()),
         )
+
+
+def _crossfaded(first: FloatArray, second: FloatArray, n: int) -> FloatArray:
+    """From one curve of n values to another."""
+    share = fade_in(n, n)
+    return np.asarray((1.0 - share) * first + share * second)

@@ -165,7 +165,7 @@ class Synthesizer:
         yield self._clear_fetch(source, goal)
         lifted = self._waits_at()
         if not self.holding:
-            yield self._clear(goal, [lambda: self._planner.leave(lifted, 0.0)])
+            yield self._clear(goal, [lambda: self._planner.leave(lifted, self._hand.opening)])
             return _Outcome(False, f"felt nothing in the hand at {_cm(source)} cm")
         yield self._clear_deliver(lifted, target, goal)
         return self._placed(target)
@@ -177,10 +177,12 @@ class Synthesizer:
 
     def _take(self, goal: RelocationGoal) -> _Course:
         here, opening = self._waits_at(), self._hand.opening
-        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, 0.0)])
+        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, self._planner.options.closed_opening)])
         if self.holding:
             return _Outcome(True)
-        yield self._clear(goal, [lambda: self._planner.fingers(here, 0.0, self._planner.options.work_opening)])
+        yield self._clear(
+            goal, [lambda: self._planner.fingers(here, self._hand.opening, self._planner.options.work_opening)]
+        )
         return _Outcome(False, "closed the hand and felt nothing")
 
     def _release(self, goal: RelocationGoal) -> _Course:

@@ -76,6 +76,12 @@ class SafetyCore:
             self._rest(now_ns, measured)
         return targets, self.state, self.faults
 
+    def held(self, next_index: int) -> FloatArray | None:
+        """The last accepted row [J] if the robot has played them all: its own report of it is rounded to its units."""
+        if self._sent is None or next_index < self._sent.end_index:
+            return None
+        return np.asarray(self._sent.rows[-1])
+
     def _connected(self, now_ns: int, measured: Measured | None) -> bool:
         if measured is None:
             return False

@@ -145,11 +145,12 @@ class ArmDriver:
         age_s = (self._now_ns - captured_ns) * 1e-9
         if age_s > MAX_TRAJECTORY_AGE_S:
             raise TrajectoryRefusedError("stale", -1, "", f"age {age_s:.2f} s", f"up to {MAX_TRAJECTORY_AGE_S:g} s")
+        held = self._core.held(report.next_index) if report.epoch == self._writer.epoch else None
         path = check_trajectory(
             list(message.joints),
             [point.time_s for point in message.points],
             [list(point.position_rad) for point in message.points],
-            report.commanded,
+            report.commanded if held is None else held,
             self._limits,
             float(np.deg2rad(self._description.stream.start_tolerance_deg)),
         )
