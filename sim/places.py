@@ -11,13 +11,15 @@ from sim import tool_box
 
 FloatArray = NDArray[np.float64]
 
-STRIP_X = (0.172, 0.195)
-STRIP_Y = (-0.100, 0.080)
+STRIP_X = (0.168, 0.186)
+STRIP_Y = (-0.100, 0.065)
 LEAST_GAP = 0.050  # between the axes of two cylinders
 
 APPROACH = 0.040  # the open hand comes along this last part towards an object
-HALF_WIDTH_RIGHT = 0.026  # of the swept open hand, on the side of the fingers
-HALF_WIDTH_LEFT = 0.038  # on the side of the open thumb
+FINGERS_BEYOND = 0.037  # and reaches so far past its axis
+HALF_WIDTH_RIGHT = 0.037  # of the swept open hand and its clearance, on the side of the fingers
+HALF_WIDTH_LEFT = 0.034  # on the side of the open thumb
+ELBOW = np.array((0.02, -0.06))  # about where the elbow is while the hand is over the box: the forearm comes from there
 
 IDLE_FINGERTIP = np.array((0.40, -0.52, 0.00))
 PARKED = tuple(
@@ -66,16 +68,15 @@ def redraw_rate(seed: int = 0, count: int = 1000) -> float:
 def hand_has_room(layout: FloatArray) -> bool:
     """Whether the open hand reaches each cylinder of `layout` [n, 2] without touching another one.
 
-    The swept hand: a corridor from `APPROACH` before the object to it, along the horizontal direction from the
-    shoulder to the object, which is close to the forearm's.
+    The swept hand: a corridor from `APPROACH` before the object to `FINGERS_BEYOND` it, along the forearm's direction.
     """
     radius = tool_box.CYLINDER_RADIUS
     for target in range(len(layout)):
-        ahead = layout[target] / np.linalg.norm(layout[target])
+        ahead = (layout[target] - ELBOW) / np.linalg.norm(layout[target] - ELBOW)
         left = np.array((-ahead[1], ahead[0]))
         others = np.delete(layout, target, axis=0) - layout[target]
         along, aside = others @ ahead, others @ left
-        beyond_end = np.maximum(0.0, np.maximum(along, -APPROACH - along))
+        beyond_end = np.maximum(0.0, np.maximum(along - FINGERS_BEYOND, -APPROACH - along))
         beyond_side = np.maximum(0.0, np.maximum(aside - HALF_WIDTH_LEFT, -HALF_WIDTH_RIGHT - aside))
         if (np.hypot(beyond_end, beyond_side) < radius).any():
             return False

@@ -21,6 +21,7 @@ _TURNS = np.deg2rad(np.arange(0.0, 181.0, 1.0))
 _TURNS_BOTH = np.stack([_TURNS, -_TURNS], axis=1).ravel()
 _BISECTIONS = 7
 _JUMP = np.deg2rad(20.0)
+_MARGIN = np.deg2rad(0.3)  # inside the limits that the safety gate refuses: paths are curves through these poses
 _NEARLY_STRAIGHT = 1e-9
 
 
@@ -52,8 +53,8 @@ class ArmPoseSolver:
     """
 
     def __init__(self, robot: RobotDescription, arm: Arm) -> None:
-        self._lower = robot.soft_lower[arm.indices]
-        self._upper = robot.soft_upper[arm.indices]
+        self._lower = robot.soft_lower[arm.indices] + _MARGIN
+        self._upper = robot.soft_upper[arm.indices] - _MARGIN
         self._joints = arm.joints
         self._upper_arm = arm.kinematics.upper_arm
         along, aside, above = arm.kinematics.gripper_from_elbow
@@ -80,6 +81,7 @@ class ArmPoseSolver:
         gripper: ArrayLike,
         finger_to_thumb: ArrayLike,
         level: ArrayLike = 0.0,
+        slope: float | None = None,
         smoothing: int = 0,
     ) -> JointSolution:
         """Joint angles that place the gripper exactly and the elbow near the one given.
@@ -94,14 +96,17 @@ class ArmPoseSolver:
             finger_to_thumb: Direction from index finger to thumb (o of 5.2.3), [K, 3].
             level: Share 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the
                 table plane, thumb on the left (5.2.5).
-            smoothing: Over how many poses a turn of the elbow comes and goes; 0 for poses that are no sequence in time.
+            slope: Angle by which the forearm shall slope down, rad: by the share `level` the elbow is turned towards
+                the nearest place that gives it, so that what is held keeps its tilt. None leaves it to the person.
+            smoothing: Over how many poses a turn of the elbow comes and goes; 0 for poses that are no sequence.
 
         Raises:
             UnreachablePoseError: A gripper point is out of reach, or no turn of the elbow keeps the joint limits.
         """
         q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
         self._check_reach(r)
-        poses = _Poses(q, r, o, np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1]))
+        share = np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1])
+        poses = _Poses(q if slope is None else self._sloped(q, r, slope, share), r, o, share)
         solution = self._one_sided(poses, self._nearest(poses, _TURNS_BOTH))
         return self._smoothed(poses, solution, smoothing) if smoothing else solution
 
@@ -188,6 +193,12 @@ class ArmPoseSolver:
         return _angles(q / self._upper_arm, forearm, aside), q
 
     def _elbow(self, q: FloatArray, r: FloatArray, turn: FloatArray) -> FloatArray:
+        middle, radius, w2, w3 = self._elbow_circle(q, r)
+        side = np.cos(turn)[..., None] * w2 + np.sin(turn)[..., None] * w3
+        return np.asarray(middle + radius * side)  # (5.10)
+
+    def _elbow_circle(self, q: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Where the elbow can be: middle [K, 3], radius [K, 1], direction w2 towards q and w3 across, [K, 3]."""
         a, b = self._upper_arm, self._forearm
         c = np.linalg.norm(r, axis=-1, keepdims=True)  # c = |r - p| with p = 0; corrected (printed |r - q|)
         w1 = r / c  # (5.11)
@@ -198,10 +209,20 @@ class ArmPoseSolver:
         w2 = np.where(length > _NEARLY_STRAIGHT, w2, fallback)
         w2 = w2 / np.linalg.norm(w2, axis=-1, keepdims=True)  # (5.12)
         cos_beta = np.clip((a**2 + c**2 - b**2) / (2 * a * c), -1.0, 1.0)  # (5.8)
-        sin_beta = np.sqrt(1.0 - cos_beta**2)
-        w3 = np.cross(w1, w2)
-        side = np.cos(turn)[..., None] * w2 + np.sin(turn)[..., None] * w3
-        return np.asarray(a * (cos_beta * w1 + sin_beta * side))  # (5.10)
+        return a * cos_beta * w1, a * np.sqrt(1.0 - cos_beta**2), w2, np.cross(w1, w2)
+
+    def _sloped(self, q: FloatArray, r: FloatArray, slope: float, share: FloatArray) -> FloatArray:
+        """The elbow turned towards the nearest place at which the forearm slopes down by `slope`, by a share [K]."""
+        middle, radius, w2, w3 = self._elbow_circle(q, r)
+        wanted_z = r[:, 2] + self._forearm * np.sin(slope)
+        along, across = radius[:, 0] * w2[:, 2], radius[:, 0] * w3[:, 2]
+        amplitude = np.maximum(np.hypot(along, across), _NEARLY_STRAIGHT)
+        centre = np.arctan2(across, along)
+        spread = np.arccos(np.clip((wanted_z - middle[:, 2]) / amplitude, -1.0, 1.0))
+        turns = np.stack([centre + spread, centre - spread])
+        turns = (turns + np.pi) % (2 * np.pi) - np.pi
+        nearest = np.where(np.abs(turns[0]) <= np.abs(turns[1]), turns[0], turns[1])
+        return self._elbow(q, r, share * nearest)
 
     def _hand(self, q: FloatArray, r: FloatArray, o: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Unit forearm axis b and the hand's sideward axis y (towards the thumb), with r = q + along b + aside y.

@@ -28,8 +28,8 @@ class RelocationOptions:
     """Sizes of the relocation action, m, s, m/s. Where the thesis gives a number it is named."""
 
     before: float = 0.03  # 3 cm before the object
-    aside: float = 0.010  # 1 cm to the right
-    grasp_aside: float = 0.005  # thesis 1 cm; the gripper site already lies beside the forearm's axis
+    aside: float = 0.008  # thesis 1 cm to the right
+    grasp_aside: float = 0.004  # thesis 1 cm; the gripper site already lies beside the forearm's axis
     release_aside: float = 0.006  # 0.6 cm
     lift: float = 0.048  # thesis 1.5 cm; this much clears standing objects
     entry_height: float = 0.048  # the synthesised approach ends and the retreat begins so far above the table target
@@ -40,8 +40,9 @@ class RelocationOptions:
     careful_speed: float = 0.05
     finger_duration: float = 0.5
     settle_duration: float = 0.3
-    work_opening: float = 0.85  # ξ while approaching and leaving an object
+    work_opening: float = 0.75  # ξ while approaching and leaving an object
     closed_opening: float = 0.02  # ξ of the hand that closes on an object, which stops it earlier
+    work_slope: float = 0.25  # rad; the forearm's slope while it interacts, the same everywhere: objects stay upright
     level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
     limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
     reach_margin: float = 0.002  # the synthesised path keeps this much outside the least reach of the arm
@@ -132,12 +133,18 @@ class RelocationPlanner:
         self._base = self._pose_of(base[:5])
         self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
-    def fetch(self, target: ArrayLike, entry_height: float | None = None) -> PlannedMotion:
-        """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5)."""
+    def fetch(self, target: ArrayLike, entry_height: float | None = None, from_above: bool = False) -> PlannedMotion:
+        """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5).
+
+        Args:
+            target: Where the gripper grasps it, [3], m, shoulder frame.
+            entry_height: Height above t′ at which the synthesised movement ends; None for the options' one.
+            from_above: Lower the open hand over the object instead of reaching from 3 cm before it.
+        """
         t = np.asarray(target, dtype=np.float64)
         o = self.options
         path = self._new_path()
-        before = self._before(t)
+        before = t + o.aside * self._right(t) if from_above else self._before(t)
         grasp = t + o.grasp_aside * self._right(t)
         self._approach(path, before + (o.entry_height if entry_height is None else entry_height) * _UP)
         self._move(path, "lower", [before], o.speed, o.work_opening)
@@ -146,8 +153,13 @@ class RelocationPlanner:
         self._move(path, "lift", [grasp + o.lift * _UP], o.careful_speed, o.closed_opening, holding=True)
         return self._finish(path)
 
-    def deliver(self, start: ArrayLike, target: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
-        """Carry a held object from gripper position `start` over `via` to `target`, let go, back to the base pose."""
+    def deliver(
+        self, start: ArrayLike, target: ArrayLike, via: Sequence[ArrayLike] = (), upward: bool = False
+    ) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `target`, let go, back to the base pose.
+
+        `upward` raises the open hand straight up afterwards instead of drawing it back.
+        """
         o = self.options
         t = np.asarray(target, dtype=np.float64)
         path = self._new_path()
@@ -163,15 +175,15 @@ class RelocationPlanner:
             holding=True,
         )
         self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
-        self._leave(path, t, o.closed_opening)
+        self._leave(path, t, o.closed_opening, upward)
         return self._finish(path)
 
-    def leave(self, start: ArrayLike, opening: float) -> PlannedMotion:
+    def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
         """Open the hand where it is and go back to the base pose (last part of 5.2.5)."""
         path = self._new_path()
         here = np.asarray(start, dtype=np.float64)
         self._stay(path, "release", here, opening)
-        self._leave(path, here, opening)
+        self._leave(path, here, opening, upward)
         return self._finish(path)
 
     def offer(self, target: ArrayLike) -> PlannedMotion:
@@ -203,14 +215,15 @@ class RelocationPlanner:
         states = self._blended(states, o.blend_share)
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
-    def _leave(self, path: _Path, target: FloatArray, opening: float) -> None:
+    def _leave(self, path: _Path, target: FloatArray, opening: float, upward: bool) -> None:
         o, m = self.options, self.movement
         self._fingers(path, "release", opening, o.work_opening)
         aside = target + o.release_aside * self._right(target)
-        before = self._before(target)
+        before = aside if upward else self._before(target)
         high = self.far_enough(before + o.entry_height * _UP)
         self._move(path, "withdraw", [aside], o.careful_speed, o.work_opening)
-        self._move(path, "withdraw", [before], o.speed, o.work_opening)
+        if not upward:
+            self._move(path, "withdraw", [before], o.speed, o.work_opening)
         self._move(path, "withdraw", [high], o.speed, o.work_opening)
         states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
         opening_path = m.opening(states.finger_to_thumb)
@@ -288,7 +301,7 @@ class RelocationPlanner:
     def _forward(self, target: FloatArray) -> FloatArray:
         """b′ of 5.2.5: the forearm's direction projected onto the table plane."""
         pose = self._reached(target[None])
-        solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, level=1.0)
+        solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, 1.0, self.options.work_slope)
         b = (pose.gripper - solution.elbow)[0] * [1.0, 1.0, 0.0]
         return np.asarray(b / np.linalg.norm(b))
 
@@ -312,7 +325,9 @@ class RelocationPlanner:
         poses = ArmPoses.joined(path.poses)
         opening, level = np.concatenate(path.opening), np.concatenate(path.level)
         smoothing = round(self.options.turn_smoothing / path.period)
-        solution = self.solver.solve(poses.elbow, poses.gripper, poses.finger_to_thumb, level, smoothing)
+        solution = self.solver.solve(
+            poses.elbow, poses.gripper, poses.finger_to_thumb, level, self.options.work_slope, smoothing
+        )
         closed, opened = self.arm.fingers_closed, self.arm.fingers_open
         fingers = closed + opening * (opened - closed)
         angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)

@@ -162,12 +162,14 @@ class Synthesizer:
 
     def _relocate(self, goal: RelocationGoal) -> _Course:
         source, target = _point(goal, "from"), _point(goal, "to")
-        yield self._clear_fetch(source, goal)
-        lifted = self._waits_at()
+        fetch = self._clear_fetch(source, goal)
+        lifted = fetch.gripper[-1]
+        deliver = self._clear_deliver(lifted, target, goal)  # known to be possible before the arm moves
+        yield fetch
         if not self.holding:
-            yield self._clear(goal, [lambda: self._planner.leave(lifted, self._hand.opening)])
+            yield self._clear_leave(lifted, goal)
             return _Outcome(False, f"felt nothing in the hand at {_cm(source)} cm")
-        yield self._clear_deliver(lifted, target, goal)
+        yield deliver
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
@@ -199,8 +201,7 @@ class Synthesizer:
 
     def _rest(self, goal: RelocationGoal) -> _Course:
         if not self._hand.at_base:
-            here, opening = self._waits_at(), self._hand.opening
-            yield self._clear(goal, [lambda: self._planner.leave(here, opening)])
+            yield self._clear_leave(self._waits_at(), goal)
         return _Outcome(True)
 
     def _placed(self, target: FloatArray) -> _Outcome:
@@ -211,16 +212,23 @@ class Synthesizer:
     def _clear_fetch(self, source: FloatArray, goal: RelocationGoal) -> PlannedMotion:
         if not self._hand.at_base:
             raise GoalRefusedError("the arm is not at its base pose; send a goal of kind REST first")
-        heights = (self._planner.options.entry_height, 0.06, 0.075)
-        return self._clear(goal, [partial(self._planner.fetch, source, height) for height in heights])
+        ways = [(height, above) for above in (False, True) for height in (self._planner.options.entry_height, 0.065)]
+        return self._clear(goal, [partial(self._planner.fetch, source, *way) for way in ways])
+
+    def _clear_leave(self, here: FloatArray, goal: RelocationGoal) -> PlannedMotion:
+        return self._clear(
+            goal, [partial(self._planner.leave, here, self._hand.opening, upward) for upward in (False, True)]
+        )
 
     def _clear_deliver(self, start: FloatArray, target: FloatArray, goal: RelocationGoal) -> PlannedMotion:
-        """Straight if that is clear; else first back towards the row of the target; else higher."""
+        """Straight if that is clear; else first back towards the row of the target; else higher; withdrawing up if back
+        is not clear."""
         high = np.array([0.0, 0.0, 0.012])
         back = np.array([target[0] + 0.004, start[1], start[2]])
         detours: list[list[FloatArray]] = [[], [back], [back + high]]
         plans = [
-            partial(self._planner.deliver, start, target, [self._planner.far_enough(point) for point in detour])
+            partial(self._planner.deliver, start, target, [self._planner.far_enough(p) for p in detour], upward)
+            for upward in (False, True)
             for detour in detours
         ]
         return self._clear(goal, plans)

@@ -10,6 +10,7 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 from paramove.rules.stage import Mind, Place, Stage, cm
 
+BORDER = 0.02  # m; what vanishes at the surface's border was carried away
 GONE_FOR_GOOD_S = 1.5  # an object that was only hidden appears again within this time
 
 
@@ -46,7 +47,7 @@ class Learning(Stage):
                 self._say_rules()
         elif gesture.kind == Gesture.KIND_VANISHED and name in self._moved and gesture.located:
             self._moved.discard(name)
-            if self.mind.options.surface.contains(place):
+            if self.mind.options.surface.contains(place, BORDER):
                 self._going_in[name] = (place, gesture.captured.ToNanoseconds() * 1e-9)
 
     def step(self) -> ApplicationStage.Stage | None:
