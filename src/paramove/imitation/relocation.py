@@ -7,7 +7,6 @@ is kept and only the parameter t varies.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,90 +14,13 @@ from scipy.interpolate import CubicSpline
 
 from paramove.imitation.arm_pose import ArmPoseSolver
 from paramove.imitation.conversion import ArmPoses, RobotMovement
+from paramove.imitation.motion import Path, PlannedMotion, RelocationOptions
 from paramove.imitation.timing import fade_in, minimum_jerk, resampled, slowed_times, soft_ends
 from paramove.robots.description import Arm
 
 FloatArray = NDArray[np.float64]
 
 _UP = np.array([0.0, 0.0, 1.0])
-
-
-@dataclass(frozen=True)
-class RelocationOptions:
-    """Sizes of the relocation action, m, s, m/s. Where the thesis gives a number it is named."""
-
-    before: float = 0.03  # 3 cm before the object
-    aside: float = 0.008  # thesis 1 cm to the right
-    grasp_aside: float = 0.004  # thesis 1 cm; the gripper site already lies beside the forearm's axis
-    release_aside: float = 0.006  # 0.6 cm
-    lift: float = 0.048  # thesis 1.5 cm; this much clears standing objects
-    entry_height: float = 0.048  # the synthesised approach ends and the retreat begins so far above the table target
-    release_height: float = 0.001
-    approach_duration: float = 3.0  # about 3 s
-    retreat_duration: float = 2.6
-    speed: float = 0.10
-    careful_speed: float = 0.05
-    finger_duration: float = 0.5
-    settle_duration: float = 0.3
-    work_opening: float = 0.75  # ξ while approaching and leaving an object
-    closed_opening: float = 0.02  # ξ of the hand that closes on an object, which stops it earlier
-    work_slope: float = 0.25  # rad; the forearm's slope while it interacts, the same everywhere: objects stay upright
-    level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
-    limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
-    reach_margin: float = 0.002  # the synthesised path keeps this much outside the least reach of the arm
-    reach_width: float = 0.012  # and begins to be moved outward from twice so much on
-    turn_smoothing: float = 0.15  # s, over which a turn of the elbow comes and goes
-    blend_share: float = 0.45  # part of the approach over which the robot's own base pose fades into the movement
-    sample_period: float = 0.005
-
-
-@dataclass
-class _Path:
-    """A path under construction: samples of pose, opening and level, and where phases begin."""
-
-    period: float
-    poses: list[ArmPoses] = field(default_factory=list)
-    opening: list[FloatArray] = field(default_factory=list)
-    level: list[FloatArray] = field(default_factory=list)
-    holding: list[NDArray[np.bool_]] = field(default_factory=list)
-    phases: list[tuple[str, float]] = field(default_factory=list)
-
-    def add(
-        self, name: str, poses: ArmPoses, opening: ArrayLike, level: ArrayLike = 1.0, holding: bool = False
-    ) -> None:
-        n = len(poses)
-        start = self.period * sum(len(p) for p in self.poses)
-        if not self.phases or self.phases[-1][0] != name:
-            self.phases.append((name, start))
-        self.poses.append(poses)
-        self.opening.append(np.broadcast_to(np.asarray(opening, dtype=np.float64), n))
-        self.level.append(np.broadcast_to(np.asarray(level, dtype=np.float64), n))
-        self.holding.append(np.full(n, holding))
-
-    @property
-    def end(self) -> ArmPoses:
-        return self.poses[-1][-1:]
-
-
-@dataclass(frozen=True)
-class PlannedMotion:
-    """A motion from rest to rest, ready for the driver.
-
-    Attributes:
-        times: [K], s, from 0.
-        angles: Arm joints and fingers, [K, 6], rad.
-        gripper: Where the gripper site shall be, [K, 3], m, shoulder frame.
-        holding: Whether an object is held, [K].
-        phases: Name and start of each phase.
-        elbow_turn: Largest turn of the elbow that a joint limit asked for, rad.
-    """
-
-    times: FloatArray
-    angles: FloatArray
-    gripper: FloatArray
-    holding: NDArray[np.bool_]
-    phases: tuple[tuple[str, float], ...]
-    elbow_turn: float
 
 
 class RelocationPlanner:
@@ -199,10 +121,10 @@ class RelocationPlanner:
         self._fingers(path, "fingers", start, end)
         return self._finish(path)
 
-    def _new_path(self) -> _Path:
-        return _Path(self.options.sample_period)
+    def _new_path(self) -> Path:
+        return Path(self.options.sample_period)
 
-    def _approach(self, path: _Path, target: FloatArray) -> None:
+    def _approach(self, path: Path, target: FloatArray) -> None:
         """States 1..T of the movement for `target`, started from the base pose."""
         o, m = self.options, self.movement
         target = self.far_enough(target)
@@ -215,7 +137,7 @@ class RelocationPlanner:
         states = self._blended(states, o.blend_share)
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
-    def _leave(self, path: _Path, target: FloatArray, opening: float, upward: bool) -> None:
+    def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool) -> None:
         o, m = self.options, self.movement
         self._fingers(path, "release", opening, o.work_opening)
         aside = target + o.release_aside * self._right(target)
@@ -239,7 +161,7 @@ class RelocationPlanner:
         self._synthesised(path, "retreat", states, opening_path, level, o.retreat_duration)
 
     def _synthesised(
-        self, path: _Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
+        self, path: Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
     ) -> None:
         """State means in order (synthesis method D), smoothly timed from rest to rest."""
         at = np.linspace(0.0, 1.0, len(states))
@@ -265,7 +187,7 @@ class RelocationPlanner:
         return np.asarray(gripper * (least + softened) / distance)
 
     def _move(
-        self, path: _Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
+        self, path: Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
     ) -> None:
         """θ_T^t along straight lines of t, at rest at every point."""
         here = path.end.gripper[0]
@@ -276,10 +198,10 @@ class RelocationPlanner:
             path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
             here = point
 
-    def _stay(self, path: _Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
+    def _stay(self, path: Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
         path.add(name, self._reached(here[None]), opening, holding=holding)
 
-    def _fingers(self, path: _Path, name: str, start: float, end: float) -> None:
+    def _fingers(self, path: Path, name: str, start: float, end: float) -> None:
         o = self.options
         n = max(2, round(o.finger_duration / path.period))
         rest = max(1, round(o.settle_duration / path.period))
@@ -321,7 +243,7 @@ class RelocationPlanner:
         across = points.shoulder_from_hand[..., :, 1] * self.movement.o_max
         return ArmPoses(points.elbow[None], points.gripper[None], across[None])
 
-    def _finish(self, path: _Path) -> PlannedMotion:
+    def _finish(self, path: Path) -> PlannedMotion:
         poses = ArmPoses.joined(path.poses)
         opening, level = np.concatenate(path.opening), np.concatenate(path.level)
         smoothing = round(self.options.turn_smoothing / path.period)

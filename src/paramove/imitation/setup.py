@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.imitation.arm_pose import ArmPoseSolver
+from paramove.imitation.clear_plans import ClearPlans
 from paramove.imitation.clearance import ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.imitation.conversion import RobotMovement
 from paramove.imitation.relocation import RelocationPlanner
@@ -63,4 +64,4 @@ def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, sur
     )
     box = WorkSurface(surface.x, surface.y, surface.z)
     cylinder = UprightCylinder(surface.object_radius, surface.object_height)
-    return Synthesizer(planner, ClearanceChecker(robot, side, box, cylinder))
+    return Synthesizer(ClearPlans(planner, ClearanceChecker(robot, side, box, cylinder)))

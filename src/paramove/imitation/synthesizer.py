@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
 
 from paramove.imitation.arm_pose import UnreachablePoseError
-from paramove.imitation.clearance import ClearanceChecker
-from paramove.imitation.relocation import PlannedMotion, RelocationPlanner
+from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
+from paramove.imitation.motion import PlannedMotion
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 
 FloatArray = NDArray[np.float64]
 
 FRAME = "right_shoulder"
-LEAST_CLEARANCE = 0.005  # m, of planned paths from table, box and standing objects
 FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
 
-_Ending = TrajectoryStatus.State
 _ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
 
 
@@ -82,13 +79,12 @@ class Synthesizer:
     """Does one goal at a time. Hear messages with the `on_…` methods, then call `tick` once per turn.
 
     Args:
-        planner: Builds motions from the converted movement.
-        checker: Keeps them clear of table, body and standing objects.
+        plans: Builds motions from the converted movement that keep clear of table, body and standing objects.
     """
 
-    def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
-        self._planner, self._checker = planner, checker
-        self._arm = planner.arm
+    def __init__(self, plans: ClearPlans) -> None:
+        self._plans = plans
+        self._arm = plans.planner.arm
         self._hand = _Hand()
         self._running: _Running | None = None
         self._newest: dict[str, RelocationStatus] = {}
@@ -117,7 +113,7 @@ class Synthesizer:
             return
         try:
             self._begin(goal)
-        except (GoalRefusedError, UnreachablePoseError) as refusal:
+        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
             self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
 
     def on_joint_states(self, message: JointStates) -> None:
@@ -161,98 +157,52 @@ class Synthesizer:
     # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
 
     def _relocate(self, goal: RelocationGoal) -> _Course:
-        source, target = _point(goal, "from"), _point(goal, "to")
-        fetch = self._clear_fetch(source, goal)
+        source, target, standing = _point(goal, "from"), _point(goal, "to"), _standing(goal)
+        if not self._hand.at_base:
+            raise GoalRefusedError("the arm is not at its base pose; send a goal of kind REST first")
+        fetch = self._plans.fetch(source, standing)
         lifted = fetch.gripper[-1]
-        deliver = self._clear_deliver(lifted, target, goal)  # known to be possible before the arm moves
+        deliver = self._plans.deliver(lifted, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
-            yield self._clear_leave(lifted, goal)
+            yield self._plans.leave(lifted, self._hand.opening, standing)
             return _Outcome(False, f"felt nothing in the hand at {_cm(source)} cm")
         yield deliver
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
-        place = _point(goal, "from")
-        yield self._clear(goal, [lambda: self._planner.offer(place)])
+        yield self._plans.offer(_point(goal, "from"), _standing(goal))
         return _Outcome(True)
 
     def _take(self, goal: RelocationGoal) -> _Course:
-        here, opening = self._waits_at(), self._hand.opening
-        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, self._planner.options.closed_opening)])
+        here, options = self._waits_at(), self._plans.planner.options
+        yield self._plans.fingers(here, self._hand.opening, options.closed_opening, _standing(goal))
         if self.holding:
             return _Outcome(True)
-        yield self._clear(
-            goal, [lambda: self._planner.fingers(here, self._hand.opening, self._planner.options.work_opening)]
-        )
+        yield self._plans.fingers(here, self._hand.opening, options.work_opening, _standing(goal))
         return _Outcome(False, "closed the hand and felt nothing")
 
     def _release(self, goal: RelocationGoal) -> _Course:
-        here, opening = self._waits_at(), self._hand.opening
-        yield self._clear(goal, [lambda: self._planner.fingers(here, opening, self._planner.options.work_opening)])
+        opening = self._plans.planner.options.work_opening
+        yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, _standing(goal))
         return _Outcome(True)
 
     def _place_held(self, goal: RelocationGoal) -> _Course:
         target = _point(goal, "to")
         if not self.holding:
             raise GoalRefusedError("nothing is held; take an object first")
-        yield self._clear_deliver(self._waits_at(), target, goal)
+        yield self._plans.deliver(self._waits_at(), target, _standing(goal))
         return self._placed(target)
 
     def _rest(self, goal: RelocationGoal) -> _Course:
         if not self._hand.at_base:
-            yield self._clear_leave(self._waits_at(), goal)
+            yield self._plans.leave(self._waits_at(), self._hand.opening, _standing(goal))
         return _Outcome(True)
 
     def _placed(self, target: FloatArray) -> _Outcome:
         if self._hand.lost:
             return _Outcome(False, f"the object slipped out of the hand on the way to {_cm(target)} cm")
         return _Outcome(True)
-
-    def _clear_fetch(self, source: FloatArray, goal: RelocationGoal) -> PlannedMotion:
-        if not self._hand.at_base:
-            raise GoalRefusedError("the arm is not at its base pose; send a goal of kind REST first")
-        ways = [(height, above) for above in (False, True) for height in (self._planner.options.entry_height, 0.065)]
-        return self._clear(goal, [partial(self._planner.fetch, source, *way) for way in ways])
-
-    def _clear_leave(self, here: FloatArray, goal: RelocationGoal) -> PlannedMotion:
-        return self._clear(
-            goal, [partial(self._planner.leave, here, self._hand.opening, upward) for upward in (False, True)]
-        )
-
-    def _clear_deliver(self, start: FloatArray, target: FloatArray, goal: RelocationGoal) -> PlannedMotion:
-        """Straight if that is clear; else first back towards the row of the target; else higher; withdrawing up if back
-        is not clear."""
-        high = np.array([0.0, 0.0, 0.012])
-        back = np.array([target[0] + 0.004, start[1], start[2]])
-        detours: list[list[FloatArray]] = [[], [back], [back + high]]
-        plans = [
-            partial(self._planner.deliver, start, target, [self._planner.far_enough(p) for p in detour], upward)
-            for upward in (False, True)
-            for detour in detours
-        ]
-        return self._clear(goal, plans)
-
-    def _clear(self, goal: RelocationGoal, plans: Sequence[Callable[[], PlannedMotion]]) -> PlannedMotion:
-        """The first plan that can be done and keeps its distance from everything."""
-        middle = self._checker.surface_z + self._checker.cylinder.height / 2
-        standing = np.array([[p.x, p.y, middle] for p in goal.avoid]).reshape(-1, 3)
-        reasons = []
-        for plan in plans:
-            try:
-                motion = plan()
-            except UnreachablePoseError as error:
-                reasons.append(str(error))
-                continue
-            closest = self._checker.smallest(motion.angles, standing, motion.holding, every=6)
-            if closest.distance >= LEAST_CLEARANCE:
-                return motion
-            phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
-            reasons.append(
-                f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
-                f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
-            )
-        raise GoalRefusedError("; ".join(dict.fromkeys(reasons)))
 
     def _begin(self, goal: RelocationGoal) -> None:
         if self._running is not None:
@@ -289,7 +239,7 @@ class Synthesizer:
         self._hand.opening = float(np.clip((motion.angles[-1, 5] - self._arm.fingers_closed) / span, 0.0, 1.0))
         try:
             self._start_or_end(running, self._advance(running))
-        except (GoalRefusedError, UnreachablePoseError) as error:
+        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as error:
             self._end(running, _Outcome(False, str(error)))
 
     def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
@@ -357,6 +307,11 @@ def _point(goal: RelocationGoal, name: str) -> FloatArray:
     if not np.isfinite(point).all():
         raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
     return point
+
+
+def _standing(goal: RelocationGoal) -> FloatArray:
+    """Places of the objects to keep clear of, [M, 2]."""
+    return np.array([[place.x, place.y] for place in goal.avoid]).reshape(-1, 2)
 
 
 def _cm(point: FloatArray) -> str:

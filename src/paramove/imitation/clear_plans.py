@@ -1,0 +1,96 @@
+"""Plans that keep their distance: the first of several ways to do a motion that is reachable and clear."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.imitation.arm_pose import UnreachablePoseError
+from paramove.imitation.clearance import ClearanceChecker
+from paramove.imitation.motion import PlannedMotion
+from paramove.imitation.relocation import RelocationPlanner
+
+FloatArray = NDArray[np.float64]
+
+LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
+_HIGHER_ENTRY = 0.065
+_HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
+_BEHIND_ROW = 0.004
+
+
+class NoClearPlanError(ValueError):
+    """No way of doing the motion is both reachable and clear; the message says why, way by way."""
+
+
+class _Way(Protocol):
+    def __call__(self) -> PlannedMotion: ...
+
+
+class ClearPlans:
+    """Tries the ways of a motion in order of preference.
+
+    Args:
+        planner: Builds motions from the converted movement.
+        checker: Measures their distance from table, body and standing objects.
+    """
+
+    def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
+        self.planner, self._checker = planner, checker
+
+    def fetch(self, source: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it.
+
+        Args:
+            source: Where the object is grasped, [3], m, shoulder frame.
+            standing: Other objects, [M, 2].
+        """
+        heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
+        ways = [partial(self.planner.fetch, source, height, above) for above in (False, True) for height in heights]
+        return self._first(ways, standing)
+
+    def deliver(self, start: FloatArray, target: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up."""
+        back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
+        detours: list[list[FloatArray]] = [[], [back], [back + _HIGHER_CARRY]]
+        ways = [
+            partial(self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detour], upward)
+            for upward in (False, True)
+            for detour in detours
+        ]
+        return self._first(ways, standing)
+
+    def leave(self, here: FloatArray, opening: float, standing: FloatArray) -> PlannedMotion:
+        """Open the hand and go back to the base pose, withdrawing back, else up."""
+        return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)
+
+    def offer(self, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Go to `place` with an open hand."""
+        return self._first([partial(self.planner.offer, place)], standing)
+
+    def fingers(self, here: FloatArray, start: float, end: float, standing: FloatArray) -> PlannedMotion:
+        """Open or close the hand where it is."""
+        return self._first([partial(self.planner.fingers, here, start, end)], standing)
+
+    def _first(self, ways: Sequence[_Way], standing: FloatArray) -> PlannedMotion:
+        middle = self._checker.surface_z + self._checker.cylinder.height / 2
+        middles = np.column_stack([standing, np.full(len(standing), middle)])
+        reasons = []
+        for way in ways:
+            try:
+                motion = way()
+            except UnreachablePoseError as error:
+                reasons.append(str(error))
+                continue
+            closest = self._checker.smallest(motion.angles, middles, motion.holding, every=6)
+            if closest.distance >= LEAST_CLEARANCE:
+                return motion
+            phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
+            reasons.append(
+                f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
+                f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
+            )
+        raise NoClearPlanError("; ".join(dict.fromkeys(reasons)))
