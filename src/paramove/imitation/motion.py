@@ -30,6 +30,7 @@ class RelocationOptions:
     finger_duration: float = 0.5
     settle_duration: float = 0.3
     work_opening: float = 0.75  # ξ while approaching and leaving an object
+    offer_opening: float = 0.95  # ξ while waiting for an object from somebody's hand
     closed_opening: float = 0.02  # ξ of the hand that closes on an object, which stops it earlier
     work_slope: float = 0.25  # rad; the forearm's slope while it interacts, the same everywhere: objects stay upright
     level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction

@@ -68,7 +68,8 @@ class RelocationPlanner:
         path = self._new_path()
         before = t + o.aside * self._right(t) if from_above else self._before(t)
         grasp = t + o.grasp_aside * self._right(t)
-        self._approach(path, before + (o.entry_height if entry_height is None else entry_height) * _UP)
+        entry = before + (o.entry_height if entry_height is None else entry_height) * _UP
+        self._approach(path, entry, o.work_opening)
         self._move(path, "lower", [before], o.speed, o.work_opening)
         self._move(path, "reach", [grasp], o.careful_speed, o.work_opening)
         self._fingers(path, "grasp", o.work_opening, o.closed_opening)
@@ -111,7 +112,7 @@ class RelocationPlanner:
     def offer(self, target: ArrayLike) -> PlannedMotion:
         """Go to `target` with an open hand and stay there."""
         path = self._new_path()
-        self._approach(path, np.asarray(target, dtype=np.float64))
+        self._approach(path, np.asarray(target, dtype=np.float64), self.options.offer_opening)
         return self._finish(path)
 
     def fingers(self, here: ArrayLike, start: float, end: float) -> PlannedMotion:
@@ -124,7 +125,7 @@ class RelocationPlanner:
     def _new_path(self) -> Path:
         return Path(self.options.sample_period)
 
-    def _approach(self, path: Path, target: FloatArray) -> None:
+    def _approach(self, path: Path, target: FloatArray, final_opening: float) -> None:
         """States 1..T of the movement for `target`, started from the base pose."""
         o, m = self.options, self.movement
         target = self.far_enough(target)
@@ -133,7 +134,7 @@ class RelocationPlanner:
         n = len(states)
         opening = _crossfaded(np.full(n, self._base_opening), opening, n)
         level = fade_in(n, o.level_states)
-        opening = _crossfaded(opening, np.full(n, o.work_opening), n)
+        opening = _crossfaded(opening, np.full(n, final_opening), n)
         states = self._blended(states, o.blend_share)
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 

@@ -179,11 +179,11 @@ class Synthesizer:
         yield self._plans.fingers(here, self._hand.opening, options.closed_opening, _standing(goal))
         if self.holding:
             return _Outcome(True)
-        yield self._plans.fingers(here, self._hand.opening, options.work_opening, _standing(goal))
+        yield self._plans.fingers(here, self._hand.opening, options.offer_opening, _standing(goal))
         return _Outcome(False, "closed the hand and felt nothing")
 
     def _release(self, goal: RelocationGoal) -> _Course:
-        opening = self._plans.planner.options.work_opening
+        opening = self._plans.planner.options.offer_opening
         yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, _standing(goal))
         return _Outcome(True)
 
