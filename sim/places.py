@@ -15,7 +15,7 @@ STRIP_X = (0.168, 0.186)
 STRIP_Y = (-0.100, 0.065)
 LEAST_GAP = 0.050  # between the axes of two cylinders
 
-APPROACH = 0.040  # the open hand comes along this last part towards an object
+APPROACH = 0.100  # hand and wrist lie along this part before an object
 FINGERS_BEYOND = 0.037  # and reaches so far past its axis
 HALF_WIDTH_RIGHT = 0.037  # of the swept open hand and its clearance, on the side of the fingers
 HALF_WIDTH_LEFT = 0.034  # on the side of the open thumb

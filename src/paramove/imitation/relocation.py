@@ -15,12 +15,14 @@ from scipy.interpolate import CubicSpline
 from paramove.imitation.arm_pose import ArmPoseSolver
 from paramove.imitation.conversion import ArmPoses, RobotMovement
 from paramove.imitation.motion import Path, PlannedMotion, RelocationOptions
-from paramove.imitation.timing import fade_in, minimum_jerk, resampled, slowed_times, soft_ends
+from paramove.imitation.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
 from paramove.robots.description import Arm
 
 FloatArray = NDArray[np.float64]
 
 _UP = np.array([0.0, 0.0, 1.0])
+_SLOWING_ROUNDS = 6
+_FINAL_SHARE = 0.93  # of the limits, reached by the finished samples at most
 
 
 class RelocationPlanner:
@@ -259,6 +261,12 @@ class RelocationPlanner:
         holding = np.concatenate(path.holding).astype(np.float64)
         columns = np.concatenate([angles, poses.gripper], axis=1)
         times, values = resampled(stretched, columns, path.period)
+        for _ in range(_SLOWING_ROUNDS):
+            excess = largest_excess(values[:, :6], path.period, self._velocity, self._acceleration) / _FINAL_SHARE
+            if excess <= 1.0:
+                break
+            stretched = 1.01 * excess * stretched
+            times, values = resampled(stretched, columns, path.period)
         planned = path.period * np.arange(len(poses))
         phases = [(name, float(np.interp(start, planned, stretched))) for name, start in path.phases]
         return PlannedMotion(

@@ -51,6 +51,18 @@ def slowed_times(angles: FloatArray, period: float, velocity: FloatArray, accele
     return np.concatenate([[0.0], np.cumsum(stretch * period)])
 
 
+def largest_excess(angles: FloatArray, period: float, velocity: FloatArray, acceleration: FloatArray) -> float:
+    """The factor by which even samples [K, J] must be slowed to keep the limits; not above 1 if they do.
+
+    Before and after the samples the joints rest.
+    """
+    rates = np.diff(angles, axis=0) / period
+    rates = np.concatenate([0.0 * rates[:1], rates, 0.0 * rates[:1]])
+    speed = (np.abs(rates) / velocity).max()
+    change = (np.abs(np.diff(rates, axis=0)) / period / acceleration).max()
+    return float(max(speed, np.sqrt(change)))
+
+
 def _spread(needed: FloatArray, period: float) -> FloatArray:
     """At least 1 and at least `needed`, smooth in time."""
     window = max(1, round(_WINDOW_S / period))

@@ -12,7 +12,7 @@ HAND_PATIENCE_S = 6.0
 
 
 class Applying(Stage):
-    """States: waiting (for a pointing hand), letting_hand_leave, relocating, looking, helped."""
+    """States: waiting (for a pointing hand), letting_hand_leave, relocating, returning, looking, helped."""
 
     stage = ApplicationStage.STAGE_APPLY
 
@@ -21,6 +21,8 @@ class Applying(Stage):
         self._object = ""
         self._source: Place = (0.0, 0.0)
         self._attempt = 0
+        self._began_s = 0.0
+        self._failure = ""
 
     def enter(self) -> None:
         """Ask the instructor to point."""
@@ -37,6 +39,7 @@ class Applying(Stage):
             "waiting": self._waiting,
             "letting_hand_leave": self._letting_hand_leave,
             "relocating": self._relocating,
+            "returning": self._returning,
             "looking": self._looking,
             "helped": self._helped,
         }
@@ -66,6 +69,7 @@ class Applying(Stage):
 
     def _relocate(self) -> None:
         self._attempt += 1
+        self._began_s, self._failure = self.mind.now_s, ""
         mind = self.mind
         mind.errand.start(
             RelocationGoal.KIND_RELOCATE,
@@ -84,7 +88,16 @@ class Applying(Stage):
             return
         if outcome.state == RelocationStatus.STATE_REFUSED:
             self._ask_for_help(f"I cannot do that: {outcome.reason}.")
+        elif outcome.state == RelocationStatus.STATE_FAILED:
+            self._failure = outcome.reason
+            self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+            self.go("returning")
         else:
+            self.go("looking")
+
+    def _returning(self) -> None:
+        """The arm may have been left anywhere: bring it to its base pose before looking."""
+        if self.mind.errand.outcome is not None:
             self.go("looking")
 
     def _looking(self) -> ApplicationStage.Stage | None:
@@ -92,11 +105,11 @@ class Applying(Stage):
         if self.for_s < self.mind.options.settle_s:
             return None
         seen = self.mind.table.objects.get(self._object)
-        began_s = self.mind.errand.started_s
-        if self.mind.errand.succeeded and seen is not None and seen.kind == Gesture.KIND_VANISHED:
+        if not self._failure and seen is not None and seen.kind == Gesture.KIND_VANISHED:
             return self._put_away()
         if seen is not None and seen.at_rest and seen.place is not None:
-            if self.mind.errand.succeeded and seen.time_s < began_s and self.for_s < 2 * self.mind.options.settle_s:
+            unseen = not self._failure and seen.time_s < self._began_s
+            if unseen and self.for_s < 2 * self.mind.options.settle_s:
                 return None  # not seen since: the view is not settled yet
             self._try_again(seen.place)
             return None
@@ -105,7 +118,7 @@ class Applying(Stage):
         return None
 
     def _try_again(self, place: Place) -> None:
-        reason = self.mind.errand.outcome.reason if self.mind.errand.outcome else ""
+        reason = self._failure
         if self._attempt >= self.mind.options.attempts:
             self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
             return
