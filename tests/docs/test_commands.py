@@ -1,0 +1,185 @@
+"""Every command in README and docs works.
+
+A block of commands is run as it stands, from the root of the workspace. Two markers in the Markdown, in a comment on
+the line before the block, change that:
+
+    <!-- check only: why -->       the targets, sub-commands and options exist, but nothing is started
+    <!-- needs a running demo -->  run while the demo runs in the same domain
+"""
+
+import functools
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from ruamel.yaml import YAML
+
+from tests.docs.markdown import MARKERS, PAGES, ROOT, Block, blocks
+
+BLOCKS = [block for path in PAGES for block in blocks(path)]
+DOMAIN = f"docs-test-{os.getpid()}"
+ENVIRONMENT = {
+    **os.environ,
+    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+    "PARAMOVE_DOMAIN": DOMAIN,
+    "COLUMNS": "120",
+    "NO_COLOR": "1",
+}
+
+
+def run(command, seconds=60.0):
+    return subprocess.run(
+        command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=seconds, check=False
+    )
+
+
+def marked(marker):
+    return [pytest.param(block, id=str(block)) for block in BLOCKS if block.marker == marker]
+
+
+def run_block(block: Block):
+    answer = run(["bash", "-euo", "pipefail", "-c", "\n".join(block.commands)])
+    assert answer.returncode == 0, f"{block}\n{answer.stdout}{answer.stderr}"
+
+
+def test_markers_are_known():
+    assert {block.marker for block in BLOCKS} <= {"", *MARKERS}
+
+
+@pytest.mark.parametrize("block", marked(""))
+def test_commands_run(block):
+    run_block(block)
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """A run of the demo, ended after the last test that looks at it."""
+    runs = tmp_path_factory.mktemp("runs")
+    log = runs / "log"
+    with log.open("w") as output:
+        launch = subprocess.Popen(
+            ["paramove", "launch", "rule_learning", "--headless", "--runs", str(runs)],
+            cwd=ROOT,
+            env=ENVIRONMENT,
+            stdout=output,
+            stderr=output,
+        )
+    try:
+        deadline_s = time.monotonic() + 120
+        while 'robot: "' not in log.read_text():
+            assert launch.poll() is None, log.read_text()
+            assert time.monotonic() < deadline_s, log.read_text()
+            run(["paramove", "node", "list", "--seconds", "1"])
+        yield
+    finally:
+        launch.send_signal(signal.SIGINT)
+        launch.wait(30)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", marked("needs a running demo"))
+def test_commands_look_at_a_running_demo(block, demo):
+    run_block(block)
+
+
+@pytest.mark.parametrize("block", marked("check only"))
+def test_commands_exist(block):
+    for line in block.commands:
+        for command in re.split(r"\s+&&\s+|\s*;\s*", line):
+            words = shlex.split(command)
+            while words and re.fullmatch(r"[A-Z_]+=.*", words[0]):
+                del words[0]
+            check = CHECKS.get(Path(words[0]).name)
+            assert check is not None, f"{block}: no check for commands of {words[0]!r}: {command}"
+            check(words)
+
+
+def check_make(words):
+    answer = run(["make", "--dry-run", *words[1:]])
+    assert answer.returncode == 0, answer.stderr
+    arguments = [word.removeprefix("ARGS=") for word in words if word.startswith("ARGS=")]
+    if words[1] == "demo" and arguments:
+        check_paramove(["paramove", "launch", "rule_learning", *shlex.split(arguments[0])])
+
+
+def check_paramove(words):
+    if words[1] == "launch":
+        answer = run(["paramove", *words[1:], "--check"])
+        assert answer.returncode == 0, answer.stderr
+        return
+    path = []
+    for word in words[1:]:
+        commands = re.findall(r"^│ (\w+) ", help_of(("paramove", *path)).partition(" Commands ")[2], re.M)
+        if word not in commands:
+            break
+        path.append(word)
+    assert path, f"no such command: {shlex.join(words)}"
+    check_options(("paramove", *path), words)
+
+
+def check_python(words):
+    assert words[1] == "-m", f"only modules are checked: {shlex.join(words)}"
+    check_options((sys.executable, "-m", words[2]), words[3:])
+
+
+def check_options(command, words):
+    known = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", help_of(command)))
+    assert {word.partition("=")[0] for word in words if word.startswith("-")} <= known
+
+
+@functools.cache
+def help_of(command):
+    answer = run([*command, "--help"])
+    assert answer.returncode == 0, f"{shlex.join(command)} --help: {answer.stderr}"
+    return answer.stdout
+
+
+def check_git(words):
+    assert words[1] == "clone"
+
+
+def check_docker(words):
+    """The service of a `docker compose -f FILE run [OPTION...] SERVICE` exists; Docker itself is not needed."""
+    assert words[1:3] == ["compose", "-f"]
+    services = YAML(typ="safe", pure=True).load((ROOT / words[3]).read_text())["services"]
+    assert words[4] == "run"
+    assert set(services).intersection(words[5:])
+    for service in services.values():
+        folder = ROOT / Path(words[3]).parent / service["build"]["context"]
+        assert (folder / service["build"]["dockerfile"]).is_file()
+
+
+def check_program(words):
+    assert shutil.which(words[0]), f"{words[0]} is not there"
+
+
+def check_nothing(words):
+    """Of a shell's own commands and of a machine's administration there is nothing to check."""
+
+
+CHECKS = {
+    "make": check_make,
+    "paramove": check_paramove,
+    "python": check_python,
+    "git": check_git,
+    "docker": check_docker,
+    "cp": check_program,
+    "cd": check_nothing,
+    ".": check_nothing,
+    "apt-get": check_nothing,
+    "xdg-open": check_nothing,
+}
+
+
+def test_a_wrong_command_is_found():
+    """The checks themselves can fail."""
+    for words in ("make no-such-target", "paramove launch no_such", "paramove topic hz --no-such", "paramove nothing"):
+        with pytest.raises(AssertionError):
+            CHECKS[words.split()[0]](words.split())

@@ -1,0 +1,99 @@
+"""What the pages say of the code is true: links, tables, names of files and modules."""
+
+import re
+
+import pytest
+
+from paramove.bus import topics
+from paramove.supervision.interfaces import read_interface
+from tests.docs.markdown import PAGES, ROOT, anchors, table
+
+ARCHITECTURE = ROOT / "docs" / "explanation" / "architecture.md"
+MODULES = [
+    *(f"nodes.{path.stem}" for path in sorted((ROOT / "nodes").glob("*.py")) if path.stem != "__init__"),
+    "sim.simulator",
+    "sim.judge",
+]
+INTERFACES = {module.partition(".")[2]: read_interface(module, ROOT) for module in MODULES}
+
+pages = pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+
+
+@pages
+def test_links_lead_to_files_and_headings(path):
+    wrong = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        name, _, anchor = target.partition("#")
+        page = (path.parent / name).resolve() if name else path
+        if not page.exists() or (anchor and anchor not in anchors(page)):
+            wrong.append(target)
+    assert wrong == []
+
+
+def test_every_page_is_linked_from_the_index():
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    found = {str(path.relative_to(ROOT / "docs")) for path in PAGES[1:]} - {"index.md"}
+    assert {name for name in found if f"({name})" not in index} == set()
+
+
+@pages
+def test_named_files_exist(path):
+    """`folder/file.py` in backquotes lies in the workspace, or in the library with its `src/paramove/` left out."""
+    names = set(re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|yaml|sh|proto))`", path.read_text(encoding="utf-8")))
+    missing = {name for name in names if not any((root / name).exists() for root in (ROOT, ROOT / "src" / "paramove"))}
+    assert missing == set()
+
+
+@pages
+def test_named_modules_exist(path):
+    names = set(re.findall(r"`(paramove(?:\.[a-z_0-9]+)+)`", path.read_text(encoding="utf-8")))
+    wrong = set()
+    for name in names - {"paramove.msgs"}:
+        place = ROOT / "src" / name.replace(".", "/")
+        if not place.is_dir() and not place.with_suffix(".py").is_file():
+            wrong.add(name)
+    assert wrong == set()
+
+
+def who(topic, what):
+    """Processes that say or hear a topic; the recorder, which hears nearly all, is left out."""
+    names = [name for name, interface in INTERFACES.items() if name != "recorder"]
+    return ", ".join(name for name in names if topic in getattr(INTERFACES[name], what)) or "–"
+
+
+def test_topic_table_is_that_of_the_code():
+    rows = [
+        [
+            topic.name,
+            topic.type_name,
+            f"{topic.rate_hz:g}" if topic.rate_hz else "event",
+            topic.profile.value,
+            topic.frame or "–",
+            "yes" if topic.recorded else "–",
+            who(topic, "says"),
+            who(topic, "hears"),
+        ]
+        for topic in topics.TOPICS
+    ]
+    assert table(ARCHITECTURE, "topics") == rows
+
+
+def test_process_table_names_every_process():
+    text = ARCHITECTURE.read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+) \| `((?:nodes|sim)/\w+\.py)` \|", text, re.M)
+    assert {path.removesuffix(".py").replace("/", ".") for _, path in rows} == set(MODULES)
+
+
+def test_safety_states_are_those_of_the_code():
+    from paramove.safety.gate_io import State
+
+    assert [row[0] for row in table(ARCHITECTURE, "safety states")] == [state.value for state in State]
+
+
+def test_stages_have_the_states_that_are_told():
+    """Each state of the table occurs in the stage's file, and the file goes to no other."""
+    for _, path, states, _ in table(ARCHITECTURE, "stages"):
+        source = (ROOT / "src" / "paramove" / path).read_text(encoding="utf-8")
+        assert set(re.findall(r'self\.go\("(\w+)"\)', source)) == set(states.split(", "))
