@@ -22,7 +22,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "demos": ("paramove.cli.demos", "List, show, plot, label, import and split demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "record": ("paramove.cli.record", "Record, inspect and replay what is said on the bus."),
-    "evaluate": ("paramove.cli.evaluate", "Repeat the thesis's experiments and write a report."),
+    "evaluate": ("paramove.cli.evaluate", "Repeat experiments and say how well they went."),
+    "warm": ("paramove.cli.warm", "Compile kernels and train the reaching model, so that the first run starts fast."),
     "doctor": ("paramove.cli.doctor", "Check this machine and its installation."),
 }
 """Name -> module and one line of help. A command whose module does not exist is not offered."""

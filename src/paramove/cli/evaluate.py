@@ -1,0 +1,181 @@
+"""`paramove evaluate`: repeats experiments and says how well they went."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from paramove.supervision import application, exit_codes
+
+app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
+
+JUDGED_A_FAILURE = 3
+RUNS = Path("runs/evaluation")
+
+JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the numbers to FILE too")]
+RunsOption = Annotated[
+    Path | None, typer.Option(help="where runs and results are kept (default: runs/evaluation); finished ones are used")
+]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NODE.PARAM=VALUE", help="as in paramove launch; may be repeated")
+]
+JobsOption = Annotated[int, typer.Option(min=1, help="runs at the same time; each uses about two cores")]
+AgainOption = Annotated[bool, typer.Option("--again", help="run every seed again, also those with a result")]
+
+
+@app.command("rule_learning")
+def rule_learning(
+    seeds: Annotated[str, typer.Option(help="worlds: 7, 0-9 or 3,5,10-12")] = "0-9",
+    jobs: JobsOption = 1,
+    json_file: JsonFileOption = None,
+    runs: RunsOption = None,
+    settings: SetOption = None,
+    again: AgainOption = False,
+    video: Annotated[bool, typer.Option("--video", help="with video and report of every run; slower")] = False,
+    drop_recordings: Annotated[
+        bool, typer.Option("--drop-recordings", help="delete the recording of a successful run (about 0.5 GB each)")
+    ] = False,
+) -> None:
+    """Run the rule-learning demo once per seed, headless, and judge every run by the truth.
+
+    Ctrl-C and the same command again: goes on with the seeds that are missing. Exit codes: 0 at least 9 of 10 runs
+    succeeded; 3 fewer did; 130 interrupted.
+    """
+    console = Console(highlight=False, emoji=False)
+    results = _batch(console, seeds, jobs, runs, settings or [], again, video, drop_recordings)
+    from paramove.evaluation.batch_table import enough, table_of, totals_of
+
+    console.print(table_of(results))
+    for result in results:
+        if not result.get("success"):
+            console.print(
+                f"seed {result['seed']}: {result.get('reason') or 'failed'} ({result['run_folder']})", markup=False
+            )
+    _write(json_file, {"results": results, "totals": totals_of(results)}, console)
+    raise typer.Exit(exit_codes.OK if enough(results) else JUDGED_A_FAILURE)
+
+
+@app.command("homography")
+def homography(
+    run_folder: Annotated[Path | None, typer.Argument(help="folder of a run; or give --seeds")] = None,
+    seeds: Annotated[str | None, typer.Option(help="worlds to run, or to take from --runs: 0-9")] = None,
+    jobs: JobsOption = 1,
+    json_file: JsonFileOption = None,
+    runs: RunsOption = None,
+    settings: SetOption = None,
+) -> None:
+    """Measure the robot's own camera calibration against the true camera, over its working area.
+
+    Exit codes: 0 median error of every run at most 3 mm; 3 larger, or a run never calibrated; 66 no such run.
+    """
+    from paramove.evaluation.homography_accuracy import GOAL_MM, accuracy_of
+    from paramove.evaluation.recorded_run import RunFolderError, load_run
+
+    console = Console(highlight=False, emoji=False)
+    if (run_folder is None) == (seeds is None):
+        raise typer.BadParameter("give either a run folder or --seeds")
+    if run_folder is not None:
+        folders = [run_folder]
+    else:
+        results = _batch(console, str(seeds), jobs, runs, settings or [], False, False, False)
+        folders = [Path(result["run_folder"]) for result in results]
+    rows: list[dict[str, Any]] = []
+    for folder in folders:
+        try:
+            rows.append(accuracy_of(load_run(folder)))
+        except RunFolderError as error:
+            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+            raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    console.print(_homography_table(rows))
+    _write(json_file, rows, console)
+    good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
+    raise typer.Exit(exit_codes.OK if good else JUDGED_A_FAILURE)
+
+
+def _homography_table(rows: list[dict[str, Any]]) -> Table:
+    table = Table(title="error of the robot's own homography, mm", show_edge=False, pad_edge=False)
+    table.add_column("seed", justify="right")
+    for heading in ("grid median", "95 %", "max", "objects seen at rest: median", "max", "number"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        grid, seen = row["grid_mm"], row["seen_at_rest_mm"]
+        values = (grid["median"], grid["p95"], grid["max"], seen["median"], seen["max"])
+        cells = ["–" if value is None else f"{value:.2f}" for value in values]
+        table.add_row(str(row["seed"]), *cells, str(seen["samples"]))
+    return table
+
+
+def _batch(
+    console: Console,
+    seeds: str,
+    jobs: int,
+    runs: Path | None,
+    settings: list[str],
+    again: bool,
+    video: bool,
+    drop_recordings: bool,
+) -> list[dict[str, Any]]:
+    from paramove.evaluation.batch import BatchOptions, SeedsError, finished, run_batch, seeds_of
+
+    try:
+        wanted = seeds_of(seeds)
+    except SeedsError as error:
+        raise typer.BadParameter(str(error), param_hint="--seeds") from error
+    try:
+        workspace = application.find_workspace(Path.cwd())
+    except FileNotFoundError as error:
+        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    folder = (runs or workspace / RUNS).resolve()
+    options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings))
+    results = {} if again else finished(folder, wanted, settings)
+    if results:
+        console.print(
+            f"results of {len(results)} seeds are taken from {folder} (--again runs them anew)", soft_wrap=True
+        )
+    missing = [seed for seed in wanted if seed not in results]
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not missing) as progress:
+        task = progress.add_task("runs", total=len(missing))
+        running: list[int] = []
+
+        def begun(seed: int) -> None:
+            running.append(seed)
+            progress.update(task, description=f"seed {', '.join(map(str, running))}")
+
+        def ended(result: dict[str, Any]) -> None:
+            running.remove(result["seed"])
+            results[result["seed"]] = result
+            verdict = "[green]success[/]" if result.get("success") else "[red]failed[/]"
+            progress.console.print(f"seed {result['seed']}: {verdict}, {result.get('objects_placed', 0)} placed")
+            progress.advance(task)
+
+        try:
+            run_batch(missing, options, begun, ended)
+        except KeyboardInterrupt:
+            console.print(f"interrupted; {len(results)} of {len(wanted)} results are kept in {folder}", soft_wrap=True)
+            raise typer.Exit(130) from None
+    return [results[seed] for seed in wanted]
+
+
+def _write(file: Path | None, numbers: Any, console: Console) -> None:
+    if file is None:
+        return
+    text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    if str(file) == "-":
+        sys.stdout.write(text)
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    console.print(f"numbers: {file}", markup=False, soft_wrap=True)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,96 @@
+"""Rates and losses of every recorded topic, from the recording alone, in the run's own time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from paramove.bus import topics
+from paramove.recording.reader import Recorded
+from paramove.supervision.interfaces import InterfaceError, read_interface
+
+
+@dataclass
+class TopicTraffic:
+    """Publication times and sequence numbers of one topic, in order."""
+
+    publish_ns: list[int] = field(default_factory=list)
+    sequence: list[int] = field(default_factory=list)
+
+    @property
+    def lost(self) -> int:
+        """Messages missing between the recorded ones. A publisher that started again begins a new count."""
+        steps = [after - before for before, after in zip(self.sequence, self.sequence[1:], strict=False)]
+        return sum(step - 1 for step in steps if step > 1) + (self.sequence[0] - 1 if self.sequence else 0)
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Mean rate between the first and the last message; None for fewer than two."""
+        if len(self.publish_ns) < 2 or self.publish_ns[-1] == self.publish_ns[0]:
+            return None
+        return 1e9 * (len(self.publish_ns) - 1) / (self.publish_ns[-1] - self.publish_ns[0])
+
+    @property
+    def longest_gap_s(self) -> float:
+        """Longest time between two messages, s."""
+        gaps = [after - before for before, after in zip(self.publish_ns, self.publish_ns[1:], strict=False)]
+        return 1e-9 * max(gaps, default=0)
+
+
+class Traffic:
+    """Takes in every message of a recording."""
+
+    def __init__(self) -> None:
+        self.topics: dict[str, TopicTraffic] = {}
+        self.last_ns = 0
+
+    def take(self, recorded: Recorded) -> None:
+        """One more message."""
+        topic = self.topics.setdefault(recorded.topic, TopicTraffic())
+        topic.publish_ns.append(recorded.publish_ns)
+        topic.sequence.append(recorded.sequence)
+        self.last_ns = max(self.last_ns, recorded.publish_ns)
+
+    def cut(self, end_ns: int) -> None:
+        """Forget what was said at `end_ns` and later."""
+        for topic in self.topics.values():
+            kept = sum(time_ns < end_ns for time_ns in topic.publish_ns)
+            del topic.publish_ns[kept:], topic.sequence[kept:]
+
+    def rates(self, speakers: dict[str, str]) -> dict[str, dict[str, Any]]:
+        """Topic -> node, declared and measured rate, messages, longest gap."""
+        return {
+            name: {
+                "node": speakers.get(name, ""),
+                "declared_hz": topics.by_name(name).rate_hz,
+                "measured_hz": topic.rate_hz,
+                "messages": len(topic.sequence),
+                "longest_gap_s": topic.longest_gap_s,
+            }
+            for name, topic in sorted(self.topics.items())
+        }
+
+    def loss(self) -> dict[str, Any]:
+        """Messages that the recorder did not get, per topic and in total."""
+        lost = {name: topic.lost for name, topic in sorted(self.topics.items())}
+        return {"total": sum(lost.values()), "topics": lost}
+
+
+def speakers(launch_file: Path, workspace: Path) -> dict[str, str]:
+    """Topic -> name of the node that says it, from a run's effective launch file; what cannot be read is left out."""
+    found: dict[str, str] = {}
+    if not launch_file.is_file():
+        return found
+    launch = YAML(typ="safe", pure=True).load(launch_file.read_text(encoding="utf-8")) or {}
+    for node, settings in launch.get("nodes", {}).items():
+        try:
+            interface = read_interface(settings["module"], workspace)
+        except (InterfaceError, KeyError):
+            continue
+        remaps = settings.get("remaps", {})
+        found |= {remaps.get(topic.name, topic.name): node for topic in interface.says}
+        found[topics.status(node).name] = node
+    return found

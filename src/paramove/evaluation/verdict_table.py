@@ -1,0 +1,100 @@
+"""What a person sees in the terminal at the end of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
+    """Print the verdict, the main numbers beside their goals, and where to read on."""
+    colour = "green" if summary["success"] else "red"
+    verdict = "SUCCESS" if summary["success"] else "FAILURE"
+    console.print(
+        f"\n[bold {colour}]{verdict}[/]: {summary['objects_placed']} of {len(summary['rules'])} objects rest in their "
+        f"own opening after {summary['simulated_s']:.0f} s of simulated time",
+        soft_wrap=True,
+    )
+    if not summary["success"]:
+        console.print(summary["reason"], markup=False, soft_wrap=True)
+    table = Table(show_edge=False, pad_edge=False)
+    table.add_column("what")
+    table.add_column("found", justify="right")
+    table.add_column("goal", justify="right", style="dim")
+    for name, found, goal, good in rows_of(summary):
+        table.add_row(name, found if good else f"[yellow]{found}[/]", goal)
+    console.print(table)
+    for rule in summary["rules"]:
+        mark = "[green]✓[/]" if rule["right"] else "[red]✗[/]"
+        console.print(mark, f"“{rule['sentence'] or rule['object'] + ': nothing learnt'}”", style="dim", soft_wrap=True)
+    for path in written:
+        console.print(f"{path.name:12s} {path}", markup=False, soft_wrap=True)
+
+
+def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
+    """Name, found, goal, and whether it is met."""
+    homography = summary["homography_error_mm"]
+    commanded, physical = summary["gripper_error_commanded_mm"], summary["gripper_error_physical_mm"]
+    rules = [rule["error_mm"] for rule in summary["rules"]]
+    factor = summary["wall"]["realtime_factor"]
+    return [
+        (
+            "rules learnt",
+            f"{sum(rule['right'] for rule in summary['rules'])} of {len(rules)}",
+            "all",
+            all_right(summary),
+        ),
+        ("farthest rule from its opening", mm(max((e for e in rules if e is not None), default=None)), "< 14 mm", True),
+        (
+            "grasps, at first try",
+            f"{summary['grasps']}, {summary['grasps_first_try']}",
+            "3, 3",
+            summary["grasps"] == summary["grasps_first_try"] > 0,
+        ),
+        ("unwanted contacts", str(summary["unwanted_contacts"]), "0", summary["unwanted_contacts"] == 0),
+        (
+            "deepest penetration",
+            mm(summary["deepest_penetration_mm"]),
+            "≤ 0.7 mm",
+            summary["deepest_penetration_mm"] <= 0.7,
+        ),
+        (
+            "homography error, median (max)",
+            f"{mm(homography['median'])} ({mm(homography['max'])})",
+            "≤ 3 mm",
+            below(homography["median"], 3.0),
+        ),
+        (
+            "gripper: commanded to target, max",
+            mm(commanded["both"]["max"]),
+            "< 0.5 mm",
+            below(commanded["both"]["max"], 0.5),
+        ),
+        (
+            "gripper: in the world to commanded, max",
+            mm(physical["both"]["max"]),
+            "< 2 mm",
+            below(physical["both"]["max"], 2.0),
+        ),
+        ("messages lost", str(summary["loss"]["total"]), "0", summary["loss"]["total"] == 0),
+        ("times real time", "–" if factor is None else f"{factor:.1f}", "", True),
+    ]
+
+
+def all_right(summary: dict[str, Any]) -> bool:
+    """Whether every object's opening is known."""
+    return all(rule["right"] for rule in summary["rules"])
+
+
+def below(value: float | None, limit: float) -> bool:
+    """Whether a value is known and not above a limit."""
+    return value is not None and value <= limit
+
+
+def mm(value: float | None) -> str:
+    """A length in mm; a dash where there is none."""
+    return "–" if value is None else f"{value:.2f} mm"
