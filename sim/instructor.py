@@ -27,6 +27,7 @@ ABOVE = 0.07  # the fingertip waits so far above a top
 TRAVEL_Z = tool_box.SURFACE_Z + 0.085  # centre of a carried cylinder: over standing ones
 SHOWN_LIFT = 0.025
 ASIDE_IN_HAND = 0.004  # from the gripper's centre towards the thumb: between pads and open thumb
+AHEAD_IN_HAND = 0.0025  # and towards the fingertips: the upright object must pass the palm of the sloping hand
 POINTING_S = 4.0
 
 
@@ -346,9 +347,9 @@ class Instructor:
     def _into_hand(self, above: float) -> FloatArray:
         """Fingertip when the held cylinder stands in the robot's open hand, or `above` it."""
         gripper, rotation = self._table.gripper()
-        centre = gripper + ASIDE_IN_HAND * rotation[:, 1]
-        centre[:2] += self._paths.normal(0.0, 0.001, 2)
-        centre[2] = gripper[2] - self._paths.uniform(0.007, 0.009)
+        centre = gripper + ASIDE_IN_HAND * rotation[:, 1] + AHEAD_IN_HAND * rotation[:, 0]
+        centre[:2] += self._paths.normal(0.0, 0.0007, 2)
+        centre[2] = gripper[2] - self._paths.uniform(0.009, 0.011)
         return self._tip_over(centre, above)
 
     # -- what to take next --------------------------------------------------------------------------------------------
