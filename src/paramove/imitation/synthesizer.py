@@ -69,7 +69,7 @@ class _Hand:
 
     at_base: bool = True
     gripper: FloatArray | None = None  # where it waits, if not at the base pose
-    opening: float = 0.0
+    opening: float = 1.0  # ξ that the last motion ended with
     measured: float = 1.0  # ξ of the measured fingers
     lost: bool = False
     known: bool = field(default=True)
@@ -102,8 +102,8 @@ class Synthesizer:
 
     @property
     def holding(self) -> bool:
-        """Whether the fingers of the closed hand feel something."""
-        return self._hand.measured > FELT_OPENING
+        """Whether the hand is commanded to be closed and its fingers feel something."""
+        return self._commanded_opening() < FELT_OPENING < self._hand.measured
 
     def on_goal(self, goal: RelocationGoal) -> None:
         """Accept or refuse a goal. The same id again is answered with its newest status and not done twice."""
@@ -120,11 +120,10 @@ class Synthesizer:
         """Hear the measured joints: the fingers tell whether something is held."""
         for joint in message.joints:
             if joint.name == self._arm.fingers:
-                span = self._arm.fingers_open - self._arm.fingers_closed
-                self._hand.measured = (joint.position - self._arm.fingers_closed) / span
+                self._hand.measured = self._opening(joint.position)
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
-            self._hand.lost |= not self.holding
+            self._hand.lost |= self._hand.measured <= FELT_OPENING
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
         """Hear how the driver fares with the motion under way."""
@@ -235,8 +234,7 @@ class Synthesizer:
         base = motion.phases[-1][0] == "retreat"
         self._hand.at_base = base
         self._hand.gripper = None if base else motion.gripper[-1]
-        span = self._arm.fingers_open - self._arm.fingers_closed
-        self._hand.opening = float(np.clip((motion.angles[-1, 5] - self._arm.fingers_closed) / span, 0.0, 1.0))
+        self._hand.opening = self._opening(float(motion.angles[-1, 5]))
         try:
             self._start_or_end(running, self._advance(running))
         except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as error:
@@ -291,6 +289,18 @@ class Synthesizer:
         """Whether the motion holds an object from half a second before to half a second after `time_s`."""
         around = np.searchsorted(motion.times, [time_s - 0.5, time_s + 0.5])
         return bool(motion.holding[around[0] : max(around[1], around[0] + 1)].all()) and around[0] > 0
+
+    def _commanded_opening(self) -> float:
+        running = self._running
+        if running is None or running.motion is None:
+            return self._hand.opening
+        sample = min(int(np.searchsorted(running.motion.times, running.time_s)), len(running.motion.times) - 1)
+        return self._opening(float(running.motion.angles[sample, 5]))
+
+    def _opening(self, fingers: float) -> float:
+        """ξ of an angle of the fingers."""
+        span = self._arm.fingers_open - self._arm.fingers_closed
+        return float(np.clip((fingers - self._arm.fingers_closed) / span, 0.0, 1.0))
 
     def _waits_at(self) -> FloatArray:
         if self._hand.gripper is None:
