@@ -13,7 +13,7 @@ def test_redraw_rate_is_small(capsys: pytest.CaptureFixture[str]) -> None:
     rate = places.redraw_rate(seed=0, count=1000)
     with capsys.disabled():
         print(f"\nlayouts drawn again: {100 * rate:.1f} %")  # noqa: T201 - the rate is to be seen in the test's output
-    assert 0.0 < rate < 0.3
+    assert 0.0 < rate < 0.4  # the hand is broad: fingers, open thumb and wrist housing
 
 
 def test_layouts_leave_gaps_and_room_for_the_hand() -> None:
@@ -29,11 +29,11 @@ def test_layouts_leave_gaps_and_room_for_the_hand() -> None:
 
 def test_hand_has_no_room_where_another_cylinder_stands_in_its_way() -> None:
     target = np.array((0.185, -0.02))
-    ahead = target / np.linalg.norm(target)
+    ahead = (target - places.ELBOW) / np.linalg.norm(target - places.ELBOW)
     right, left = np.array((ahead[1], -ahead[0])), np.array((-ahead[1], ahead[0]))
     before = target - 0.03 * ahead
     assert not places.hand_has_room(np.array((target, before + 0.035 * right)))
-    assert not places.hand_has_room(np.array((target, before + 0.047 * left)))
+    assert not places.hand_has_room(np.array((target, before + 0.043 * left)))
     # Each of two neighbours has the other on one side, so the wider side decides.
     assert not places.hand_has_room(np.array((target, target + 0.045 * right)))
     assert places.hand_has_room(np.array((target, target + 0.052 * right)))
