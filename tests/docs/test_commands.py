@@ -8,6 +8,7 @@ the line before the block, change that:
 """
 
 import functools
+import itertools
 import os
 import re
 import shlex
@@ -91,14 +92,19 @@ def test_commands_look_at_a_running_demo(block, demo):
 
 @pytest.mark.parametrize("block", marked("check only"))
 def test_commands_exist(block):
-    for line in block.commands:
-        for command in re.split(r"\s+&&\s+|\s*;\s*", line):
-            words = shlex.split(command)
-            while words and re.fullmatch(r"[A-Z_]+=.*", words[0]):
-                del words[0]
-            check = CHECKS.get(Path(words[0]).name)
-            assert check is not None, f"{block}: no check for commands of {words[0]!r}: {command}"
-            check(words)
+    for words in (words for line in block.commands for words in single_commands(line)):
+        program = words[0].rpartition("/")[2]
+        assert program in CHECKS, f"{block}: no check for commands of {program!r}: {shlex.join(words)}"
+        CHECKS[program](words)
+
+
+def single_commands(line):
+    """Words of each command of a line `A && B; C`, without variables set before it."""
+    words = shlex.shlex(line, posix=True, punctuation_chars=True)
+    words.whitespace_split = True
+    for ends, command in itertools.groupby(words, key=lambda word: word in ("&&", ";", "|")):
+        if not ends:
+            yield list(itertools.dropwhile(lambda word: re.fullmatch(r"[A-Z_]+=.*", word), command))
 
 
 def check_make(words):
@@ -116,7 +122,7 @@ def check_paramove(words):
         return
     path = []
     for word in words[1:]:
-        commands = re.findall(r"^│ (\w+) ", help_of(("paramove", *path)).partition(" Commands ")[2], re.M)
+        commands = re.findall(r"^│ ([\w-]+) ", help_of(("paramove", *path)).partition(" Commands ")[2], re.M)
         if word not in commands:
             break
         path.append(word)
@@ -125,6 +131,9 @@ def check_paramove(words):
 
 
 def check_python(words):
+    if words[1] == "-c":
+        compile(words[2], "<command>", "exec")
+        return
     assert words[1] == "-m", f"only modules are checked: {shlex.join(words)}"
     check_options((sys.executable, "-m", words[2]), words[3:])
 
