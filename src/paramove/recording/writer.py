@@ -28,15 +28,16 @@ class RecordingWriter:
         library: What wrote it, for people.
 
     Raises:
-        RecordingExistsError: There is a file of that name already.
+        RecordingExistsError: There is a file of that name already, finished or not.
     """
 
     def __init__(self, path: Path, library: str) -> None:
-        if path.exists():
-            raise RecordingExistsError(f"{path} exists; recordings are never overwritten: choose another name")
         self.path = path
         self._part = path.with_name(path.name + ".part")
-        self._file = self._part.open("wb")
+        for existing in (path, self._part):
+            if existing.exists():
+                raise RecordingExistsError(f"{existing} exists; recordings are never overwritten: choose another name")
+        self._file = self._part.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library=library)
         self._schemas: dict[str, int] = {}
