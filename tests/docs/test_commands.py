@@ -7,6 +7,7 @@ the line before the block, change that:
     <!-- needs a running demo -->  run while the demo runs in the same domain
 """
 
+import atexit
 import functools
 import itertools
 import os
@@ -16,6 +17,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -25,11 +27,13 @@ from ruamel.yaml import YAML
 from tests.docs.markdown import MARKERS, PAGES, ROOT, Block, blocks
 
 BLOCKS = [block for path in PAGES for block in blocks(path)]
-DOMAIN = f"docs-test-{os.getpid()}"
+RUNTIME = tempfile.TemporaryDirectory(prefix="paramove-docs-")  # sockets lie there; short, as their paths must be
+atexit.register(RUNTIME.cleanup)
 ENVIRONMENT = {
     **os.environ,
     "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-    "PARAMOVE_DOMAIN": DOMAIN,
+    "XDG_RUNTIME_DIR": RUNTIME.name,
+    "PARAMOVE_DOMAIN": "docs",
     "COLUMNS": "120",
     "NO_COLOR": "1",
 }
