@@ -6,6 +6,7 @@ and its own targets give the homography.
 
 from __future__ import annotations
 
+from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.rules.stage import Mind, Place, Stage, cm
@@ -32,6 +33,9 @@ class Calibrating(Stage):
         self.mind.tell("I do not know yet how the camera sees the table. I will place an object at four corners.")
         self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
         self.go("resting")
+
+    def on_gesture(self, gesture: Gesture) -> None:
+        """Nothing: what the table keeps is enough for this stage."""
 
     def step(self) -> ApplicationStage.Stage | None:
         """One tick."""

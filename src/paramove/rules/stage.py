@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 from paramove.msgs.gesture_pb2 import Gesture
@@ -71,7 +72,7 @@ class Mind:
         _log.info("%.1f s: %s", self.now_s, sentence)
 
 
-class Stage:
+class Stage(ABC):
     """A stage: `enter`, then `step` once a tick until it gives the next stage's name.
 
     Attributes:
@@ -86,14 +87,15 @@ class Stage:
         self.state = ""
         self._since_s = 0.0
 
+    @abstractmethod
     def enter(self) -> None:
         """Begin the stage."""
-        raise TypeError(f"{type(self).__name__} must say how it begins")
 
+    @abstractmethod
     def step(self) -> ApplicationStage.Stage | None:
         """One tick; the next stage or None to stay."""
-        raise TypeError(f"{type(self).__name__} must say what it does")
 
+    @abstractmethod
     def on_gesture(self, gesture: Gesture) -> None:
         """Something happened on the table (the table itself knows already)."""
 
