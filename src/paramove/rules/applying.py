@@ -89,7 +89,7 @@ class Applying(Stage):
         if outcome.state == RelocationStatus.STATE_REFUSED:
             self._ask_for_help(f"I cannot do that: {outcome.reason}.")
         elif outcome.state == RelocationStatus.STATE_FAILED:
-            self._failure = outcome.reason
+            self._failure = outcome.reason or "it failed"
             self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
             self.go("returning")
         else:
