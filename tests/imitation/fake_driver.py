@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
+from paramove.bus import topics
+from paramove.bus.subscriber import Heard
+from paramove.bus.turns import Tick
 from paramove.imitation.clear_plans import ClearPlans
 from paramove.imitation.motion import PlannedMotion
 from paramove.imitation.synthesizer import Synthesizer
@@ -153,26 +156,36 @@ class Cell:
 
     Attributes:
         statuses: Everything the synthesizer said of its goals.
+        events: Everything it heard, and the ticks.
     """
 
     def __init__(self, driver: FakeDriver | None = None) -> None:
         self.driver = driver or FakeDriver()
         self.synthesizer = Synthesizer(RememberedPlans(planner(), checker()))
         self.statuses: list[RelocationStatus] = []
+        self.events: list[Heard | Tick] = []
         self.now_ns = 0
 
     def tick(self) -> None:
         self.now_ns += PERIOD_NS
+        self.events.append(Tick(len(self.events), self.now_ns))
         says = self.synthesizer.tick(self.now_ns)
         self.statuses.extend(says.statuses)
         answers = [status for trajectory in says.trajectories for status in self.driver.hear(trajectory)]
         answers.extend(self.driver.step())
-        self.synthesizer.on_joint_states(self.driver.measured())
+        measured = self.driver.measured()
+        self._heard(topics.ARM_JOINT_STATES, measured)
+        self.synthesizer.on_joint_states(measured)
         for answer in answers:
+            self._heard(topics.ARM_TRAJECTORY_STATUS, answer)
             self.synthesizer.on_trajectory_status(answer)
+
+    def _heard(self, topic: topics.Topic, message: Any) -> None:
+        self.events.append(Heard(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
     def do(self, wanted: RelocationGoal, patience: int = 1200) -> RelocationStatus:
         """Sends the goal and ticks until its last status, which is returned."""
+        self._heard(topics.RELOCATION_GOAL, wanted)
         self.synthesizer.on_goal(wanted)
         last = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
         for _ in range(patience):

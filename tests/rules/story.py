@@ -6,6 +6,9 @@ import heapq
 import itertools
 from collections.abc import Callable
 
+from paramove.bus import topics
+from paramove.bus.subscriber import Heard
+from paramove.bus.turns import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
@@ -13,7 +16,7 @@ from paramove.rules.rule_learner import RuleLearner
 from paramove.rules.stage import RuleLearnerOptions
 from paramove.rules.table import Surface
 
-TICK_S = 1 / 15
+TICK_NS = 66_666_667
 MOTION_S = 4.0
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 OPENINGS = {"yellow": (0.135, -0.038), "green": (0.135, -0.095), "blue": (0.135, 0.019)}
@@ -33,6 +36,7 @@ class Story:
     """What happens follows from `arm` and `instructor`, which a test may replace.
 
     Attributes:
+        events: Everything that the learner heard, and the ticks.
         goals: Every goal as often as it was sent.
         outcomes: Outcomes of the next relocations in stage 3: (state, reason, where the object is then; None: in its
             opening). When they are used up, all go well.
@@ -40,9 +44,11 @@ class Story:
         answers: Request -> what the instructor does then.
     """
 
-    def __init__(self) -> None:
-        self.learner = RuleLearner(OPTIONS, "run")
-        self.now_s = 0.0
+    def __init__(self, run_name: str = "run") -> None:
+        self.learner = RuleLearner(OPTIONS, run_name)
+        self.events: list[Heard | Tick] = []
+        self.now_ns = 0
+        self._number = 0
         self.goals: list[RelocationGoal] = []
         self.speech: list[Speech] = []
         self.rules: list[Rules] = []
@@ -66,15 +72,21 @@ class Story:
 
     # Time
 
+    @property
+    def now_s(self) -> float:
+        return self.now_ns * 1e-9
+
     def later(self, after_s: float, do: Callable[..., None], *arguments) -> None:
         heapq.heappush(self._events, (self.now_s + after_s, next(self._count), do, arguments))
 
     def tick(self) -> None:
-        self.now_s += TICK_S
+        self.now_ns += TICK_NS
         while self._events and self._events[0][0] <= self.now_s:
             _, _, do, arguments = heapq.heappop(self._events)
             do(*arguments)
-        said = self.learner.tick(self.now_s)
+        self._number += 1
+        self.events.append(Tick(self._number, self.now_ns))
+        said = self.learner.tick(self.now_ns * 1e-9)
         self.calibrations += said.calibrations
         self.calibrated |= bool(said.calibrations)
         self.rules += said.rules
@@ -104,7 +116,8 @@ class Story:
         seen = Gesture(kind=kind, object=name, u_px=u, v_px=v, located=self.calibrated)
         if self.calibrated:
             seen.x, seen.y, seen.frame = place[0], place[1], "right_shoulder"
-        seen.captured.FromNanoseconds(round(self.now_s * 1e9))
+        seen.captured.FromNanoseconds(self.now_ns)
+        self._heard(topics.GESTURES, seen)
         self.learner.on_gesture(seen)
 
     def hand(self, there: bool) -> None:
@@ -181,7 +194,12 @@ class Story:
         self.later(MOTION_S, self._say, goal.id, state, reason)
 
     def _say(self, name: str, state: RelocationStatus.State, reason: str = "") -> None:
-        self.learner.on_goal_status(RelocationStatus(goal_id=name, state=state, reason=reason))
+        status = RelocationStatus(goal_id=name, state=state, reason=reason)
+        self._heard(topics.RELOCATION_STATUS, status)
+        self.learner.on_goal_status(status)
+
+    def _heard(self, topic: topics.Topic, message: Gesture | RelocationStatus) -> None:
+        self.events.append(Heard(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
     # What was said
 

@@ -1,0 +1,35 @@
+"""The operator's node arms once in simulation, replayed from recordings of the gate's state."""
+
+from nodes import operator
+from paramove.bus import topics
+from paramove.bus.recorded import RecordedBus
+from paramove.bus.subscriber import Heard
+from paramove.msgs.safety_state_pb2 import SafetyState
+
+SECOND = 1_000_000_000
+
+
+def replayed(arms_at_start: bool, *states: SafetyState.State) -> RecordedBus:
+    """The gate says a state each second."""
+    bus = RecordedBus(
+        Heard(topics.ARM_SAFETY, SafetyState(state=state), number * SECOND, number * SECOND, number)
+        for number, state in enumerate(states, start=1)
+    )
+    operator.run(bus, operator.Config(arms_at_start=arms_at_start))
+    return bus
+
+
+def test_arms_once_and_never_again() -> None:
+    disarmed, armed = SafetyState.STATE_DISARMED, SafetyState.STATE_ARMED
+    bus = replayed(True, SafetyState.STATE_DISCONNECTED, disarmed, armed, armed, SafetyState.STATE_HOLD, disarmed)
+    (word,) = bus.said
+    assert word.topic is topics.OPERATOR_ARM
+    assert word.message.armed
+    assert word.message.captured.ToNanoseconds() == word.published_ns == 2 * SECOND
+    assert bus.states == [("ready", "arms once at the start")]
+
+
+def test_does_not_arm_unless_told() -> None:
+    bus = replayed(False, SafetyState.STATE_DISARMED, SafetyState.STATE_DISARMED)
+    assert bus.said == []
+    assert bus.states == [("ready", "does not arm")]

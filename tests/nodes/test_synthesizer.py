@@ -1,0 +1,65 @@
+"""The synthesizer's node says what its library says, replayed from a recording of goals and an arm."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from nodes import synthesizer
+from paramove.bus import topics
+from paramove.bus.recorded import RecordedBus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from tests.imitation.fake_driver import Cell, goal
+from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> synthesizer.Config:
+    """With a trained model from a file, not from the user's cache."""
+    path = tmp_path / "reaching.npz"
+    reaching_model().save(path)
+    return synthesizer.Config.model_validate({"robot": ROBOT_FOLDER, "movement": {"file": path}})
+
+
+def test_replays_a_relocation(config: synthesizer.Config) -> None:
+    cell = Cell()
+    cell.do(goal(RelocationGoal.KIND_RELOCATE, source=(0.177, -0.02), target=OPENINGS[1]))
+    cell.do(goal(RelocationGoal.KIND_RELOCATE, "far", source=(0.30, 0.0), target=OPENINGS[1]))
+    bus = RecordedBus(cell.events)
+    synthesizer.run(bus, config)
+    assert bus.states == [("starting", "training or reading the reaching movement"), ("ready", "waiting for a goal")]
+    statuses = [said.message for said in bus.said_on(topics.RELOCATION_STATUS)]
+    assert statuses == cell.statuses
+    assert statuses[-1].state == RelocationStatus.STATE_REFUSED
+    trajectories = [said.message for said in bus.said_on(topics.ARM_TRAJECTORY)]
+    assert [one.id for one in trajectories] == [one.id for one in cell.driver.heard] == ["g/1", "g/2"]
+    for one, other in zip(trajectories, cell.driver.heard, strict=True):
+        assert one.phases == other.phases
+        np.testing.assert_allclose(one.points[-1].position_rad, other.points[-1].position_rad, rtol=0, atol=1e-9)
+    assert {said.topic for said in bus.said} <= set(synthesizer.SAYS)
+
+
+def test_without_goals_it_says_nothing(config: synthesizer.Config) -> None:
+    cell = Cell()
+    for _ in range(20):
+        cell.tick()
+    bus = RecordedBus(cell.events)
+    synthesizer.run(bus, config)
+    assert bus.said == []
+
+
+def test_trains_its_movement_once_and_keeps_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    config = synthesizer.Config.model_validate({"robot": ROBOT_FOLDER, "movement": {"seed": 3}})
+    synthesizer.run(RecordedBus(), config)
+    (kept,) = tmp_path.rglob("*.npz")
+    before = kept.stat().st_mtime_ns
+    synthesizer.run(RecordedBus(), config)
+    assert kept.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("parameters", [{"surfaze": {}}, {"surface": {"height": 1.0}}, {"movement": {"seeds": 1}}])
+def test_refuses_unknown_parameters(parameters: dict) -> None:
+    with pytest.raises(ValidationError):
+        synthesizer.Config.model_validate(parameters)
