@@ -1,10 +1,11 @@
-"""A bus that plays what was recorded and keeps what is said."""
+"""The library's recorded bus, filled with messages a tick apart or with ticks alone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
+from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
@@ -12,37 +13,14 @@ from paramove.bus.turns import Tick
 PERIOD_NS = 66_666_667
 
 
-class RecordedBus:
-    """Stands in for `paramove.bus.bus.Bus` in `run(bus, config)`."""
+def bus_that_heard(messages: Iterable[tuple[Topic, Any]]) -> RecordedBus:
+    """One message each tick period, from the first on; no ticks."""
+    return RecordedBus(
+        Heard(topic, message, number * PERIOD_NS, number * PERIOD_NS, number)
+        for number, (topic, message) in enumerate(messages, start=1)
+    )
 
-    def __init__(self, recorded: Iterable[tuple[Topic, Any]] = (), ticks: int = 0) -> None:
-        self._recorded = [
-            Heard(topic, message, (i + 1) * PERIOD_NS, (i + 1) * PERIOD_NS, i)
-            for i, (topic, message) in enumerate(recorded)
-        ]
-        self._ticks = ticks
-        self.now_ns = 0
-        self.said: list[tuple[Topic, Any, int | None]] = []
-        self.states: list[tuple[str, str]] = []
 
-    def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
-        assert isinstance(message, topic.type)
-        self.said.append((topic, message, captured_ns))
-
-    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
-        for heard in self._recorded:
-            if heard.topic in wanted:
-                self.now_ns = heard.captured_ns
-                yield heard
-        for number in range(1, self._ticks + 1 if tick else 1):
-            self.now_ns = number * PERIOD_NS
-            yield Tick(number, self.now_ns)
-
-    def latest(self, *wanted: Topic) -> Iterator[Heard | Tick]:
-        return self.events(*wanted)
-
-    def ready(self, sentence: str) -> None:
-        self.states.append(("ready", sentence))
-
-    def degraded(self, sentence: str) -> None:
-        self.states.append(("degraded", sentence))
+def bus_with_ticks(count: int) -> RecordedBus:
+    """Nothing but time."""
+    return RecordedBus(Tick(number, number * PERIOD_NS) for number in range(1, count + 1))

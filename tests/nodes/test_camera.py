@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from nodes import camera
 from paramove.bus import topics
 from paramove.vision.frames import FrameError, decode
-from tests.nodes.recorded_bus import RecordedBus
+from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard, bus_with_ticks
 
 
 def _picture(seed: int, width: int = 480, height: int = 360) -> np.ndarray:
@@ -31,15 +31,15 @@ def test_says_each_frame_of_a_video_file_once(tmp_path: Path) -> None:
     for picture in pictures:
         writer.write(picture)
     writer.release()
-    bus = RecordedBus(ticks=30)
+    bus = bus_with_ticks(30)
     camera.run(bus, camera.Config(source=f"file:{path}"))
-    assert bus.now_ns < 30 * 66_666_667  # it ended with the file
+    assert bus.now_ns < 30 * PERIOD_NS  # it ended with the file
     assert len(bus.said) == 6
-    for (topic, message, captured_ns), picture in zip(bus.said, pictures, strict=True):
-        assert topic is topics.CAMERA_IMAGE
-        assert message.frame_id == "camera_optical"
-        assert message.timestamp.ToNanoseconds() == captured_ns
-        assert np.abs(decode(message).astype(int) - picture).mean() < 6
+    for said, picture in zip(bus.said, pictures, strict=True):
+        assert said.topic is topics.CAMERA_IMAGE
+        assert said.message.frame_id == "camera_optical"
+        assert said.message.timestamp.ToNanoseconds() == said.captured_ns
+        assert np.abs(decode(said.message).astype(int) - picture).mean() < 6
 
 
 def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
     for seed in range(12):
         writer.write(_picture(seed))
     writer.release()
-    bus = RecordedBus(ticks=30)
+    bus = bus_with_ticks(30)
     camera.run(bus, camera.Config(source=f"file:{path}"))
     assert len(bus.said) == 6
 
@@ -56,16 +56,16 @@ def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
 def test_compresses_the_light_of_a_topic_and_recovers_from_bad_frames() -> None:
     black = np.zeros((360, 480, 3), np.uint8)
     wrong_size = _picture(1, 360, 240)
-    bus = RecordedBus([_light(image) for image in (_picture(1), black, wrong_size, _picture(2))])
+    bus = bus_that_heard([_light(image) for image in (_picture(1), black, wrong_size, _picture(2))])
     camera.run(bus, camera.Config())
-    assert [captured_ns // 66_666_667 for _, _, captured_ns in bus.said] == [1, 4]
+    assert [said.captured_ns // PERIOD_NS for said in bus.said] == [1, 4]
     assert [state for state, _ in bus.states] == ["ready", "degraded", "degraded", "ready"]
     assert "black" in bus.states[1][1]
     assert "360 x 240 px, 480 x 360 expected" in bus.states[2][1]
 
 
 def test_a_frozen_picture_is_said_no_more() -> None:
-    bus = RecordedBus([_light(_picture(1))] * 20)
+    bus = bus_that_heard([_light(_picture(1))] * 20)
     camera.run(bus, camera.Config(frozen_after=10))
     assert len(bus.said) == 9
     assert "frozen" in bus.states[-1][1]
@@ -82,7 +82,7 @@ def test_a_frozen_picture_is_said_no_more() -> None:
 )
 def test_a_source_that_is_not_there_is_named(source: str, words: str) -> None:
     with pytest.raises(FrameError, match=words):
-        camera.run(RecordedBus(), camera.Config(source=source))
+        camera.run(bus_with_ticks(1), camera.Config(source=source))
 
 
 def test_refuses_unknown_parameters() -> None:

@@ -5,7 +5,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from nodes import colour_tracker
 from paramove.bus import topics
 from paramove.vision.frames import Frame, encode
-from tests.nodes.recorded_bus import RecordedBus
+from tests.nodes.recorded_bus import bus_that_heard
 
 
 def _drawn() -> CompressedImage:
@@ -15,17 +15,17 @@ def _drawn() -> CompressedImage:
 
 
 def test_says_what_each_image_shows() -> None:
-    bus = RecordedBus([(topics.CAMERA_IMAGE, _drawn())] * 3)
+    bus = bus_that_heard([(topics.CAMERA_IMAGE, _drawn())] * 3)
     colour_tracker.run(bus, colour_tracker.Config())
-    assert [topic for topic, _, _ in bus.said] == [topics.OBJECTS_TRACKED] * 3
-    _, tracked, captured_ns = bus.said[1]
-    assert tracked.captured.ToNanoseconds() == captured_ns
+    assert [said.topic for said in bus.said] == [topics.OBJECTS_TRACKED] * 3
+    tracked = bus.said[1].message
+    assert tracked.captured.ToNanoseconds() == bus.said[1].captured_ns
     assert [(o.name, round(o.u_px), round(o.v_px)) for o in tracked.objects] == [("yellow", 106, 114)]
 
 
 def test_a_corrupt_image_is_left_out_and_told() -> None:
     broken = CompressedImage(format="jpeg", data=b"\xff\xd8 not a picture")
-    bus = RecordedBus([(topics.CAMERA_IMAGE, image) for image in (_drawn(), broken, _drawn())])
+    bus = bus_that_heard([(topics.CAMERA_IMAGE, image) for image in (_drawn(), broken, _drawn())])
     colour_tracker.run(bus, colour_tracker.Config())
     assert len(bus.said) == 2
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
@@ -34,6 +34,6 @@ def test_a_corrupt_image_is_left_out_and_told() -> None:
 
 def test_colours_come_from_the_parameters() -> None:
     config = colour_tracker.Config.model_validate({"colours": [{"name": "amber", "hue_deg": [40, 80]}]})
-    bus = RecordedBus([(topics.CAMERA_IMAGE, _drawn())])
+    bus = bus_that_heard([(topics.CAMERA_IMAGE, _drawn())])
     colour_tracker.run(bus, config)
-    assert [found.name for found in bus.said[0][1].objects] == ["amber"]
+    assert [found.name for found in bus.said[0].message.objects] == ["amber"]

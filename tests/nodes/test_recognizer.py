@@ -4,7 +4,7 @@ from nodes import recognizer
 from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
-from tests.nodes.recorded_bus import PERIOD_NS, RecordedBus
+from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard
 from tests.vision.tracks import image_of, standing
 
 
@@ -12,20 +12,21 @@ def test_says_gestures_with_places_once_calibrated() -> None:
     metres = PlaneCalibration(plane_frame="right_shoulder", plane_from_image=[0.001, 0, 0, 0, -0.001, 0, 0, 0, 1])
     recorded = [(topics.CALIBRATION_PLANE, metres)]
     recorded += [(topics.OBJECTS_TRACKED, image_of((n + 2) * PERIOD_NS, standing("blue", 200, 150))) for n in range(12)]
-    bus = RecordedBus(recorded)
+    bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config())
     assert len(bus.said) == 1
-    topic, gesture, captured_ns = bus.said[0]
-    assert topic is topics.GESTURES
+    said = bus.said[0]
+    gesture = said.message
+    assert said.topic is topics.GESTURES
     assert (gesture.kind, gesture.object, gesture.located) == (Gesture.KIND_APPEARED, "blue", True)
-    assert gesture.captured.ToNanoseconds() == captured_ns
+    assert gesture.captured.ToNanoseconds() == said.captured_ns
     assert_allclose((gesture.x, gesture.y), (0.2, -0.15), rtol=0, atol=1e-9)
 
 
 def test_a_bad_calibration_is_refused_and_the_node_goes_on() -> None:
     recorded = [(topics.CALIBRATION_PLANE, PlaneCalibration(plane_from_image=[1.0] * 4))]
     recorded += [(topics.OBJECTS_TRACKED, image_of((n + 2) * PERIOD_NS, standing("blue", 200, 150))) for n in range(12)]
-    bus = RecordedBus(recorded)
+    bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config())
     assert bus.states[-1][0] == "degraded"
-    assert [gesture.located for _, gesture, _ in bus.said] == [False]
+    assert [said.message.located for said in bus.said] == [False]
