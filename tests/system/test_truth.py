@@ -37,11 +37,11 @@ def test_no_ordinary_node_can_learn_of_the_truth(launcher):
     runtime = Path(launcher.environment["XDG_RUNTIME_DIR"]) / "paramove"
     (truth_folder,) = runtime.glob("truth-*")
     bus_folder = runtime / "test"
-    until(lambda: any(truth_folder.iterdir()), "the truth is said")
+    sockets = {"truth.layout", "truth.state"}
+    until(lambda: sockets <= {path.name for path in truth_folder.iterdir()}, "the simulator says the truth")
 
     assert stat.S_IMODE(truth_folder.stat().st_mode) == 0o700
     assert stat.S_IMODE(bus_folder.stat().st_mode) == 0o700
-    assert {"truth.layout", "truth.state"} <= {path.name for path in truth_folder.iterdir()}
     assert [path.name for path in bus_folder.rglob("*") if "truth" in path.name] == []
 
     configs = {path.stem: path.read_text() for path in (launcher.latest / "nodes").glob("*.yaml")}
