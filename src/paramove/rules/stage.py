@@ -49,7 +49,6 @@ class Mind:
     Attributes:
         rules: Object -> place of its opening.
         done: Objects that have been put away.
-        pointed_at: Objects pointed at since the last look, oldest first, with the time.
     """
 
     options: RuleLearnerOptions
@@ -60,7 +59,6 @@ class Mind:
     now_s: float = 0.0
     rules: dict[str, Place] = field(default_factory=dict)
     done: set[str] = field(default_factory=set)
-    pointed_at: list[tuple[str, float]] = field(default_factory=list)
     sentence: str = ""
 
     def tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
