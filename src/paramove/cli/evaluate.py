@@ -50,9 +50,11 @@ def rule_learning(
     """
     console = Console(highlight=False, emoji=False)
     results = _batch(console, seeds, jobs, runs, settings or [], again, video, drop_recordings)
-    from paramove.evaluation.batch_table import enough, table_of, totals_of
+    from paramove.evaluation.batch_table import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
 
-    console.print(table_of(results))
+    wide = Console(highlight=False, emoji=False, width=max(console.width, TABLE_WIDTH))
+    wide.print(table_of(results))
+    console.print(LEGEND, style="dim")
     for result in results:
         if not result.get("success"):
             console.print(

@@ -13,22 +13,29 @@ from paramove.evaluation.verdict_table import below
 COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("placed", ("objects_placed",), "total"),
     ("grasps", ("grasps",), "total"),
-    ("first try", ("grasps_first_try",), "total"),
-    ("calib. grasps", ("calibration_grasps",), "total"),
-    ("first try ", ("calibration_grasps_first_try",), "total"),
-    ("unwanted contacts", ("unwanted_contacts",), "total"),
-    ("penetr. mm", ("deepest_penetration_mm",), "max"),
-    ("homogr. mm", ("homography_error_mm", "median"), "median"),
-    ("max", ("homography_error_mm", "max"), "max"),
-    ("commanded mm", ("gripper_error_commanded_mm", "both", "max"), "max"),
-    ("physical mm", ("gripper_error_physical_mm", "both", "max"), "max"),
+    ("first\ntry", ("grasps_first_try",), "total"),
+    ("calib.\ngrasps", ("calibration_grasps",), "total"),
+    ("first\ntry ", ("calibration_grasps_first_try",), "total"),
+    ("unw.\ncont.", ("unwanted_contacts",), "total"),
+    ("penetr.\nmm", ("deepest_penetration_mm",), "max"),
+    ("homogr.\nmm", ("homography_error_mm", "median"), "median"),
+    ("max\nmm", ("homography_error_mm", "max"), "max"),
+    ("comm.\nmm", ("gripper_error_commanded_mm", "both", "max"), "max"),
+    ("phys.\nmm", ("gripper_error_physical_mm", "both", "max"), "max"),
     ("lost", ("loss", "total"), "total"),
-    ("simulated s", ("simulated_s",), "median"),
-    ("× real time", ("wall", "realtime_factor"), "median"),
+    ("sim.\ns", ("simulated_s",), "median"),
+    ("× real\ntime", ("wall", "realtime_factor"), "median"),
 )
 """Heading, keys in run.json, and how the column is summed up."""
 
+LEGEND = (
+    "unw. cont.: contacts with anything but the handled object; penetr.: deepest penetration; homogr., max: the "
+    "robot's own calibration; comm.: commanded gripper to its target; phys.: gripper to the commanded one, both the "
+    "largest while grasping and placing; yellow: not within its goal"
+)
 NEEDED_SHARE = 0.9
+TABLE_WIDTH = 140
+"""On a narrower terminal the rows are broken by the terminal."""
 
 
 def value_of(result: dict[str, Any], keys: Sequence[str]) -> float | None:
@@ -87,11 +94,11 @@ def shown(value: float | None) -> str:
 
 
 _LIMITS = {
-    "unwanted contacts": 0.0,
-    "penetr. mm": 0.7,
-    "homogr. mm": 3.0,
-    "commanded mm": 0.5,
-    "physical mm": 2.0,
+    "unw.\ncont.": 0.0,
+    "penetr.\nmm": 0.7,
+    "homogr.\nmm": 3.0,
+    "comm.\nmm": 0.5,
+    "phys.\nmm": 2.0,
     "lost": 0.0,
 }
 

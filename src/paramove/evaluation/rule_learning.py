@@ -1,4 +1,4 @@
-"""Evaluates a run of the rule-learning application: `run.json`, `report.html`, `demo.mp4` in its folder.
+"""Evaluates a run of the rule-learning application: `run.json`, `report.html`, `demo.webm` in its folder.
 
 Called by the launcher after the run, or by hand: `python -m paramove.evaluation.rule_learning RUN_FOLDER [--no-video]`.
 Exit codes: 0 the robot did what it should, by the recorded truth; 3 it did not; 66 no such run.
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m paramove.evaluation.rule_learning", description=__doc__)
     parser.add_argument("run_folder", type=Path)
-    parser.add_argument("--no-video", action="store_true", help="write no demo.mp4")
+    parser.add_argument("--no-video", action="store_true", help="write no demo.webm")
     parser.add_argument("--no-report", action="store_true", help="write run.json alone")
     options = parser.parse_args(arguments)
     console = Console(highlight=False, emoji=False)
@@ -49,6 +49,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
         return exit_codes.INPUT_MISSING
     written = [write_summary(evaluation)]
+    if not options.no_report:
+        from paramove.evaluation.demo_video import write_video
+        from paramove.evaluation.report import write_report
+
+        video = None if options.no_video else write_video(evaluation, console)
+        written = [write_report(evaluation, video), *([video] if video is not None else []), *written]
     show_verdict(evaluation.summary, written, console)
     return exit_codes.OK if evaluation.summary["success"] else JUDGED_A_FAILURE
 

@@ -1,0 +1,264 @@
+"""The report of a run: one HTML file that needs no other, to be read from top to bottom."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from paramove.evaluation import plots
+from paramove.evaluation.plots import svg_of
+from paramove.evaluation.run_summary import RunEvaluation
+from paramove.evaluation.verdict_table import rows_of
+
+STYLE = """
+:root{--ink:#1d2530;--soft:#5b6470;--line:#e3e7ec;--good:#1f7a45;--bad:#b3372b;--warn:#a86a00;--card:#fff}
+*{box-sizing:border-box}
+body{margin:0;background:#f4f6f8;color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:1120px;margin:0 auto;padding:0 20px 60px}
+header{color:#fff;background:var(--good);padding:28px 0 26px;margin-bottom:24px}
+header.bad{background:var(--bad)}
+header>div{max-width:1120px;margin:0 auto;padding:0 20px}
+h1{margin:0;font-size:28px;letter-spacing:-.01em} header p{margin:6px 0 0;opacity:.92}
+h2{font-size:18px;margin:0 0 4px} .why{color:var(--soft);margin:0 0 12px;font-size:14px}
+section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:18px 20px;margin:0 0 18px}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:12px;margin-bottom:18px}
+.tile{background:var(--card);border:1px solid var(--line);border-left:4px solid var(--good);border-radius:8px;
+padding:10px 14px}
+.tile.off{border-left-color:var(--warn)} .tile b{display:block;font-size:18px;font-weight:650}
+.tile span{color:var(--soft);font-size:12.5px;display:block;line-height:1.35}
+table{border-collapse:collapse;width:100%;font-size:13.5px} th{text-align:left;color:var(--soft);font-weight:600}
+th,td{padding:5px 10px 5px 0;border-bottom:1px solid var(--line);vertical-align:top}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums} td.n,td:has(.dot){white-space:nowrap}
+tr:last-child td{border-bottom:0}
+.two{display:grid;grid-template-columns:1fr 1fr;gap:18px} .two section{margin:0}
+.yes{color:var(--good);font-weight:600}.no{color:var(--bad);font-weight:600}.soft{color:var(--soft)}
+.dot{display:inline-block;width:10px;height:10px;border-radius:50%;margin-right:7px}
+video{width:100%;border-radius:8px;background:#000;display:block} svg{width:100%;height:auto;display:block}
+.scroll{overflow-x:auto} summary{cursor:pointer;font-weight:600} pre{font-size:12.5px;overflow-x:auto}
+@media(max-width:860px){.two{grid-template-columns:1fr}}
+"""
+
+
+def write_report(evaluation: RunEvaluation, video: Path | None) -> Path:
+    """Write `report.html` into the run's folder; the video is put into it."""
+    path = evaluation.run.folder / "report.html"
+    path.write_text(page(evaluation, video), encoding="utf-8")
+    return path
+
+
+def page(evaluation: RunEvaluation, video: Path | None) -> str:
+    """The report as text."""
+    summary = evaluation.summary
+    seed = summary["seed"]
+    parts = [
+        f"<!doctype html><html lang=en><meta charset=utf-8><title>Rule learning, seed {seed}</title>",
+        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
+        _header(summary),
+        "<main>",
+        _tiles(summary),
+        _video(video),
+        _plot(
+            "What happened when",
+            "Stages of the application, goals of the arm in the colour of the object, and what the robot noticed.",
+            svg_of(plots.timeline, evaluation, (11, 2.5)),
+        ),
+        _rules(summary),
+        "<div class=two>",
+        _plot(
+            "The working surface from above",
+            "Rings are true, crosses and dots are what the robot believed. The robot stands below, looking up.",
+            svg_of(plots.plan, evaluation, (5.6, 3.7)),
+        ),
+        _plot(
+            "How well the robot knows its camera",
+            "Error of its own calibration over the working area; the camera's true pose and lens are known only here.",
+            svg_of(plots.homography, evaluation, (5.6, 3.7)),
+        ),
+        "</div><p></p>",
+        _grasps(summary),
+        _plot(
+            "The arm",
+            "Measured joint angles; the gripper's height; its distance from where it was sent and from its targets.",
+            svg_of(plots.motion, evaluation, (11, 5.6)),
+        ),
+        _contacts(evaluation),
+        _topics(summary),
+        _speech(summary),
+        _origin(summary),
+        "</main></html>",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _header(summary: dict[str, Any]) -> str:
+    good = summary["success"]
+    number = len(summary["rules"])
+    title = "Success" if good else "Failure"
+    world = f"Rule learning, world {summary['seed']}, {summary['simulated_s']:.0f} s simulated"
+    return (
+        f"<header{'' if good else ' class=bad'}><div><h1>{title}: {summary['objects_placed']} of {number} objects rest "
+        f"in their own opening</h1><p>{world}: {escape(summary['reason'])}. "
+        f"Judged by the recorded truth.</p></div></header>"
+    )
+
+
+def _tiles(summary: dict[str, Any]) -> str:
+    tiles = (
+        f"<div class='tile{'' if good else ' off'}'><b>{escape(found)}</b><span>{escape(name)}"
+        f"{f' (goal {escape(goal)})' if goal else ''}</span></div>"
+        for name, found, goal, good in rows_of(summary)
+    )
+    return f"<div class=tiles>{''.join(tiles)}</div>"
+
+
+def _video(video: Path | None) -> str:
+    if video is None:
+        return ""
+    data = base64.b64encode(video.read_bytes()).decode("ascii")
+    kind = f"video/{video.suffix.removeprefix('.')}"
+    return (
+        "<section><h2>The run</h2><p class=why>Left, the camera with what the robot makes of it; right, the world, "
+        "which the robot is not shown. Boxes: tracked objects. Circles: openings it believes in. Arrow: its goal.</p>"
+        f"<video controls preload=metadata src='data:{kind};base64,{data}'></video></section>"
+    )
+
+
+def _plot(title: str, why: str, svg: str) -> str:
+    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{svg}</section>"
+
+
+def _rules(summary: dict[str, Any]) -> str:
+    rows = [
+        (
+            _dot(rule["object"]),
+            f"“{escape(rule['sentence'])}”" if rule["sentence"] else "<span class=soft>nothing learnt</span>",
+            _place(rule["believed"]),
+            _place(rule["true"]),
+            _number(rule["error_mm"], 1),
+            _yes(rule["right"]),
+        )
+        for rule in summary["rules"]
+    ]
+    heads = ("object", "in its own words", "believed, cm", "true, cm", "error, mm", "right")
+    return _section(
+        "What the robot believes, beside the truth",
+        "The robot saw the instructor carry each object into an opening; nobody told it where the openings are.",
+        _table(heads, rows, numbers=(2, 3, 4)),
+    )
+
+
+def _grasps(summary: dict[str, Any]) -> str:
+    rows = [
+        (
+            f"{grasp['begun_s']:.1f}–{grasp['ended_s']:.1f}",
+            escape(grasp["stage"]),
+            _dot(grasp["object"]),
+            str(grasp["attempt"]),
+            _place(grasp["from"]),
+            _number(grasp["from_error_mm"], 1),
+            _place(grasp["to"]),
+            f"<span class={'yes' if grasp['result'] == 'succeeded' else 'no'}>{escape(grasp['result'])}</span>"
+            + (f"<br><span class=soft>{escape(grasp['reason'])}</span>" if grasp["reason"] else ""),
+            _number(grasp["elbow_turn_deg"], 1),
+            _number(grasp.get("grasp_commanded_mm"), 2),
+            _number(grasp.get("grasp_physical_mm"), 2),
+            _number(grasp.get("place_commanded_mm"), 2),
+            _number(grasp.get("place_physical_mm"), 2),
+        )
+        for grasp in summary["grasp_list"]
+    ]
+    heads = (
+        *("s", "stage", "object", "try", "from, cm", "off, mm", "to, cm", "result", "elbow, °"),
+        *("grasp: target, mm", "world, mm", "place: target, mm", "world, mm"),
+    )
+    return _section(
+        "Every grasp",
+        "Off: how far the object truly stood from where the robot believed it. Elbow: turned because of a joint limit. "
+        "Target: commanded gripper from its target. World: gripper from the commanded one.",
+        _table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)),
+    )
+
+
+def _contacts(evaluation: RunEvaluation) -> str:
+    found = evaluation.summary["contact_list"]
+    rows = [
+        (f"{item['time_s']:.2f}", str(item["count"]), escape(", ".join(item["in_contact"]) or "over already"))
+        for item in found
+    ]
+    table = _table(("s", "new", "in contact then"), rows, numbers=(0, 1)) if rows else ""
+    return _section(
+        "What the robot touched",
+        "It may touch the object that it handles, and nothing else. Deeper than 0.7 mm would be no physical grasp.",
+        svg_of(plots.contacts, evaluation, (11, 2.2)) + table,
+    )
+
+
+def _topics(summary: dict[str, Any]) -> str:
+    lost = summary["loss"]["topics"]
+    rows = [
+        (
+            escape(rate["node"] or "–"),
+            escape(topic),
+            _number(rate["declared_hz"], 0) if rate["declared_hz"] is not None else "<span class=soft>events</span>",
+            _number(rate["measured_hz"], 2),
+            str(rate["messages"]),
+            _number(rate["longest_gap_s"], 2),
+            str(lost.get(topic, 0)),
+        )
+        for topic, rate in sorted(summary["topic_rates"].items(), key=lambda item: (item[1]["node"], item[0]))
+    ]
+    heads = ("node", "topic", "declared, Hz", "measured, Hz", "messages", "longest gap, s", "lost")
+    return _section(
+        "What was said on the bus",
+        "Rates in simulated time. Lost: gaps in the sequence numbers of the recording.",
+        _table(heads, rows, numbers=(2, 3, 4, 5, 6)),
+    )
+
+
+def _speech(summary: dict[str, Any]) -> str:
+    rows = [(f"{said['time_s']:.1f}", f"“{escape(said['sentence'])}”") for said in summary["speech"]]
+    return _folded("All that the robot said", _table(("s", ""), rows, numbers=(0,)))
+
+
+def _origin(summary: dict[str, Any]) -> str:
+    wall = summary["wall"]
+    rows = [(escape(name), escape(version or "–")) for name, version in sorted(summary["versions"].items())]
+    rows += [(escape(name), escape(str(wall[name]))) for name in ("begun", "run_folder", "realtime_factor")]
+    return _folded("Versions and origin", _table(("", ""), rows))
+
+
+def _folded(title: str, content: str) -> str:
+    return f"<section><details><summary>{escape(title)}</summary>{content}</details></section>"
+
+
+def _section(title: str, why: str, content: str) -> str:
+    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p><div class=scroll>{content}</div></section>"
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """Cells are HTML already."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return f"<table><tr>{cells('th', [escape(head) for head in heads])}</tr>{body}</table>"
+
+
+def _dot(name: str) -> str:
+    return f"<span class=dot style='background:{plots.COLOURS.get(name, plots.OTHER)}'></span>{escape(name)}"
+
+
+def _place(place: Sequence[float] | None) -> str:
+    return "–" if place is None else f"({place[0] * 100:.1f}, {place[1] * 100:.1f})".replace("-", "−")
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def _yes(value: bool) -> str:
+    return "<span class=yes>yes</span>" if value else "<span class=no>no</span>"
