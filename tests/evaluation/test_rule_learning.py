@@ -25,10 +25,10 @@ def test_successful_run_gets_numbers_report_and_video(folder, capsys):
     assert json.loads((folder / "run.json").read_text())["success"]
     page = (folder / "report.html").read_text()
     assert "Success: 2 of 2 objects" in page
-    assert "data:video/webm;base64," in page
+    assert "data:video/mp4;base64," in page
     assert page.count("<svg") == 5
     assert not re.search(r"""(src|href)=["']?(http|file|/|\.)""", page), "it needs no other file"
-    video = cv2.VideoCapture(str(folder / "demo.webm"))
+    video = cv2.VideoCapture(str(folder / "demo.mp4"))
     frames = 0
     while video.read()[0]:
         frames += 1
@@ -43,7 +43,7 @@ def test_failed_run_exits_with_3_and_says_why(folder, capsys):
     shown = capsys.readouterr().out
     assert "FAILURE: 1 of 2" in shown
     assert "green is in no opening" in shown
-    assert not (folder / "demo.webm").exists()
+    assert not (folder / "demo.mp4").exists()
     assert "<video" not in (folder / "report.html").read_text()
 
 

@@ -1,19 +1,14 @@
-"""The demo video of a run: VP8 in webm, which browsers play.
-
-OpenCV's wheel has no H.264; its VP9 encoder cannot be told to hurry and takes six times as long for the same size.
-"""
+"""The demo video of a run: VP9 in mp4, which browsers play."""
 
 from __future__ import annotations
 
-import os
-import sys
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
+import av
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +29,7 @@ CAMERA_HZ = 15.0
 LONG_RUN_S = 400.0
 """A longer run is shown four times as fast as it was, others twice."""
 WAITING_FRAMES = 8
+ENCODER = {"deadline": "realtime", "cpu-used": "7", "row-mt": "1", "crf": "34", "b": "0"}
 LINGER_FRAMES = 20  # the last picture stays so long
 
 
@@ -42,10 +38,10 @@ class VideoError(RuntimeError):
 
 
 def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
-    """Write `demo.webm` into the run's folder, with a progress bar; None if the view was not recorded (headless).
+    """Write `demo.mp4` into the run's folder, with a progress bar; None if the view was not recorded (headless).
 
     Raises:
-        VideoError: OpenCV has no VP8 encoder.
+        VideoError: There is no VP9 encoder.
     """
     run = evaluation.run
     number = sum(time_s <= run.end_s for time_s in view_times(run.folder))
@@ -55,8 +51,8 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     factor = 2 if run.end_s <= LONG_RUN_S else 4
     every = round(factor * CAMERA_HZ / FRAMES_PER_S)
     frame = VideoFrame(f"rule learning, seed {run.truth.layout.seed}", factor)
-    path = run.folder / "demo.webm"
-    beside = path.with_name("demo.part.webm")
+    path = run.folder / "demo.mp4"
+    beside = path.with_name("demo.part.mp4")
     with _Writer(beside) as writer:
         shown = range(0, number, every)
         pictures = paired_images(run.folder, every)
@@ -100,12 +96,15 @@ class _Writer:
     """Encodes in a thread of its own, so that the next picture is drawn meanwhile."""
 
     def __init__(self, path: Path) -> None:
-        with _stderr_shut():  # OpenCV warns there of the tag that it replaces itself
-            self._video = cv2.VideoWriter(
-                str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"VP80"), FRAMES_PER_S, SIZE
-            )
-        if not self._video.isOpened():
-            raise VideoError(f"OpenCV {cv2.__version__} opens no VP8 encoder for {path}; leave it out: --no-video")
+        try:
+            self._file = av.open(str(path), "w")
+            self._stream = self._file.add_stream("libvpx-vp9", rate=round(FRAMES_PER_S), options=ENCODER)
+        except (av.FFmpegError, ValueError) as error:
+            raise VideoError(
+                f"PyAV {av.__version__} opens no VP9 encoder for {path}: {error}; use --no-video"
+            ) from error
+        self._stream.width, self._stream.height = SIZE
+        self._stream.pix_fmt = "yuv420p"
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._waiting: deque[Future[None]] = deque()
 
@@ -114,7 +113,8 @@ class _Writer:
 
     def __exit__(self, *_: object) -> None:
         self._thread.shutdown()
-        self._video.release()
+        self._file.mux(self._stream.encode())
+        self._file.close()
 
     def write(self, picture: Picture) -> None:
         """Add a picture, RGB; waits while many wait to be encoded."""
@@ -123,19 +123,4 @@ class _Writer:
             self._waiting.popleft().result()
 
     def _encode(self, picture: Picture) -> None:
-        self._video.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-
-
-@contextmanager
-def _stderr_shut() -> Iterator[None]:
-    """Nothing written by C code reaches the terminal."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nothing)
+        self._file.mux(self._stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))

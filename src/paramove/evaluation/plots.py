@@ -75,8 +75,7 @@ def timeline(evaluation: RunEvaluation, figure: Figure) -> None:
             )
     _gestures(evaluation, axes)
     axes.set_yticks([0.5, 1.5, 2.5], ["sees", "does", "stage"])
-    axes.set_xlim(0, max(evaluation.run.end_s, 1.0))
-    axes.set_xlabel("simulated time, s")
+    axes.set(xlim=(0, max(evaluation.run.end_s, 1.0)), ylim=(0, 3), xlabel="simulated time, s")
     axes.grid(visible=False, axis="y")
 
 

@@ -178,8 +178,20 @@ def _grasps(summary: dict[str, Any]) -> str:
         "Every grasp",
         "Off: how far the object truly stood from where the robot believed it. Elbow: turned because of a joint limit. "
         "Target: commanded gripper from its target. World: gripper from the commanded one.",
-        _table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)),
+        (_table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)) if rows else "There was none.")
+        + _refused(summary["refused_goals"]),
     )
+
+
+def _refused(goals: Sequence[dict[str, Any]]) -> str:
+    rows = [
+        (f"{goal['time_s']:.1f}", escape(goal["kind"].replace("_", " ")), _dot(goal["object"]), escape(goal["reason"]))
+        for goal in goals
+    ]
+    if not rows:
+        return ""
+    table = _table(("s", "goal", "object", "why"), rows, numbers=(0,))
+    return f"<details><summary>{len(rows)} goals were refused before the arm moved</summary>{table}</details>"
 
 
 def _contacts(evaluation: RunEvaluation) -> str:

@@ -1,4 +1,4 @@
-"""Evaluates a run of the rule-learning application: `run.json`, `report.html`, `demo.webm` in its folder.
+"""Evaluates a run of the rule-learning application: `run.json`, `report.html`, `demo.mp4` in its folder.
 
 Called by the launcher after the run, or by hand: `python -m paramove.evaluation.rule_learning RUN_FOLDER [--no-video]`.
 Exit codes: 0 the robot did what it should, by the recorded truth; 3 it did not; 66 no such run.
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m paramove.evaluation.rule_learning", description=__doc__)
     parser.add_argument("run_folder", type=Path)
-    parser.add_argument("--no-video", action="store_true", help="write no demo.webm")
+    parser.add_argument("--no-video", action="store_true", help="write no demo.mp4")
     parser.add_argument("--no-report", action="store_true", help="write run.json alone")
     options = parser.parse_args(arguments)
     console = Console(highlight=False, emoji=False)
