@@ -29,12 +29,12 @@ CAMERA_HZ = 15.0
 LONG_RUN_S = 400.0
 """A longer run is shown four times as fast as it was, others twice."""
 WAITING_FRAMES = 8
-ENCODER = {"deadline": "realtime", "cpu-used": "7", "row-mt": "1", "crf": "34", "b": "0"}
+ENCODER = {"deadline": "realtime", "cpu-used": "7", "row-mt": "1", "crf": "34", "b": "0", "g": "20"}
 LINGER_FRAMES = 20  # the last picture stays so long
 
 
 class VideoError(RuntimeError):
-    """No video can be written with this OpenCV; the text says what was tried."""
+    """No video can be written; the text says what was tried."""
 
 
 def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:

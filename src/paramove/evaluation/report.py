@@ -121,7 +121,8 @@ def _video(video: Path | None) -> str:
     kind = f"video/{video.suffix.removeprefix('.')}"
     return (
         "<section><h2>The run</h2><p class=why>Left, the camera with what the robot makes of it; right, the world, "
-        "which the robot is not shown. Boxes: tracked objects. Circles: openings it believes in. Arrow: its goal.</p>"
+        "which the robot is not shown. Boxes: tracked objects. Circles: openings it believes in, at the height of an "
+        "object's middle. Arrow: its goal.</p>"
         f"<video controls preload=metadata src='data:{kind};base64,{data}'></video></section>"
     )
 
