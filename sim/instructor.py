@@ -28,6 +28,7 @@ TRAVEL_Z = tool_box.SURFACE_Z + 0.085  # centre of a carried cylinder: over stan
 SHOWN_LIFT = 0.025
 ASIDE_IN_HAND = 0.004  # from the gripper's centre towards the thumb: between pads and open thumb
 AHEAD_IN_HAND = 0.0025  # and towards the fingertips: the upright object must pass the palm of the sloping hand
+OVER_THE_ARM = 0.13  # a handed object comes from so high above its place in the robot's hand
 POINTING_S = 4.0
 
 
@@ -150,7 +151,7 @@ class Instructor:
         else:  # asked again: out of the hand and in anew, which also shows the robot that something happens
             yield self._move(_raised(self._fingertip, ABOVE), seconds=(0.6, 0.9), straight=True)
         self.doing = f"brings {held} to the robot's hand"
-        yield self._move(self._into_hand(ABOVE), seconds=(1.0, 2.4))
+        yield self._move(self._into_hand(OVER_THE_ARM), seconds=(1.0, 2.4))
         self.doing = f"holds {held} in the robot's hand"
         yield self._move(self._into_hand(0.0), seconds=(1.0, 1.5), straight=True)
 
