@@ -1,6 +1,6 @@
 """A still of a run's video, for the README.
 
-python docs/images/still.py runs/latest/demo.mp4 --at 97 --out docs/images/demo.jpg
+python docs/images/still.py runs/latest/demo.mp4 --at 110 --out docs/images/demo.jpg
 """
 
 import argparse
