@@ -47,6 +47,7 @@ def run(bus: Bus, config: Config) -> None:
         for status in says.statuses:
             bus.publish(topics.ARM_TRAJECTORY_STATUS, status)
         bus.publish(topics.ARM_SAFETY, says.safety)
+        bus.ready(f"the safety gate says: {driver.state.value}")
 
 
 if __name__ == "__main__":

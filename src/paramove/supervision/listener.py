@@ -54,7 +54,6 @@ class Listener:
             self._on_story(f'robot: "{heard.message.sentence}"')
         else:
             stage = heard.message.Stage.Name(heard.message.stage).removeprefix("STAGE_").lower()
-            told = f"{stage}: {heard.message.sentence or heard.message.step}"
-            if told != self._told:
-                self._told = told
-                self._on_story(told)
+            if stage != self._told:
+                self._told = stage
+                self._on_story(f"stage: {stage}")
