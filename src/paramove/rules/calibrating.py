@@ -18,7 +18,7 @@ HAND_AWAY_S = 0.5
 
 
 class Calibrating(Stage):
-    """States: resting, offering, asking, taking, letting_go, placing, looking, fetching."""
+    """States: resting, offering, asking, taking, letting_go, placing, looking."""
 
     stage = ApplicationStage.STAGE_CALIBRATE
 
