@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -72,7 +71,7 @@ class _Hand:
     opening: float = 1.0  # ξ that the last motion ended with
     measured: float = 1.0  # ξ of the measured fingers
     lost: bool = False
-    known: bool = field(default=True)
+    known: bool = True
 
 
 class Synthesizer:
@@ -310,8 +309,7 @@ class Synthesizer:
 
 def _point(goal: RelocationGoal, name: str) -> FloatArray:
     if not goal.HasField(name):
-        near = difflib.get_close_matches(name, ["from", "to"], n=1)
-        raise GoalRefusedError(f"the goal lacks its position {near[0]!r}")
+        raise GoalRefusedError(f"the goal lacks its position {name!r}")
     position: Position = getattr(goal, name)
     point = np.array([position.x, position.y, position.z])
     if not np.isfinite(point).all():
