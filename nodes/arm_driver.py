@@ -2,6 +2,7 @@
 
 Hears   arm/trajectory         JointTrajectory        events
         operator/arm           ArmRequest             events, latched
+        operator/stop          StopRequest            events, latched
         wire/hoap3/state       Hoap3State             15 Hz   joint units
 Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
         arm/joint_states       foxglove.JointStates   15 Hz   rad
@@ -16,7 +17,7 @@ from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.driver import ArmDriver
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.WIRE_HOAP3_STATE)
+HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.OPERATOR_STOP, topics.WIRE_HOAP3_STATE)
 SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
@@ -37,9 +38,11 @@ def run(bus: Bus, config: Config) -> None:
     bus.ready("disarmed, waiting for the robot")
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
-            hear[event.topic](event.message, event.captured_ns)
-            continue
-        says = driver.tick(event.now_ns)
+            if event.topic is not topics.OPERATOR_STOP:
+                hear[event.topic](event.message, event.captured_ns)
+                continue
+            driver.on_stop(event.message)  # and at once a tick: a stop does not wait for the next period
+        says = driver.tick(bus.now_ns)
         if says.stream is not None:
             bus.publish(topics.WIRE_HOAP3_STREAM, says.stream)
         if says.joint_states is not None:

@@ -7,7 +7,7 @@ import logging
 import os
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, overload
@@ -101,6 +101,13 @@ class Bus:
         if topic.name not in self._heard:
             self._heard.append(topic.name)
 
+    def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
+        """Calls `call`, in the bus's thread, as soon as `descriptor` can be read, even between two ticks.
+
+        So another thread of the node can have something said at once. `call` must read the descriptor.
+        """
+        self.exchange.when_readable(descriptor, call)
+
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         """Says `message`. Never waits.
 
@@ -133,7 +140,7 @@ class Bus:
     def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Heard | Tick]: ...
 
     def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
-        """Every message of these topics (default: of all heard), oldest first, until the bus is stopped.
+        """Every message of these topics (default: of all heard, also later on), oldest first, until the bus is stopped.
 
         Messages of other topics are kept for a later loop, as many as the topic's high water mark.
 
@@ -247,11 +254,11 @@ class Bus:
         return LockstepTurns(self.exchange, self.node) if self.settings.lockstep else SimulatedTurns(self.exchange)
 
     def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Heard | Tick]:
-        names = {topic.name for topic in wanted} or set(self._heard)
+        names = {topic.name for topic in wanted}
         if unheard := names - set(self._heard):
             raise KeyError(f"{self.node} does not hear {', '.join(sorted(unheard))}; add the topic to HEARS")
         while not self.stopped:
-            while not self.stopped and (heard := self._next_of(names, conflate)) is not None:
+            while not self.stopped and (heard := self._next_of(names or set(self._heard), conflate)) is not None:
                 yield from self._timed(heard)
             if tick and self._tick is not None and not self.stopped:
                 now, self._tick = self._tick, None

@@ -47,6 +47,7 @@ class Exchange:
         self.context: zmq.Context[Any] = zmq.Context()
         self._owned: list[Ownership] = []
         self._pending: dict[str, deque[tuple[int, Heard]]] = {}
+        self._callbacks: dict[int, Callable[[], None]] = {}
         self._poller = zmq.Poller()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._poller.register(self._wake, zmq.POLLIN)
@@ -88,6 +89,11 @@ class Exchange:
         else:
             self._poller.unregister(descriptor)
 
+    def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
+        """Lets `wait` call `call` as soon as `descriptor` can be read. `call` reads it, or is called again and again."""
+        self._callbacks[descriptor] = call
+        self._poller.register(descriptor, zmq.POLLIN)
+
     def wait(self, timeout_s: float) -> set[object]:
         """Waits until something can be read, at most `timeout_s`.
 
@@ -105,6 +111,9 @@ class Exchange:
                 if publisher.socket in ready:
                     publisher.serve()
             self.drain(name for name, subscriber in self.subscribers.items() if subscriber.socket in ready)
+            for descriptor, call in self._callbacks.items():
+                if descriptor in ready:
+                    call()
         return ready
 
     def drain(self, topics: Iterable[str]) -> None:

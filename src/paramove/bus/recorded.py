@@ -7,7 +7,7 @@ assert [said.message for said in bus.said_on(topics.OBJECTS_TRACKED)] == [...]
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,6 +105,9 @@ class RecordedBus:
 
     def hear(self, topic: Topic) -> None:
         """Every topic of the recording is heard anyway."""
+
+    def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
+        """There is nothing to wait for in a recording; what another thread has to say is asked for at ticks."""
 
     def starting(self, sentence: str) -> None:
         """Keeps the state."""

@@ -23,7 +23,7 @@ from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from paramove.msgs.truth_pb2 import TruthLayout, TruthState
 
@@ -100,6 +100,7 @@ ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _
 ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)
 ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
 OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
+OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -111,6 +112,11 @@ TOPICS: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if
 
 _STATUS_PREFIX = "status/"
 _NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")
+
+
+def is_name(name: str) -> bool:
+    """Whether a topic may be called so: parts of lower-case letters, digits and `_`, joined by `/`."""
+    return _NAME.fullmatch(name) is not None
 
 
 def status(node: str) -> Topic:

@@ -72,6 +72,8 @@ class SafetyCore:
             targets = self._hear(now_ns, inputs.word, measured, inputs.proposal)
         if self.state is State.ARMED:
             targets = self._armed(now_ns, measured, inputs)
+        elif inputs.stop is not None:
+            self._latch(now_ns, inputs.stop)
         if self.state is State.STOPPING and targets is None:
             self._rest(now_ns, measured)
         return targets, self.state, self.faults
@@ -237,6 +239,15 @@ class SafetyCore:
             return None
         ramp = stop_ramp(before[-1], path, self.limits)
         return self._accept(proposal.first_index, ramp[:0], ramp, measured) if len(ramp) else None
+
+    def _latch(self, now_ns: int, fault: Fault) -> None:
+        """A fault while nothing is let through: it stays until a new arm word, and so nobody arms by an older one."""
+        if fault not in self.faults:
+            self.faults = (*self.faults, fault)
+        self._disarm_after_stop = False
+        if self.state is State.DISARMED:
+            self.state = State.HOLD
+        self._heard_ns = max(self._heard_ns, now_ns)
 
     def _moving(self, measured: Measured) -> bool:
         """Whether rows are played or still to be played: a report of rest can be older than the rows just sent."""

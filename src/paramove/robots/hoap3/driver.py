@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
-from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.execution import Execution
 from paramove.robots.hoap3.robot_report import RobotReport
@@ -40,6 +40,8 @@ MAX_TRAJECTORY_AGE_S = 1.0
 # The stop ramp's path ahead of the last row sent; a ramp from the operating limits runs over 0.1 s of it.
 AHEAD_ROWS = 400
 TICKS_PER_PROGRESS = 5
+PERSON_STOP = "person_stop"
+"""Code of the fault that a person's stop latches."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,7 @@ class ArmDriver:
         self._report: RobotReport | None = None
         self._reported = False
         self._words: list[ArmWord] = []
+        self._stop: Fault | None = None
         self._execution: Execution | None = None
         self._statuses: list[TrajectoryStatus] = []
         self._last_status: dict[str, TrajectoryStatus] = {}
@@ -98,6 +101,10 @@ class ArmDriver:
         """Hear a person's (in simulation the operator node's) word."""
         self._words.append(ArmWord(captured_ns, message.source, message.armed))
 
+    def on_stop(self, message: StopRequest) -> None:
+        """Hear a person's stop: the next `tick` begins a controlled stop and latches it, in whatever state the gate is."""
+        self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
+
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Accept or refuse a trajectory. The same id again is answered with its newest status and not played twice."""
         known = self._last_status.get(message.id)
@@ -119,12 +126,14 @@ class ArmDriver:
         words: list[ArmWord | None] = [*self._words] or [None]
         self._words.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
-        stop = self._fault_of_stream(now_ns)
+        stop = self._stop or self._fault_of_stream(now_ns)
         proposal = self._proposal(now_ns)
         targets = None
         for word in words:
             given, _, _ = self._core.step(now_ns, Inputs(measured, word, proposal, stop))
             targets = given or targets
+        if self._core.state is not State.DISCONNECTED:  # there a stop waits until the robot is heard again
+            self._stop = None
         stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
         self._follow(now_ns)
         statuses, self._statuses = tuple(self._statuses), []
