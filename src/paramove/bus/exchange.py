@@ -90,7 +90,7 @@ class Exchange:
             self._poller.unregister(descriptor)
 
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
-        """Lets `wait` call `call` as soon as `descriptor` can be read. `call` reads it, or is called again and again."""
+        """Lets `wait` call `call` as soon as `descriptor` can be read; unless `call` reads it, again and again."""
         self._callbacks[descriptor] = call
         self._poller.register(descriptor, zmq.POLLIN)
 

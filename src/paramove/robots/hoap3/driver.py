@@ -102,7 +102,7 @@ class ArmDriver:
         self._words.append(ArmWord(captured_ns, message.source, message.armed))
 
     def on_stop(self, message: StopRequest) -> None:
-        """Hear a person's stop: the next `tick` begins a controlled stop and latches it, in whatever state the gate is."""
+        """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
         self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
