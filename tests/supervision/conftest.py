@@ -1,5 +1,6 @@
 """A workspace of its own for each test, with the test nodes in it."""
 
+import json
 import os
 import shutil
 import signal
@@ -67,6 +68,24 @@ class Workspace:
         """What the nodes did, in order."""
         path = self.root / "runs" / "latest" / "events.txt"
         return path.read_text().splitlines() if path.exists() else []
+
+    @property
+    def happened(self):
+        """What the supervisor wrote into its log of events, in order."""
+        path = self.root / "runs" / "latest" / "events.jsonl"
+        return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+    def await_happening(self, launcher, node, event):
+        """Waits until the supervisor has logged `event` of `node` while the launcher lives; returns the newest."""
+        found = []
+
+        def seen():
+            found[:] = [e for e in self.happened if (e.get("node"), e["event"]) == (node, event)]
+            return found or launcher.poll() is not None
+
+        until(seen, f"{node} {event}")
+        assert found, launcher.communicate()[0]
+        return found[-1]
 
     def await_event(self, event, launcher):
         """Waits until a node has written `event` while the launcher lives."""

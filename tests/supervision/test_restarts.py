@@ -24,7 +24,7 @@ def test_budget_gives_up_and_says_so():
     verdict = rule.after_exit(-11, 20.0)
     assert verdict.restart_after_s is None
     assert verdict.failed
-    assert verdict.sentence == "ended by SIGSEGV; given up after 2 restarts in 60 s"
+    assert verdict.consequence == "given up after 2 restarts in 60 s"
 
 
 def test_window_slides():
@@ -39,7 +39,7 @@ def test_hopeless_exit_codes_are_final(restart, code):
     verdict = policy(restart).after_exit(code, 0.0)
     assert verdict.restart_after_s is None
     assert verdict.failed
-    assert "a restart would end the same way" in verdict.sentence
+    assert "a restart would end the same way" in verdict.consequence
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,10 @@ nodes:
 """)
     outcome, _, shown = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "required node broken has ended: exit code 1; given up after 2 restarts in 100 s" in outcome.reason
+    assert (
+        "broken ended with exit code 1; given up after 2 restarts in 100 s; the run cannot go on without it"
+        in outcome.reason
+    )
     assert "RuntimeError: crash number 3" in shown
     assert workspace.events.count("broken started") == 3
 
@@ -69,7 +72,7 @@ nodes:
 """)
     outcome, _, shown = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "its parameters are wrong" in outcome.reason
+    assert "exit code 78: its parameters" in outcome.reason
     assert workspace.events.count("wrong started") == 1, shown
 
 
@@ -103,7 +106,7 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "not ready within 2.5 s, last said: warming up the lamp" in outcome.reason
+    assert "slow was not ready within 2.5 s, last said: warming up the lamp" in outcome.reason
 
 
 def test_required_node_that_ends_early_ends_the_run_as_a_failure(workspace):
@@ -114,7 +117,7 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert outcome.reason == "required node camera has ended: finished"
+    assert outcome.reason == "camera has finished; the run cannot go on without it"
 
 
 def test_stubborn_node_is_killed_with_its_children(workspace):
@@ -125,14 +128,14 @@ nodes:
 """)
     outcome, _, shown = workspace.run()
     assert outcome.code == exit_codes.OK
-    assert "exit -9" in shown
+    assert "was killed (SIGKILL)" in shown
     assert workspace.processes() == {}
 
 
 def test_story_is_told(workspace):
     workspace.write("""
 nodes:
-  robot: {module: nodes.actor, ends_run: true, parameters: {say: "Please hand me\\u0007 an object", lasts_s: 1.0}}
+  robot: {module: nodes.actor, ends_run: true, parameters: {say: "Please hand me<bell> an object", lasts_s: 1.0}}
 """)
     outcome, _, shown = workspace.run()
     assert outcome.code == exit_codes.OK
@@ -196,7 +199,7 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert re.search(r"greedy has ended: used \d{3} MB of memory, its limit is 200 MB", outcome.reason)
+    assert re.search(r"greedy used \d{3} MB of memory, its limit is 200 MB", outcome.reason)
 
 
 @pytest.mark.parametrize(

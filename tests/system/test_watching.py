@@ -41,7 +41,7 @@ def test_killed_tracker_comes_back_and_the_run_goes_on(launcher):
     os.kill(pid_of("nodes.colour_tracker", launcher.folder), signal.SIGKILL)
     shown = process.communicate(timeout=120)[0]
     assert process.returncode == 0, shown
-    assert "ended by SIGKILL; restart 1 in 0.1 s" in shown
+    assert "was killed (SIGKILL); restart 1 in 0.1 s" in shown
     assert (
         "colour_tracker:\n      state: stopped\n      exit_code: 0\n      restarts: 1"
         in (launcher.latest / "run.yaml").read_text()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +17,7 @@ from paramove.supervision.domain import DomainError
 from paramove.supervision.launch_file import LaunchFileMissingError, load
 from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.run_folder import RunFolder
-from paramove.supervision.supervisor import View
+from paramove.supervision.supervisor import Outcome, View
 from paramove.supervision.view import LineView, TableView
 
 app = typer.Typer(add_completion=False)
@@ -80,12 +81,17 @@ def _launch(
         errors.print(f"{error.filename}: {error.strerror}; run from a clone that you may write to")
         return exit_codes.PERMISSION
     try:
-        console.print(
-            f"{'done' if outcome.code == 0 else 'FAILED'}: {outcome.reason}. Run folder: {folder.path}", soft_wrap=True
-        )
+        console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
     except OSError:  # the terminal was closed; flushing it again at exit would fail too
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return outcome.code
+
+
+def _verdict(outcome: Outcome) -> str:
+    """What the last line begins with; a run that a person ended did not fail."""
+    if outcome.code in map(exit_codes.by_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+        return ""
+    return "done: " if outcome.code == exit_codes.OK else "FAILED: "
 
 
 def _view(console: Console, folder: RunFolder, headless: bool) -> View:

@@ -11,17 +11,17 @@ FAILURE = 1
 USAGE = 2
 """Wrong arguments; the same again would fail again."""
 INPUT_MISSING = 66
-"""A launch file or an overlay does not exist."""
+"""A launch file, an overlay or a node's input does not exist; a restart does not help."""
 TEMPORARY = 75
 """Something else holds what is needed, such as another run in the same domain."""
 PERMISSION = 77
 """A right is missing; a restart does not help."""
 CONFIGURATION = 78
-"""The launch file or a node's parameters are wrong; a restart does not help."""
+"""The launch file, a node's parameters or its input are wrong; a restart does not help."""
 TIME_LIMIT = 124
 """The run took longer than its time limit."""
 
-NEVER_RESTARTED = frozenset({USAGE, PERMISSION, CONFIGURATION})
+NEVER_RESTARTED = frozenset({USAGE, INPUT_MISSING, PERMISSION, CONFIGURATION})
 """Exit codes after which a restart would end the same way."""
 
 
@@ -31,13 +31,33 @@ def by_signal(number: int) -> int:
 
 
 def describe(code: int) -> str:
-    """What an exit code of a node says, in words; negative codes are signals, as in `subprocess`."""
+    """What a node did when it ended with an exit code, in words that follow its name; negative codes are signals."""
     if code < 0:
-        return f"ended by {signal.Signals(-code).name}"
+        return _describe_signal(-code)
     meanings = {
-        OK: "finished",
-        USAGE: "exit code 2: wrong arguments",
-        PERMISSION: "exit code 77: a right is missing",
-        CONFIGURATION: "exit code 78: its parameters are wrong",
+        OK: "has finished",
+        USAGE: "ended with exit code 2: wrong arguments",
+        INPUT_MISSING: "ended with exit code 66: an input is missing",
+        TEMPORARY: "ended with exit code 75: what it needs is held by another process",
+        PERMISSION: "ended with exit code 77: a right is missing",
+        CONFIGURATION: "ended with exit code 78: its parameters or its input are wrong",
     }
-    return meanings.get(code, f"exit code {code}")
+    return meanings.get(code, f"ended with exit code {code}")
+
+
+def _describe_signal(number: int) -> str:
+    try:
+        name = signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"was ended by signal {number}"
+    if number == signal.SIGKILL:
+        return "was killed (SIGKILL)"
+    if number in (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL):
+        return f"crashed ({name})"
+    return f"was ended by {name}"
+
+
+def interrupted(number: int) -> str:
+    """Why a run ended that a signal to the launcher has ended."""
+    reasons = {signal.SIGINT: "stopped by Ctrl-C", signal.SIGHUP: "stopped because the terminal was closed"}
+    return reasons.get(signal.Signals(number), f"stopped by {signal.Signals(number).name}")

@@ -30,9 +30,9 @@ def main() -> None:
 
 
 def end_groups(groups: set[int], grace_s: float) -> None:
-    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`."""
+    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`; stopped ones go on to end."""
     deadline_s = time.monotonic() + grace_s
-    left = {group for group in groups if _send(group, signal.SIGTERM)}
+    left = {group for group in groups if _send(group, signal.SIGTERM) and _send(group, signal.SIGCONT)}
     while left and time.monotonic() < deadline_s:
         time.sleep(0.02)
         left = {group for group in left if _send(group, 0)}

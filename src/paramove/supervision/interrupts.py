@@ -17,7 +17,7 @@ class Interrupts:
         first: The first of these signals, None before.
         urgent: Whether SIGINT or SIGTERM came once more: end everything at once. A closed terminal may send several
             SIGHUP, so these do not count.
-        wake_fd: Readable after a signal.
+        wake_fd: Readable after a signal, and when a child process has ended, was stopped (SIGSTOP) or goes on.
     """
 
     def __init__(self) -> None:
@@ -29,6 +29,7 @@ class Interrupts:
     def __enter__(self) -> Self:
         for number in _HANDLED:
             self._before[number] = signal.signal(number, self._handle)
+        self._before[signal.SIGCHLD] = signal.signal(signal.SIGCHLD, self._wake)
         return self
 
     def __exit__(
@@ -43,4 +44,7 @@ class Interrupts:
             self.first = signal.Signals(number)
         elif number != signal.SIGHUP:
             self.urgent = True
+        self._wake(number, frame)
+
+    def _wake(self, number: int, frame: FrameType | None) -> None:
         os.eventfd_write(self.wake_fd, 1)

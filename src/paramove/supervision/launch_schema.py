@@ -38,11 +38,21 @@ class NodeSettings(_Checked):
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
     restart: Literal["never", "on-failure", "always"] = "never"
-    backoff_s: Seconds = Field(default=1.0, description="wait before the first restart; doubles up to 30 s")
+    backoff_s: Seconds = Field(default=0.5, description="wait before the first restart; doubles up to 30 s")
     budget: RestartBudget = RestartBudget()
     required: bool = Field(default=True, description="the run fails when this node ends before the run does")
     after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
     ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 30.0
+    silent_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = Field(
+        default=10.0,
+        description="a node that was ready and says no status for so long hangs and is killed; null: never",
+    )
+    stopped_timeout_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = Field(
+        default=1.0, description="a process that was stopped (SIGSTOP) for so long is killed; null: never"
+    )
+    restart_ends_run: bool = Field(
+        default=False, description="once the node is back after a restart, the run ends with its ready sentence"
+    )
     memory_limit_mb: Annotated[float, Field(gt=0.0)] | None = Field(
         default=None, description="a node that uses more is killed, and restarted as `restart` says"
     )

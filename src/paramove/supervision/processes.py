@@ -110,10 +110,23 @@ class SupervisedProcess:
             self._guard.forget(self.pid)
         return code
 
+    def halted(self) -> bool | None:
+        """True if the process has been stopped (SIGSTOP and its like) since the last call, False if it goes on since.
+
+        None if neither. Both together are told as False.
+        """
+        halted: bool | None = None
+        for flag, meaning in ((os.WSTOPPED, True), (os.WCONTINUED, False)):
+            with contextlib.suppress(ChildProcessError):
+                if os.waitid(os.P_PID, self.pid, flag | os.WNOHANG) is not None:
+                    halted = meaning
+        return halted
+
     def terminate(self) -> None:
         """Asks the process to end. It alone is asked: it knows in which order its own children end."""
         if self._process.poll() is None:
             self._process.terminate()
+            self._process.send_signal(signal.SIGCONT)  # a stopped process cannot end in order
 
     def kill(self) -> None:
         """Ends the process and all of its group at once."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from paramove.supervision.exit_codes import NEVER_RESTARTED, OK, describe
+from paramove.supervision.exit_codes import NEVER_RESTARTED, OK
 from paramove.supervision.launch_schema import NodeSettings
 
 LONGEST_BACKOFF_S = 30.0
@@ -17,12 +17,12 @@ class Verdict:
     Attributes:
         restart_after_s: Wait before the next start; None for no restart.
         failed: Whether the end counts as a failure.
-        sentence: Why, in words.
+        consequence: In words; empty if there is none but the end.
     """
 
     restart_after_s: float | None
     failed: bool
-    sentence: str
+    consequence: str
 
 
 @dataclass
@@ -37,14 +37,14 @@ class RestartPolicy:
         failed = code != OK
         wanted = self.settings.restart == "always" or (self.settings.restart == "on-failure" and failed)
         if not wanted:
-            return Verdict(None, failed, describe(code))
+            return Verdict(None, failed, "")
         if code in NEVER_RESTARTED:
-            return Verdict(None, True, f"{describe(code)}; a restart would end the same way")
+            return Verdict(None, True, "a restart would end the same way")
         window_s = self.settings.budget.window_s
         self._restarts_s = [at for at in self._restarts_s if now_s - at < window_s]
         done = len(self._restarts_s)
         if done >= self.settings.budget.restarts:
-            return Verdict(None, True, f"{describe(code)}; given up after {done} restarts in {window_s:g} s")
+            return Verdict(None, True, f"given up after {done} restarts in {window_s:g} s")
         wait_s = min(self.settings.backoff_s * 2.0**done, max(LONGEST_BACKOFF_S, self.settings.backoff_s))
         self._restarts_s.append(now_s)
-        return Verdict(wait_s, failed, f"{describe(code)}; restart {done + 1} in {wait_s:g} s")
+        return Verdict(wait_s, failed, f"restart {done + 1} in {wait_s:g} s")

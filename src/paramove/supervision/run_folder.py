@@ -53,6 +53,11 @@ class RunFolder:
         """File that the node gets as `--config`."""
         return self.nodes / f"{node}.yaml"
 
+    @property
+    def events(self) -> Path:
+        """File of what happened to the nodes, a line of JSON each (see `EventLog`)."""
+        return self.path / "events.jsonl"
+
     def write_effective(self, launch: Launch) -> None:
         """Writes `launch.yaml`: the launch file after overlays, settings and defaults."""
         _write(self.path / "launch.yaml", launch.file.model_dump(mode="json"))

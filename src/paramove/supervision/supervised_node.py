@@ -8,10 +8,10 @@ from collections.abc import Callable
 import psutil
 
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision.exit_codes import FAILURE, OK
+from paramove.supervision.exit_codes import FAILURE, OK, describe
 from paramove.supervision.launch_schema import NodeSettings
 from paramove.supervision.processes import SupervisedProcess, printable
-from paramove.supervision.restarts import RestartPolicy
+from paramove.supervision.restarts import RestartPolicy, Verdict
 
 
 class State(enum.Enum):
@@ -22,6 +22,7 @@ class State(enum.Enum):
     READY = "ready"
     DEGRADED = "degraded"
     FAILED = "failed"
+    SUSPENDED = "suspended"
     RESTARTING = "restarting"
     STOPPING = "stopping"
     STOPPED = "stopped"
@@ -37,7 +38,10 @@ _SAID = {
 }
 
 
+_AT_WORK = (State.READY, State.DEGRADED, State.FAILED)
 MEASURE_PERIOD_S = 1.0
+LONGEST_LOOK_S = 0.5
+"""Silence between two looks counts for so long at most: a launcher that was stopped itself has heard nobody."""
 
 
 class SupervisedNode:
@@ -50,9 +54,15 @@ class SupervisedNode:
         on_change: Called after each change of `state` or of the reason for it.
 
     Attributes:
-        sentence: What the node said last, or what happened to it.
-        exit_code: Of its last end; None before.
+        sentence: What the node said last, or what happened to it in words that follow its name.
+        event: What has just changed: `started`, `ready`, `degraded`, `failed`, `suspended`, `resumed`, `fault` (the
+            supervisor kills it), `ended`, `asked` (to end), `stopped`.
+        exit_code: Of its last end, negative: number of the signal; None before.
+        exit_reason: How it ended last and why, in words that follow its name; empty before.
+        came_back: How it ended and what it says since it is up again, once it was restarted; empty before.
         status: Its last NodeStatus.
+        process: None while it does not run.
+        pid: Of its last process; 0 before the first.
     """
 
     def __init__(
@@ -67,15 +77,24 @@ class SupervisedNode:
         self.state = State.WAITING
         self.sentence = f"for {', '.join(settings.after)}" if settings.after else ""
         self.restarts = 0
+        self.event = ""
         self.exit_code: int | None = None
+        self.exit_reason = ""
+        self.came_back = ""
         self.status = NodeStatus()
         self.process: SupervisedProcess | None = None
+        self.pid = 0
         self._spawn = spawn
         self._on_change = on_change
         self._policy = RestartPolicy(settings)
         self._deadline_s = 0.0  # of readiness while starting, of the next start while restarting
         self._measure_due_s = 0.0
         self._killed_for = ""
+        self._silent_s = 0.0
+        self._looked_s = 0.0
+        self._before = State.STARTING  # it was suspended
+        self._suspended_s = 0.0
+        self._end = ""
 
     @property
     def is_up(self) -> bool:
@@ -91,23 +110,29 @@ class SupervisedNode:
         """Starts the process."""
         self.status = NodeStatus()
         self._killed_for = ""
+        self._silent_s, self._looked_s = 0.0, now_s
         self._deadline_s = now_s + self.settings.ready_timeout_s
         self.process = self._spawn(self.name)
-        self._become(State.STARTING, f"pid {self.process.pid}")
+        self.pid = self.process.pid
+        self._become(State.STARTING, f"pid {self.process.pid}", "started")
 
     def hear(self, status: NodeStatus) -> None:
         """Takes in what the node says of itself; words of an earlier process are passed over."""
         if self.process is None or status.pid != self.process.pid:
             return
         self.status = status
-        if self.state is State.STOPPING:
+        self._silent_s = 0.0
+        if self.state in (State.STOPPING, State.SUSPENDED):
             return
         state = _SAID.get(status.state, self.state)
         sentence = printable(status.sentence)
-        if state is not self.state:
-            self._become(state, sentence)
-        else:
+        if state is self.state:
             self.sentence = sentence
+            return
+        if self.restarts and self.state is State.STARTING:
+            how = "is back" if state is not State.FAILED else "is back, but cannot work"
+            self.came_back = f"{self._end} and {how}: {sentence}"
+        self._become(state, sentence, state.value)
 
     def check(self, now_s: float) -> int | None:
         """Does what is due; returns the exit code if the process has just ended (see `conclude`)."""
@@ -120,43 +145,73 @@ class SupervisedNode:
         if code is not None:
             self.process = None
             return code
-        if self.state is not State.STOPPING and not self._killed_for:
+        if self.state is State.STOPPING:
+            return None
+        self._look(self.process.halted(), now_s)
+        if not self._killed_for:
             self._killed_for = self._fault(self.process.pid, now_s)
             if self._killed_for:
+                self._become(self.state, f"{self._killed_for}, so it is killed", "fault")
                 self.process.kill()
         return None
 
+    def _look(self, halted: bool | None, now_s: float) -> None:
+        """Takes in whether the process was stopped or goes on, and how long it has been silent."""
+        self._silent_s += min(now_s - self._looked_s, LONGEST_LOOK_S)
+        self._looked_s = now_s
+        if halted and self.state is not State.SUSPENDED:
+            self._before = self.state
+            self._suspended_s = now_s
+            timeout_s = self.settings.stopped_timeout_s
+            rest = "" if timeout_s is None else f"; killed in {timeout_s:g} s unless it goes on"
+            self._become(State.SUSPENDED, f"is stopped (SIGSTOP){rest}", "suspended")
+        elif halted is False and not self._killed_for:
+            self._silent_s = 0.0
+            self._become(self._before if self.state is State.SUSPENDED else self.state, "goes on", "resumed")
+
     def _fault(self, pid: int, now_s: float) -> str:
-        """Why the process has to be killed; empty if it is well."""
+        """Why the process has to be killed, in words that follow its name; empty if it is well."""
+        settings = self.settings
+        if self.state is State.SUSPENDED:
+            timeout_s = settings.stopped_timeout_s
+            if timeout_s is not None and now_s >= self._suspended_s + timeout_s:
+                return f"was stopped (SIGSTOP) for {timeout_s:g} s"
+            return ""
+        said = printable(self.status.sentence) or "nothing"
         if self.state is State.STARTING and now_s >= self._deadline_s:
-            said = printable(self.status.sentence) or "nothing"
-            return f"not ready within {self.settings.ready_timeout_s:g} s, last said: {said}"
-        limit_mb = self.settings.memory_limit_mb
-        if limit_mb is not None and now_s >= self._measure_due_s:
+            return f"was not ready within {settings.ready_timeout_s:g} s, last said: {said}"
+        if self.state in _AT_WORK and self._silent_s >= (settings.silent_timeout_s or float("inf")):
+            return f"hangs: no status for {settings.silent_timeout_s:g} s, last said: {said}"
+        if settings.memory_limit_mb is not None and now_s >= self._measure_due_s:
             self._measure_due_s = now_s + MEASURE_PERIOD_S
             used_mb = _memory_mb(pid)
-            if used_mb > limit_mb:
-                return f"used {used_mb:.0f} MB of memory, its limit is {limit_mb:g} MB"
+            if used_mb > settings.memory_limit_mb:
+                return f"used {used_mb:.0f} MB of memory, its limit is {settings.memory_limit_mb:g} MB"
         return ""
 
     def conclude(self, code: int, now_s: float) -> None:
         """Draws the consequence of an end that nobody asked for: restart, finished or given up."""
-        self.exit_code = FAILURE if self._killed_for else code
-        verdict = self._policy.after_exit(self.exit_code, now_s)
-        sentence = f"{self._killed_for}; {verdict.sentence}" if self._killed_for else verdict.sentence
+        self.exit_code = code
+        self._end = self._killed_for or describe(code)
+        if not self._killed_for and self.status.state == NodeStatus.STATE_FAILED:
+            self._end += f" ({printable(self.status.sentence)})"
+        verdict = self._policy.after_exit(FAILURE if self._killed_for else code, now_s)
+        if self.settings.restart_ends_run and self.restarts > 0 and not self.came_back:
+            verdict = Verdict(None, True, "it did not come back")
+        self.exit_reason = f"{self._end}; {verdict.consequence}" if verdict.consequence else self._end
         if verdict.restart_after_s is not None:
             self._deadline_s = now_s + verdict.restart_after_s
-            self._become(State.RESTARTING, sentence)
+            self._become(State.RESTARTING, self.exit_reason, "ended")
         else:
-            self._become(State.GIVEN_UP if verdict.failed else State.FINISHED, sentence)
+            self._become(State.GIVEN_UP if verdict.failed else State.FINISHED, self.exit_reason, "ended")
 
     def stop(self) -> None:
         """Asks the process to end; one that is not running just stops waiting."""
         if self.process is not None:
             self.process.terminate()
-            self._become(State.STOPPING, "")
+            self._become(State.STOPPING, "", "asked")
         elif self.state not in ENDED:
-            self._become(State.STOPPED, "")
+            self._become(State.STOPPED, "", "stopped")
 
     def kill(self) -> None:
         """Ends the process at once."""
@@ -166,11 +221,12 @@ class SupervisedNode:
     def stopped(self, code: int, took_s: float) -> None:
         """Takes in the end of the process that `stop` or `kill` asked for."""
         self.exit_code = code
-        how = "" if code == OK else f"exit {code}, "
-        self._become(State.STOPPED, f"{how}{took_s:.1f} s after it was asked")
+        self.exit_reason = f"{describe(code)} {took_s:.1f} s after it was asked"
+        how = "" if code == OK else f"{describe(code)}, "
+        self._become(State.STOPPED, f"{how}{took_s:.1f} s after it was asked", "ended")
 
-    def _become(self, state: State, sentence: str) -> None:
-        self.state, self.sentence = state, sentence
+    def _become(self, state: State, sentence: str, event: str) -> None:
+        self.state, self.sentence, self.event = state, sentence, event
         self._on_change(self)
 
 

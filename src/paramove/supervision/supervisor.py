@@ -14,6 +14,7 @@ from typing import Protocol
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import exit_codes
 from paramove.supervision.domain import Domain
+from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.interrupts import Interrupts
 from paramove.supervision.launch_file import Launch, start_waves
 from paramove.supervision.launch_schema import LaunchFile
@@ -79,7 +80,7 @@ class Supervisor:
         self._view = view
         self._interrupts = Interrupts()
         self.nodes = {
-            name: SupervisedNode(name, node, self._spawn_node, view.changed) for name, node in self._file.nodes.items()
+            name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
         self._listener_folder = domain.folder
         self._environment = node_environment(os.environ)
@@ -90,9 +91,11 @@ class Supervisor:
         An interrupted run is not judged: `after_run` is left out.
         """
         listener = Listener(self._listener_folder, self.nodes, self._hear, self._view.story)
-        with Guard() as self._guard, self._interrupts:
+        with EventLog(self._folder.events) as self._events, Guard() as self._guard, self._interrupts:
+            self._events.write("run_begins", pid=os.getpid())
             try:
                 outcome = self._supervise(listener)
+                self._events.write("run_stops", sentence=outcome.reason, exit_code=outcome.code)
                 self._stop_all(listener)
             finally:
                 self._kill_all()
@@ -100,7 +103,22 @@ class Supervisor:
                 self._view.close()
             if self._file.after_run and self._interrupts.first is None:
                 outcome = self._judge(self._file.after_run, outcome)
+            self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
+
+    def _changed(self, node: SupervisedNode) -> None:
+        """First the log, by which reactions are measured, then the screen."""
+        code = node.exit_code if node.event == "ended" else None
+        self._events.write(
+            node.event,
+            node=node.name,
+            state=node.state.value,
+            sentence=node.sentence,
+            pid=node.pid or None,
+            exit_code=code,
+            signal=signal_name(code),
+        )
+        self._view.changed(node)
 
     def _supervise(self, listener: Listener) -> Outcome:
         """Runs until something ends the run; the reason is the outcome."""
@@ -121,7 +139,10 @@ class Supervisor:
                 node.start(time.monotonic())
 
     def _turn(self, listener: Listener) -> list[tuple[SupervisedNode, int]]:
-        """Waits up to `TURN_S` for an end or a signal, listens, and returns the nodes that ended with exit codes."""
+        """Waits up to `TURN_S` for an end, a stop (SIGSTOP) or a signal, and listens.
+
+        Returns the nodes that have just ended, with exit codes.
+        """
         poll = select.poll()
         poll.register(self._interrupts.wake_fd, select.POLLIN)
         for node in self.nodes.values():
@@ -140,12 +161,15 @@ class Supervisor:
         """The outcome if the run has come to its end."""
         if self._interrupts.first is not None:
             number = self._interrupts.first
-            return Outcome(exit_codes.by_signal(number), f"interrupted by {number.name}")
+            return Outcome(exit_codes.by_signal(number), exit_codes.interrupted(number))
         for node in self.nodes.values():
             if node.state is State.FINISHED and node.settings.ends_run:
                 return Outcome(exit_codes.OK, f"{node.name} has finished")
             if node.state in (State.GIVEN_UP, State.FINISHED) and node.settings.required:
-                return Outcome(exit_codes.FAILURE, f"required node {node.name} has ended: {node.sentence}")
+                reason = f"{node.name} {node.sentence}; the run cannot go on without it"
+                return Outcome(exit_codes.FAILURE, reason)
+            if node.came_back and node.settings.restart_ends_run:
+                return Outcome(exit_codes.FAILURE, f"{node.name} {node.came_back}; the run has ended")
         if all(node.state in ENDED for node in self.nodes.values()):
             failed = [node.name for node in self.nodes.values() if node.state is State.GIVEN_UP]
             reason = f"given up: {', '.join(failed)}" if failed else "all nodes have finished"
@@ -180,7 +204,7 @@ class Supervisor:
                         self.nodes[name].kill()
                 for node, code in self._turn(listener):
                     if node.state is not State.STOPPING:  # ended by itself while others were being stopped
-                        self._view.problem(f"{node.name} ended before it was asked: {exit_codes.describe(code)}")
+                        self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was asked to end")
                     node.stopped(code, time.monotonic() - begun_s)
 
     def _kill_all(self) -> None:
@@ -200,7 +224,10 @@ class Supervisor:
             select.select([judge.pidfd], [], [], TURN_S)
             code = judge.ended()
         if self._interrupts.first is not None:
-            return Outcome(exit_codes.by_signal(self._interrupts.first), f"interrupted during {module}")
+            return Outcome(
+                exit_codes.by_signal(self._interrupts.first),
+                f"{exit_codes.interrupted(self._interrupts.first)} during {module}",
+            )
         if outcome.code == exit_codes.OK and code != exit_codes.OK:
             return Outcome(code if code > 0 else exit_codes.FAILURE, f"{outcome.reason}; {module}: exit code {code}")
         return outcome
@@ -222,7 +249,7 @@ class Supervisor:
     def _show_log(self, node: SupervisedNode) -> None:
         path = self._folder.log(node.name)
         lines = "\n".join(f"    {line}" for line in last_lines(path, 20))
-        self._view.problem(f"{node.name}: {node.sentence}. Last lines of {path}:\n{lines or '    (empty)'}")
+        self._view.problem(f"{node.name} {node.sentence}. Last lines of {path}:\n{lines or '    (empty)'}")
 
 
 def stop_waves(file: LaunchFile) -> list[list[str]]:

@@ -19,10 +19,12 @@ _STYLES = {
     State.FINISHED: "green",
     State.DEGRADED: "yellow",
     State.STARTING: "cyan",
+    State.SUSPENDED: "yellow",
     State.RESTARTING: "yellow",
     State.FAILED: "red",
     State.GIVEN_UP: "bold red",
 }
+_NOT_TO_BE_MISSED = (State.RESTARTING, State.GIVEN_UP, State.FAILED, State.DEGRADED)
 REFRESH_S = 0.5
 
 
@@ -77,7 +79,7 @@ class TableView(LineView):
 
     def changed(self, node: SupervisedNode) -> None:
         """Only what a person should not miss in the table becomes a line."""
-        if node.state in (State.RESTARTING, State.GIVEN_UP, State.FAILED, State.DEGRADED):
+        if node.event in ("suspended", "resumed", "fault") or node.state in _NOT_TO_BE_MISSED:
             super().changed(node)
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:

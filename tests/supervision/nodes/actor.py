@@ -63,11 +63,18 @@ class Actor:
 
     def serve(self, end_s):
         """Answers subscriptions until SIGTERM or the end of its time; says its sentence again and again."""
+        next_status_s = time.monotonic()
         while time.monotonic() < end_s and not select.select([self.ended], [], [], 0.02)[0]:
             for publisher in self.publishers.values():
                 publisher.serve()
+            if time.monotonic() > next_status_s and not self.parameters.get("hangs"):
+                next_status_s += 0.2
+                if not self.parameters.get("silent"):
+                    self.status(NodeStatus.STATE_READY, "all set")
             if "speech" in self.publishers:
-                self.publishers["speech"].publish(Speech(sentence=self.parameters["say"]), 0, time.monotonic_ns())
+                self.publishers["speech"].publish(
+                    Speech(sentence=self.parameters["say"].replace("<bell>", "\a")), 0, time.monotonic_ns()
+                )
 
 
 if __name__ == "__main__":

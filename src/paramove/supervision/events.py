@@ -1,0 +1,61 @@
+"""What happened in a run, as lines of JSON for those who measure it: `events.jsonl` in the run folder."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import logging
+import os
+import signal
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+_log = logging.getLogger(__name__)
+
+
+class EventLog:
+    """Appends events to a file; each is on disk's way before `write` returns, however the launcher ends after it.
+
+    One line is an object with `monotonic_ns` (CLOCK_MONOTONIC, the same for all processes of this machine), `wall`
+    (ISO 8601), `event`, and what is known of `node`, `state`, `sentence`, `pid`, `exit_code`, `signal`.
+
+    Args:
+        path: Of the file; made if it does not exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        self._broken = False
+
+    def write(self, event: str, **facts: Any) -> None:
+        """Appends one event; facts that are None are left out. A full disk is told once and ends no run."""
+        monotonic_ns = time.monotonic_ns()
+        wall = datetime.datetime.now().astimezone().isoformat(timespec="microseconds")
+        known = {name: value for name, value in facts.items() if value is not None}
+        line = json.dumps({"monotonic_ns": monotonic_ns, "wall": wall, "event": event, **known}, ensure_ascii=False)
+        try:
+            os.write(self._file, line.encode("utf-8", errors="backslashreplace") + b"\n")
+        except OSError as error:
+            if not self._broken:
+                _log.warning("the log of events cannot be written: %s", error.strerror)
+            self._broken = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+
+def signal_name(code: int | None) -> str | None:
+    """Name of the signal that an exit code of a process tells of (negative, as in `subprocess`), else None."""
+    if code is None or code >= 0:
+        return None
+    try:
+        return signal.Signals(-code).name
+    except ValueError:  # a real-time signal
+        return f"signal {-code}"
