@@ -84,6 +84,18 @@ def test_an_exception_is_said_logged_and_ends_with_70(start: Start, bus: Bus) ->
     assert 'raise ValueError("found trouble")' in errors
 
 
+@pytest.mark.parametrize(("which", "code"), [("missing", 66), ("wrong", 78)])
+def test_an_input_that_cannot_be_used_is_said_in_one_line_without_traceback(
+    start: Start, bus: Bus, which: str, code: int
+) -> None:
+    process = start()
+    _say(bus, which)
+    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == f"{which}.npz cannot be used"
+    _, errors = process.communicate(timeout=10)
+    assert process.returncode == code
+    assert "Traceback" not in errors
+
+
 def test_a_node_that_gives_up_ends_with_70_and_keeps_its_last_word(start: Start, bus: Bus) -> None:
     process = start()
     _say(bus, "given up")

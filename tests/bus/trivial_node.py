@@ -1,9 +1,13 @@
-"""A node that tests start as a process: repeats each gesture as a sentence; `trouble` raises, `given up` gives up."""
+"""A node that tests start as a process: repeats each gesture as a sentence; `trouble` raises, `given up` gives up.
+
+`missing` and `wrong` are inputs that it cannot use.
+"""
 
 from __future__ import annotations
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
+from paramove.input_error import InputError
 from paramove.msgs.rule_pb2 import Speech
 
 HEARS = (topics.GESTURES,)
@@ -19,6 +23,8 @@ def run(bus: Bus, config: Config) -> None:
     for heard in bus.events(topics.GESTURES):
         if heard.message.object == "trouble":
             raise ValueError("found trouble")
+        if heard.message.object in ("missing", "wrong"):
+            raise InputError(f"{heard.message.object}.npz\ncannot be used", missing=heard.message.object == "missing")
         if heard.message.object == "given up":
             bus.failed("cannot go on")
             return

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from nodes import synthesizer
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
+from paramove.input_error import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from tests.imitation.fake_driver import Cell, goal
 from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
@@ -63,3 +64,16 @@ def test_trains_its_movement_once_and_keeps_it(tmp_path: Path, monkeypatch: pyte
 def test_refuses_unknown_parameters(parameters: dict) -> None:
     with pytest.raises(ValidationError):
         synthesizer.Config.model_validate(parameters)
+
+
+def test_a_bad_model_file_ends_the_node_with_the_remedy(config: synthesizer.Config) -> None:
+    path = config.movement.file
+    assert path is not None
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(InputError, match=r"reaching.npz: expected a model file .* Remedy: train it again") as refusal:
+        synthesizer.run(RecordedBus(), config)
+    assert refusal.value.exit_code == 78
+    path.unlink()
+    with pytest.raises(InputError, match=r"there is no model file .*Remedy") as refusal:
+        synthesizer.run(RecordedBus(), config)
+    assert refusal.value.exit_code == 66

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,30 @@ def test_unknown_joint_names_the_nearest() -> None:
         ("kpp: 12", "kpq: 12", "kpq"),
         ("kpp: 12", "kpp: [", "robot.yaml"),
         ("joint: right_fingers", "joint: right_finger", "unknown joints: right_finger"),
+        ("name: hoap3", "nam: hoap3", r"name: field required.*; nam: extra inputs are not permitted, found 'hoap3'"),
+        ("lower_deg: -91,", "lower_deg: .nan,", r"joints\.0\.lower_deg: input should be a finite number, found nan"),
+        ("upper_deg: 31,", "upper_deg: .inf,", r"joints\.0\.upper_deg: input should be a finite number, found inf"),
+        ("upper_deg: 31,", "upper_deg: '31 deg',", r"valid number.*found '31 deg'"),
+        (
+            "upper_deg: 31,",
+            "upper_deg: -92,",
+            "expected lower_deg below upper_deg, found -91.0 and -92.0",
+        ),
+        ("counts_per_deg: 209,", "counts_per_deg: 0,", "right_hip_yaw: expected counts_per_deg other than 0"),
+        ("margin_deg: 1.0,", "margin_deg: 70.0,", "a margin of 70.0 deg at both ends leaves nothing of -91.0 to 31.0"),
+        (
+            "torque_average: 1.5",
+            "torque_average: -1.5",
+            r"type2\.torque_average: input should be greater than 0",
+        ),
+        (
+            "open_deg: -60, closed_deg: 60",
+            "open_deg: 60, closed_deg: 60",
+            "different angles of the open",
+        ),
+        ("    joints: [right_shoulder_pitch, ", "    joints: [", r"arms\.right\.joints\.4: field required"),
+        ("    upper_arm: 0.110\n", "", r"arms\.right\.upper_arm: field required"),
+        ("name: right_knee,", "name: right_kn,", "model file .* does not exist"),
     ],
 )
 def test_wrong_files_are_refused_with_the_reason(tmp_path: Path, old: str, new: str, reason: str) -> None:
@@ -73,6 +98,31 @@ def test_wrong_files_are_refused_with_the_reason(tmp_path: Path, old: str, new: 
         RobotDescription.load(path)
 
 
+@pytest.mark.parametrize("text", ["", "[]", "hoap3", "a: 1", "\x00", "joints: []"])
+def test_a_file_without_a_robot_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DescriptionError) as refusal:
+        RobotDescription.load(path)
+    assert str(path) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert refusal.value.exit_code == 78
+
+
+def test_a_file_of_other_bytes_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_bytes(b"\xff\xfe name")
+    with pytest.raises(DescriptionError, match=r"robot\.yaml"):
+        RobotDescription.load(tmp_path)
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match="no robot description at"):
+    with pytest.raises(DescriptionError, match=r"no robot description at .*: name the folder that holds") as refusal:
         RobotDescription.load(tmp_path / "robot.yaml")
+    assert refusal.value.exit_code == 66
+
+
+def test_a_missing_model_file_is_named(tmp_path: Path) -> None:
+    shutil.copy(ROBOT_DESCRIPTION / "robot.yaml", tmp_path)
+    with pytest.raises(DescriptionError, match=r"the model file .*hoap3\.xml does not exist") as refusal:
+        RobotDescription.load(tmp_path)
+    assert refusal.value.missing

@@ -7,8 +7,9 @@ The supervisor starts a node as `python -m nodes.<name> --config FILE`. The file
     parameters: {…}              # what the node's Config holds
     run_folder: runs/2026-11-21_10-00-00
 
-Exit codes: 0 ended well or by SIGTERM or SIGINT; 2 wrong arguments; 70 the node raised an exception or ended after it
-had said that it failed; 75 a topic or the bus folder is held by somebody else; 78 the configuration is wrong.
+Exit codes: 0 ended well or by SIGTERM or SIGINT; 2 wrong arguments; 66 a file or device is missing; 70 the node raised
+an exception or ended after it had said that it failed; 75 a topic or the bus folder is held by somebody else; 78 the
+configuration, or a file that it names, is wrong.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
+from paramove.input_error import InputError
 
 __all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "read_node_file"]
 
@@ -125,6 +127,10 @@ def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
     try:
         bus.starting("starting")
         run(bus, config)
+    except InputError as error:
+        _log.error("%s", error)
+        bus.failed(str(error))
+        return error.exit_code
     except Exception as error:
         _log.exception("the node raised an exception")
         bus.failed(f"{type(error).__name__}: {error}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -77,7 +78,7 @@ class ClearanceChecker:
 
     def _compile(self, model_path: Path) -> mujoco.MjModel:
         spec = mujoco.MjSpec.from_file(str(model_path))
-        shoulder = np.array(spec.site(self._arm.sites.shoulder).pos)  # on the torso, axes parallel
+        shoulder = np.array(_site(spec, self._arm.sites.shoulder).pos)  # on the torso, axes parallel
         box, world = self._surface, spec.worldbody
         low = np.array([box.x[0], box.y[0], box.z - box.thickness])
         high = np.array([box.x[1], box.y[1], box.z])
@@ -88,7 +89,7 @@ class ClearanceChecker:
         for k in range(self._n_standing):
             body = world.add_body(name=f"standing_{k}", mocap=True, pos=[_HIDDEN, _HIDDEN, 0.0])
             body.add_geom(name=f"standing_{k}", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size)
-        gripper = spec.site(self._arm.sites.gripper)
+        gripper = _site(spec, self._arm.sites.gripper)
         held = gripper.parent.add_geom(name="held", type=mujoco.mjtGeom.mjGEOM_CYLINDER, pos=gripper.pos, size=size)
         held.pos = np.array(gripper.pos) + np.array([0.0, 0.0, -_GRASPED_ABOVE_MIDDLE])  # grasped above the middle
         self._shoulder = shoulder
@@ -113,6 +114,16 @@ class ClearanceChecker:
     def surface_z(self) -> float:
         """Height of the working plane, m, shoulder frame."""
         return self._surface.z
+
+    @property
+    def grasp_height(self) -> float:
+        """Height at which a standing object is grasped, m, shoulder frame."""
+        return self._surface.z + self._cylinder.height / 2 + _GRASPED_ABOVE_MIDDLE
+
+    @property
+    def n_standing(self) -> int:
+        """How many standing objects can be kept clear of."""
+        return self._n_standing
 
     @property
     def cylinder(self) -> UprightCylinder:
@@ -163,6 +174,13 @@ class ClearanceChecker:
 
     def _name(self, geom: int) -> str:
         return str(self._model.geom(geom).name or self._model.body(int(self._model.geom_bodyid[geom])).name)
+
+
+def _site(spec: mujoco.MjSpec, name: str) -> Any:
+    site = spec.site(name)
+    if site is None:
+        raise ValueError(f"the model has no site {name!r}; it has {', '.join(one.name for one in spec.sites)}")
+    return site
 
 
 def _bodies_below(model: mujoco.MjModel, name: str) -> set[int]:

@@ -12,10 +12,11 @@ from paramove.imitation.arm_pose import ArmPoseSolver
 from paramove.imitation.clear_plans import ClearPlans
 from paramove.imitation.clearance import ClearanceChecker, UprightCylinder, WorkSurface
 from paramove.imitation.conversion import RobotMovement
+from paramove.imitation.reaching_file import load_reaching_model
 from paramove.imitation.relocation import RelocationPlanner
 from paramove.imitation.synthesizer import Synthesizer
 from paramove.phmm import InterpolativePHMM
-from paramove.robots.description import RobotDescription
+from paramove.robots.description import DescriptionError, RobotDescription
 
 
 class MovementSource(BaseModel):
@@ -27,9 +28,9 @@ class MovementSource(BaseModel):
     seed: int = 0
 
     def model(self) -> InterpolativePHMM:
-        """The trained model; trained ones are kept in the user's cache folder."""
+        """The model, kept in the user's cache folder once trained. Raises ModelFileError for a bad `file`."""
         if self.file is not None:
-            return InterpolativePHMM.load(self.file)
+            return load_reaching_model(self.file)
         cache = user_cache_path("paramove") / f"reaching_{self.seed}.npz"
         cache.parent.mkdir(parents=True, exist_ok=True)
         return train_reaching_model(self.seed, cache=cache)
@@ -49,7 +50,14 @@ class SurfaceParameters(BaseModel):
 
 def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> Synthesizer:
     """Everything that a synthesizer needs, from files."""
+    return Synthesizer(plans_for(robot_folder, side, movement, surface))
+
+
+def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> ClearPlans:
+    """What plans the robot's movements, from files."""
     robot = RobotDescription.load(robot_folder)
+    if side not in robot.arms:
+        raise DescriptionError(f"{robot_folder} describes the arms {', '.join(robot.arms)}, found side {side!r}")
     arm = robot.arms[side]
     solver = ArmPoseSolver(robot, arm)
     converted = RobotMovement.from_model(movement.model(), solver.length)
@@ -64,4 +72,8 @@ def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, sur
     )
     box = WorkSurface(surface.x, surface.y, surface.z)
     cylinder = UprightCylinder(surface.object_radius, surface.object_height)
-    return Synthesizer(ClearPlans(planner, ClearanceChecker(robot, side, box, cylinder)))
+    try:
+        checker = ClearanceChecker(robot, side, box, cylinder)
+    except (KeyError, ValueError) as error:
+        raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
+    return ClearPlans(planner, checker)

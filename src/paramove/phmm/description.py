@@ -1,6 +1,7 @@
 """What a movement model is about: action, points, unit, frame, names of the parameters."""
 
 from dataclasses import asdict, dataclass, fields
+from math import isfinite
 from typing import Any, Self
 
 
@@ -36,7 +37,7 @@ class MovementDescription:
 
     @classmethod
     def from_record(cls, record: dict[str, Any]) -> Self:
-        """From plain values. Raises ValueError for names that do not belong to a description."""
+        """From plain values. Raises ValueError for names and types that do not belong to a description."""
         known = {field.name for field in fields(cls)}
         unknown = sorted(set(record) - known)
         if unknown:
@@ -44,4 +45,17 @@ class MovementDescription:
         values: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in record.items()
         }
+        for field in fields(cls):
+            value = values.get(field.name, field.default)
+            if not _is_like(value, field.default):
+                raise ValueError(f"{field.name} of a description is like {field.default!r}, found {value!r:.80}")
         return cls(**values)
+
+
+def _is_like(value: Any, default: Any) -> bool:
+    """Whether a value has the type of the default: a name, names, or a finite number."""
+    if isinstance(default, tuple):
+        return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
+    if isinstance(default, str):
+        return isinstance(value, str)
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -11,6 +11,7 @@ from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
+from paramove.phmm.local_models import check_local_models
 from paramove.phmm.maximisation import curvature_covariance, maximum_over_cells
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.synchronisation import synchronised
@@ -203,12 +204,14 @@ class InterpolativePHMM(ParametricHMM):
         self.grid_ = ParameterGrid(arrays["grid_origin"], arrays["grid_edges"], knots)
         self.means_, self.covariances_ = arrays["means"], arrays["covariances"]
         self.durations_ = arrays["durations"]
-        dim = self.means_.shape[-1]
+        dim, theta_dim = self.means_.shape[-1], self.grid_.dimension
         states = (self.grid_.size, self.n_states)
         expected = {"means": (*states, dim), "covariances": (*states, dim, dim), "durations": (*states, self.d_max)}
+        expected |= {"grid_origin": (theta_dim,), "grid_edges": (theta_dim, theta_dim)}
         for name, shape in expected.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
+        check_local_models(self.means_, self.covariances_, self.durations_, self.d_min)
 
 
 def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list[list[Floats]]:

@@ -163,7 +163,8 @@ class ParametricHMM(ABC):
     def load(cls, path: str | Path) -> Self:
         """Read a model of this class, or of any class when called on ParametricHMM.
 
-        Raises ModelFileError for a wrong version, class, shape or value, with what was expected and found.
+        Raises ModelFileError for a missing or damaged file, a wrong version, class, shape or value, with what was
+        expected and found.
         """
         record = read_record(Path(path))
         known = {name: kind for name, kind in _CLASSES.items() if issubclass(kind, cls)}
@@ -171,13 +172,24 @@ class ParametricHMM(ABC):
             raise ModelFileError(f"{path}: expected one of {sorted(known)}, found a {record.class_name}")
         try:
             model = known[record.class_name](**record.parameters)
+            model._check_counts()
             arrays = dict(record.arrays)
             model.parameter_bounds_ = arrays.pop("parameter_bounds")
             model._set_arrays(arrays)
-        except (KeyError, TypeError, ValueError) as error:
+        except KeyError as error:
+            found = ", ".join(sorted(record.arrays)) or "none"
+            raise ModelFileError(f"{path}: expected an array {error}, found {found}") from error
+        except (ArithmeticError, AttributeError, IndexError, TypeError, ValueError) as error:
             raise ModelFileError(f"{path}: {error}") from error
         model.training_ = record.training
         return model
+
+    def _check_counts(self) -> None:
+        counts = {name: getattr(self, name) for name in ("n_states", "d_min", "d_max")}
+        if not all(type(count) is int for count in counts.values()) or not 1 <= self.d_min <= self.d_max:
+            raise ValueError(f"expected whole numbers with 1 <= d_min <= d_max, found {counts}")
+        if self.n_states < 1 or not isinstance(self.description, MovementDescription | None):
+            raise ValueError(f"expected at least one state, found {self.n_states}")
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -10,103 +10,25 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from paramove.robots.arm_kinematics import ArmKinematics
+from paramove.robots.description_file import (
+    ArmPart,
+    ArmSites,
+    DescriptionError,
+    FirmwareParameters,
+    RobotFile,
+    StreamParameters,
+    read_robot_file,
+)
 from paramove.robots.joint_units import JointUnits
 
+__all__ = ["Arm", "DescriptionError", "RobotDescription"]
+
 FloatArray = NDArray[np.float64]
-
-
-class DescriptionError(ValueError):
-    """A robot description that cannot be used; the message names the file and what was found."""
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Joint(_Part):
-    name: str
-    motor: str
-    lower_deg: float
-    upper_deg: float
-    counts_per_deg: float
-    zero_counts: int
-    base_deg: float
-
-
-class _Motor(_Part):
-    loop: Literal["velocity", "servo"]
-    torque_average: float = Field(gt=0)
-    torque_peak: float = Field(gt=0)
-    velocity_deg_s: float = Field(gt=0)
-    margin_deg: float = Field(ge=0)
-    operating_velocity_deg_s: float = Field(gt=0)
-    operating_acceleration_deg_s2: float = Field(gt=0)
-    stop_acceleration_deg_s2: float = Field(gt=0)
-    jerk_deg_s3: float = Field(gt=0)
-
-
-class FirmwareParameters(_Part):
-    """Numbers of the loop on the robot; see `paramove.robots.hoap3.firmware`."""
-
-    period_us: int = Field(gt=0)
-    kpp: float
-    kpv: float
-    saturation_counts_per_ms: float
-    torque_per_pwm_step: float
-    servo_kp: float
-    servo_kv: float
-
-
-class StreamParameters(_Part):
-    """How targets are streamed to the robot."""
-
-    period_us: int = Field(gt=0)
-    cover_ms: int = Field(gt=0)
-    guard_ms: int = Field(gt=0)
-    start_tolerance_deg: float = Field(gt=0)
-
-
-class _Fingers(_Part):
-    joint: str
-    open_deg: float
-    closed_deg: float
-
-
-class ArmSites(_Part):
-    """Names of an arm's sites in the model file."""
-
-    shoulder: str
-    elbow: str
-    gripper: str
-    fingertip: str
-
-
-class _Arm(_Part):
-    joints: tuple[str, str, str, str, str]
-    fingers: _Fingers
-    sites: ArmSites
-    upper_arm: float
-    gripper_from_elbow: tuple[float, float, float]
-    fingertip_from_elbow: tuple[float, float, float]
-
-
-class _File(_Part):
-    name: str
-    model: str
-    joints: tuple[_Joint, ...]
-    motors: dict[str, _Motor]
-    firmware: FirmwareParameters
-    stream: StreamParameters
-    arms: dict[str, _Arm]
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,39 +125,10 @@ class RobotDescription:
         path = Path(path)
         if path.is_dir():
             path = path / "robot.yaml"
-        try:
-            raw = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-            file = _File.model_validate(raw)
-        except FileNotFoundError:
-            raise DescriptionError(f"no robot description at {path}") from None
-        except (YAMLError, ValidationError) as error:
-            raise DescriptionError(f"{path}: {error}") from error
-        _check(path, file)
-        return _assemble(path, file)
+        return _assemble(path, read_robot_file(path))
 
 
-def _check(path: Path, file: _File) -> None:
-    names = [joint.name for joint in file.joints]
-    if len(set(names)) != len(names):
-        twice = sorted({name for name in names if names.count(name) > 1})
-        raise DescriptionError(f"{path}: joints named twice: {', '.join(twice)}")
-    for joint in file.joints:
-        if joint.motor not in file.motors:
-            raise DescriptionError(
-                f"{path}: joint {joint.name} has motor {joint.motor!r}; known motors are {', '.join(file.motors)}"
-            )
-        if not joint.lower_deg <= joint.base_deg <= joint.upper_deg:
-            raise DescriptionError(
-                f"{path}: joint {joint.name}: base pose {joint.base_deg} deg is outside "
-                f"{joint.lower_deg} to {joint.upper_deg} deg"
-            )
-    for side, arm in file.arms.items():
-        unknown = [name for name in (*arm.joints, arm.fingers.joint) if name not in names]
-        if unknown:
-            raise DescriptionError(f"{path}: arm {side!r} names unknown joints: {', '.join(unknown)}")
-
-
-def _assemble(path: Path, file: _File) -> RobotDescription:
+def _assemble(path: Path, file: RobotFile) -> RobotDescription:
     joints = file.joints
     motors = [file.motors[joint.motor] for joint in joints]
     names = tuple(joint.name for joint in joints)
@@ -274,7 +167,7 @@ def _assemble(path: Path, file: _File) -> RobotDescription:
     )
 
 
-def _arm(names: tuple[str, ...], arm: _Arm) -> Arm:
+def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
     return Arm(
         joints=arm.joints,
         indices=np.array([names.index(joint) for joint in arm.joints], dtype=np.intp),

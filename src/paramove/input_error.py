@@ -1,0 +1,25 @@
+"""What a program is given from outside and cannot use: files, devices, parameters."""
+
+from __future__ import annotations
+
+EXIT_MISSING = 66
+EXIT_WRONG = 78
+
+
+class InputError(ValueError):
+    """An input that is missing or wrong; a restart with the same input would end the same way.
+
+    The message is one line for people: what was expected, what was found and what helps.
+
+    Attributes:
+        missing: There is nothing where the input should be.
+    """
+
+    def __init__(self, sentence: str, missing: bool = False) -> None:
+        super().__init__(" ".join(sentence.split()))
+        self.missing = missing
+
+    @property
+    def exit_code(self) -> int:
+        """Of a process that ends because of it: 66 for a missing input, 78 for a wrong one."""
+        return EXIT_MISSING if self.missing else EXIT_WRONG

@@ -1,0 +1,180 @@
+"""The file `robot.yaml`: its keys, and the checks that it does not contradict itself. Degrees, as in the manuals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from paramove.input_error import InputError
+
+MOST_FINDINGS = 5
+
+
+class DescriptionError(InputError):
+    """A robot description that cannot be used; the message names the file, what was found and what was expected."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class JointPart(_Part):
+    """One joint, degrees."""
+
+    name: str
+    motor: str
+    lower_deg: float
+    upper_deg: float
+    counts_per_deg: float
+    zero_counts: int
+    base_deg: float
+
+
+class MotorPart(_Part):
+    """What a kind of motor can do and may do."""
+
+    loop: Literal["velocity", "servo"]
+    torque_average: float = Field(gt=0)
+    torque_peak: float = Field(gt=0)
+    velocity_deg_s: float = Field(gt=0)
+    margin_deg: float = Field(ge=0)
+    operating_velocity_deg_s: float = Field(gt=0)
+    operating_acceleration_deg_s2: float = Field(gt=0)
+    stop_acceleration_deg_s2: float = Field(gt=0)
+    jerk_deg_s3: float = Field(gt=0)
+
+
+class FirmwareParameters(_Part):
+    """Numbers of the loop on the robot; see `paramove.robots.hoap3.firmware`."""
+
+    period_us: int = Field(gt=0)
+    kpp: float
+    kpv: float
+    saturation_counts_per_ms: float
+    torque_per_pwm_step: float
+    servo_kp: float
+    servo_kv: float
+
+
+class StreamParameters(_Part):
+    """How targets are streamed to the robot."""
+
+    period_us: int = Field(gt=0)
+    cover_ms: int = Field(gt=0)
+    guard_ms: int = Field(gt=0)
+    start_tolerance_deg: float = Field(gt=0)
+
+
+class FingersPart(_Part):
+    """The joint that closes a hand."""
+
+    joint: str
+    open_deg: float
+    closed_deg: float
+
+
+class ArmSites(_Part):
+    """Names of an arm's sites in the model file."""
+
+    shoulder: str
+    elbow: str
+    gripper: str
+    fingertip: str
+
+
+class ArmPart(_Part):
+    """One arm; lengths in m."""
+
+    joints: tuple[str, str, str, str, str]
+    fingers: FingersPart
+    sites: ArmSites
+    upper_arm: float
+    gripper_from_elbow: tuple[float, float, float]
+    fingertip_from_elbow: tuple[float, float, float]
+
+
+class RobotFile(_Part):
+    """All of robot.yaml."""
+
+    name: str
+    model: str
+    joints: tuple[JointPart, ...]
+    motors: dict[str, MotorPart]
+    firmware: FirmwareParameters
+    stream: StreamParameters
+    arms: dict[str, ArmPart]
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """Read and check a `robot.yaml`. Raises DescriptionError with every wrong key, what was found and expected."""
+    try:
+        raw = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        file = RobotFile.model_validate(raw)
+    except FileNotFoundError:
+        raise DescriptionError(
+            f"no robot description at {path}: name the folder that holds robot.yaml", missing=True
+        ) from None
+    except OSError as error:
+        raise DescriptionError(f"{path} cannot be read: {error.strerror}") from error
+    except ValidationError as error:
+        raise DescriptionError(f"{path}: {_findings(error)}") from error
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path}: {error}") from error
+    _check(path, file)
+    return file
+
+
+def _findings(error: ValidationError) -> str:
+    """Each wrong key: where, what was expected, what was found."""
+    found = error.errors()
+    told = [
+        f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'][:1].lower()}{item['msg'][1:]}, "
+        f"found {item['input']!r:.60}"
+        for item in found[:MOST_FINDINGS]
+    ]
+    more = f"; and {len(found) - MOST_FINDINGS} more" if len(found) > MOST_FINDINGS else ""
+    return "; ".join(told) + more
+
+
+def _check(path: Path, file: RobotFile) -> None:
+    if not file.joints:
+        raise DescriptionError(f"{path}: expected joints, found none")
+    names = [joint.name for joint in file.joints]
+    if len(set(names)) != len(names):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise DescriptionError(f"{path}: joints named twice: {', '.join(twice)}")
+    for joint in file.joints:
+        if joint.motor not in file.motors:
+            raise DescriptionError(
+                f"{path}: joint {joint.name} has motor {joint.motor!r}; known motors are {', '.join(file.motors)}"
+            )
+        if not joint.lower_deg < joint.upper_deg:
+            raise DescriptionError(
+                f"{path}: joint {joint.name}: expected lower_deg below upper_deg, found {joint.lower_deg} and "
+                f"{joint.upper_deg}"
+            )
+        if joint.counts_per_deg == 0:
+            raise DescriptionError(f"{path}: joint {joint.name}: expected counts_per_deg other than 0")
+        margin = file.motors[joint.motor].margin_deg
+        if joint.lower_deg + margin > joint.upper_deg - margin:
+            raise DescriptionError(
+                f"{path}: joint {joint.name}: a margin of {margin} deg at both ends leaves nothing of "
+                f"{joint.lower_deg} to {joint.upper_deg} deg"
+            )
+        if not joint.lower_deg <= joint.base_deg <= joint.upper_deg:
+            raise DescriptionError(
+                f"{path}: joint {joint.name}: base pose {joint.base_deg} deg is outside "
+                f"{joint.lower_deg} to {joint.upper_deg} deg"
+            )
+    for side, arm in file.arms.items():
+        if arm.fingers.open_deg == arm.fingers.closed_deg:
+            raise DescriptionError(f"{path}: arm {side!r}: expected different angles of the open and the closed hand")
+        unknown = [name for name in (*arm.joints, arm.fingers.joint) if name not in names]
+        if unknown:
+            raise DescriptionError(f"{path}: arm {side!r} names unknown joints: {', '.join(unknown)}")
+    if not (path.parent / file.model).is_file():
+        raise DescriptionError(f"{path}: the model file {path.parent / file.model} does not exist", missing=True)

@@ -1,0 +1,44 @@
+"""Putting a synthesizer together from files that do not fit."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from paramove.imitation.setup import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.robots.description import DescriptionError
+from tests.imitation.reaching import ROBOT_FOLDER, reaching_model
+
+
+@pytest.fixture
+def movement(tmp_path: Path) -> MovementSource:
+    reaching_model().save(tmp_path / "reaching.npz")
+    return MovementSource(file=tmp_path / "reaching.npz")
+
+
+def test_an_arm_that_the_robot_lacks_is_named(movement: MovementSource) -> None:
+    with pytest.raises(DescriptionError, match="describes the arms right, left, found side 'middle'"):
+        synthesizer_for(ROBOT_FOLDER, "middle", movement, SurfaceParameters())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("<mujoco", "<mujko", "XML"),
+        ('<site name="right_gripper"', '<site name="gripper"', "right_gripper|site"),
+        ('joint name="right_elbow"', 'joint name="elbow"', "right_elbow"),
+    ],
+)
+def test_a_model_file_without_what_the_description_names(
+    tmp_path: Path, movement: MovementSource, old: str, new: str, words: str
+) -> None:
+    folder = tmp_path / "robot"
+    shutil.copytree(ROBOT_FOLDER, folder)
+    model = folder / "hoap3.xml"
+    text = model.read_text(encoding="utf-8")
+    assert old in text
+    model.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=f"hoap3.xml does not fit the robot's description: .*({words})"):
+        synthesizer_for(folder, "right", movement, SurfaceParameters())
