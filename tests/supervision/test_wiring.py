@@ -12,7 +12,7 @@ def checked(workspace, text):
     workspace.write(text)
     launch = workspace.load()
     interfaces = read_interfaces(launch, workspace.root)
-    check_wiring(launch, interfaces)
+    check_wiring(launch, interfaces, workspace.root)
     return interfaces
 
 
@@ -49,7 +49,7 @@ def test_topics_with_a_speaker_pass(workspace):
         (
             "nodes:\n  a: {module: nodes.actor}\n  ear: {module: nodes.listener, remaps: {speach: x}}",
             "3:42",
-            "'ear' does not use speach; did you mean 'speech'?",
+            "'ear' does not use 'speach'; did you mean 'speech'?",
         ),
     ],
 )

@@ -33,7 +33,7 @@ def find_workspace(start: Path) -> Path:
 def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
     """Checks all that can be known before a process starts; returns the interfaces; raises LaunchFileError."""
     interfaces = read_interfaces(launch, workspace)
-    check_wiring(launch, interfaces)
+    check_wiring(launch, interfaces, workspace)
     return interfaces
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.util
 import json
 import subprocess
@@ -27,12 +28,16 @@ class Interface:
         hears: Topics that it subscribes to.
         says: Topics that it publishes, without its status.
         parameters: Names of its parameters; None where they cannot be read from the source.
+        has_config: Whether it has a `Config` that can be asked about parameters.
+        needs_parameters: Whether some parameter may have no default value.
     """
 
     path: Path
     hears: tuple[Topic, ...]
     says: tuple[Topic, ...]
     parameters: tuple[str, ...] | None
+    has_config: bool = False
+    needs_parameters: bool = False
 
 
 def source_of(module: str, workspace: Path) -> Path:
@@ -72,12 +77,13 @@ def read_interface(module: str, workspace: Path) -> Interface:
         tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
     except SyntaxError as error:
         raise InterfaceError(f"{path}:{error.lineno}: {error.msg}") from error
-    parameters = _parameters(tree)
+    config = _config(tree)
+    about = (_parameters(config), config is not None, config is not None and _needs_parameters(config))
     try:
-        return Interface(path, _constant(tree, "HEARS", path), _constant(tree, "SAYS", path), parameters)
+        return Interface(path, _constant(tree, "HEARS", path), _constant(tree, "SAYS", path), *about)
     except _NotPlainError:
-        hears, says = _imported(module, workspace)
-        return Interface(path, hears, says, parameters)
+        hears, says = _imported(module, workspace, path.stat().st_mtime_ns)
+        return Interface(path, hears, says, *about)
 
 
 class _NotPlainError(Exception):
@@ -116,14 +122,38 @@ def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> 
     raise _NotPlainError
 
 
-def _parameters(tree: ast.Module) -> tuple[str, ...] | None:
-    for statement in tree.body:
-        if isinstance(statement, ast.ClassDef) and statement.name == "Config":
-            if [ast.unparse(base) for base in statement.bases] != ["NodeConfig"]:
-                return None
-            fields = [line for line in statement.body if isinstance(line, ast.AnnAssign)]
-            return tuple(field.target.id for field in fields if isinstance(field.target, ast.Name))
-    return None
+def _config(tree: ast.Module) -> ast.ClassDef | None:
+    return next((line for line in tree.body if isinstance(line, ast.ClassDef) and line.name == "Config"), None)
+
+
+def _is_plain(config: ast.ClassDef) -> bool:
+    return [ast.unparse(base) for base in config.bases] == ["NodeConfig"]
+
+
+def _parameters(config: ast.ClassDef | None) -> tuple[str, ...] | None:
+    if config is None or not _is_plain(config):
+        return None
+    fields = [line for line in config.body if isinstance(line, ast.AnnAssign)]
+    return tuple(field.target.id for field in fields if isinstance(field.target, ast.Name))
+
+
+def _needs_parameters(config: ast.ClassDef) -> bool:
+    """Whether a field may have no default: none is written, or a `Field(...)` that names none."""
+    if not _is_plain(config):
+        return True
+    for line in config.body:
+        if not isinstance(line, ast.AnnAssign):
+            continue
+        value = line.value
+        if value is None:
+            return True
+        if isinstance(value, ast.Call) and ast.unparse(value.func).rpartition(".")[2] == "Field":
+            named = {keyword.arg for keyword in value.keywords}
+            if not value.args and not named & {"default", "default_factory"}:
+                return True
+            if value.args and ast.unparse(value.args[0]) == "...":
+                return True
+    return False
 
 
 _ASK = (
@@ -132,7 +162,9 @@ _ASK = (
 )
 
 
-def _imported(module: str, workspace: Path) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
+@functools.cache
+def _imported(module: str, workspace: Path, changed_ns: int) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
+    """HEARS and SAYS of a module, imported in another process; again only when its file has changed."""
     try:
         answer = subprocess.run(
             [sys.executable, "-c", _ASK, module], cwd=workspace, capture_output=True, text=True, timeout=60, check=False

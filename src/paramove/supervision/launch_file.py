@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
-from paramove.supervision.positions import Document, KeyPath, LaunchFileError, Position, read_mapping, read_value
+from paramove.supervision.names import closest, nearest
+from paramove.supervision.positions import (
+    MAX_CHARACTERS,
+    Document,
+    KeyPath,
+    LaunchFileError,
+    Position,
+    raise_any,
+    read_mapping,
+)
+from paramove.supervision.references import with_values, wrong_references
 
 _QUOTED = re.compile(r"'([^']*)'")
 _PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -35,7 +44,7 @@ class Launch:
 
     def error(self, path: KeyPath, message: str) -> LaunchFileError:
         """An error at the place where `path` was written."""
-        return LaunchFileError(self.document.position(path), message)
+        return self.document.error(path, message)
 
 
 def load(
@@ -51,28 +60,56 @@ def load(
     Args:
         folder: Holds the launch files; overlays lie in its sub-folder `overlays`.
         name: Of the launch file without `.yaml`, or a path that ends in `.yaml`.
-        overlays: Names or paths likewise; None takes the file's `default_overlays`.
+        overlays: Names or paths likewise; None takes the file's `default_overlays`, which are names.
         settings: Each `node.parameter=value`; the value is YAML.
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
 
-    Raises LaunchFileMissingError or LaunchFileError.
+    Raises LaunchFileMissingError, or LaunchFileError with all that is wrong.
     """
-    document = _read(_path_of(folder, name, "launch file"))
-    chosen = document.data.get("default_overlays", []) if overlays is None else list(overlays)
-    if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
-        raise LaunchFileError(document.position(("default_overlays",)), "expected a list of names of overlays")
-    for overlay in chosen:
-        document = document.overlaid(_read(_path_of(folder / "overlays", overlay, "overlay")))
-    if headless:
-        document = _made_headless(document)
-    for setting in settings:
-        document = _with_setting(document, setting)
-    if seed is not None:
-        document = _with_seed(document, seed)
-    file = validated(document)
-    _check_references(file, document)
+    document, chosen = _with_overlays(folder, _read(path_of(folder, name, "launch file")), overlays)
+    document, findings = with_values(document, settings, seed, headless)
+    try:
+        file = validated(document)
+    except LaunchFileError as error:
+        findings.append(error)
+    findings += wrong_references(document)
+    raise_any(findings)
     return Launch(Path(name).stem, tuple(chosen), file, document, seed)
+
+
+def _with_overlays(folder: Path, document: Document, overlays: Sequence[str] | None) -> tuple[Document, list[str]]:
+    """The document with its overlays, and their names; raises LaunchFileError with what is wrong in any of them."""
+    paths, findings = [], []
+    if overlays is None:
+        chosen = document.data.get("default_overlays", [])
+        if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
+            raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
+        for index, overlay in enumerate(chosen):
+            path = folder / "overlays" / f"{overlay}.yaml"
+            if not _PLAIN_NAME.fullmatch(overlay):
+                message = f"{overlay!r}: expected the plain name of an overlay in {folder / 'overlays'}, no path"
+                findings.append(document.error(("default_overlays", str(index)), message))
+            elif not path.is_file():
+                message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, names_in(path.parent))}"
+                findings.append(document.error(("default_overlays", str(index)), message))
+            else:
+                paths.append(path)
+    else:
+        chosen = list(overlays)
+        paths = [path_of(folder / "overlays", overlay, "overlay") for overlay in chosen]
+    for path in paths:
+        try:
+            top = _read(path)
+        except LaunchFileError as error:
+            findings.append(error)
+            continue
+        if "default_overlays" in top.data:
+            message = "an overlay names no other overlays; name both in the launch file or with --with"
+            findings.append(top.error(("default_overlays",), message))
+        document = document.overlaid(top)
+    raise_any(findings)
+    return document, chosen
 
 
 def validated(document: Document) -> LaunchFile:
@@ -80,109 +117,81 @@ def validated(document: Document) -> LaunchFile:
     try:
         return LaunchFile.model_validate(document.data)
     except ValidationError as error:
-        details = sorted(error.errors(), key=lambda found: found["type"] == "missing")  # often a mistyped key's echo
-        findings = [_finding(document, found) for found in details]
-        first, rest = findings[0], findings[1:]
-        message = "\n".join([first.message, *(str(finding) for finding in rest)])
-        raise LaunchFileError(first.position, message) from error
+        raise LaunchFileError.of([_finding(document, found) for found in _causes(error.errors())]) from error
 
 
-def nearest(word: str, known: Iterable[str]) -> str:
-    """The words among `known` that are nearest to `word`, else all of them, as a phrase for an error."""
-    choices = sorted(known)
-    close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean '{close[0]}'?"
-    return f"there are: {', '.join(choices)}" if choices else "there are none"
+def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Findings without the keys that are missing only because they are mistyped."""
+    mistyped = set()
+    for found in details:
+        if found["type"] == "extra_forbidden":
+            *above, key = (str(part) for part in found["loc"])
+            mistyped |= {(*above, meant) for meant in closest(key, _keys_at(tuple(above)))}
+    return [found for found in details if found["type"] != "missing" or tuple(map(str, found["loc"])) not in mistyped]
 
 
-def _path_of(folder: Path, name: str, kind: str) -> Path:
+def names_in(folder: Path) -> list[str]:
+    """Names of the launch files, or overlays, in a folder."""
+    return sorted(file.stem for file in folder.glob("*.yaml"))
+
+
+def path_of(folder: Path, name: str, kind: str) -> Path:
+    """File of a launch file or overlay named on the command line; raises LaunchFileMissingError."""
     if name.endswith(".yaml"):
         path = Path(name)
     elif _PLAIN_NAME.fullmatch(name):
         path = folder / f"{name}.yaml"
     else:
         raise LaunchFileMissingError(Position(name), f"no name of a {kind}: expected letters, digits, '_', or a *.yaml")
-    if not path.is_file():
-        known = [file.stem for file in folder.glob("*.yaml")]
-        raise LaunchFileMissingError(Position(str(path)), f"there is no such {kind}; {nearest(path.stem, known)}")
+    try:
+        there = path.is_file()
+    except ValueError:  # a NUL byte in it
+        there = False
+    if not there:
+        message = f"there is no such {kind}; {nearest(path.stem, names_in(folder))}"
+        raise LaunchFileMissingError(Position(str(path)), message)
     return path
 
 
 def _read(path: Path) -> Document:
     try:
-        text = path.read_text(encoding="utf-8")
+        if path.stat().st_size > 4 * MAX_CHARACTERS:
+            raise LaunchFileError(Position(str(path)), f"{path.stat().st_size} bytes: no launch file is that large")
+        text = path.read_text(encoding="utf-8-sig")  # an editor may have written a byte order mark
     except (OSError, UnicodeDecodeError) as error:
-        raise LaunchFileError(Position(str(path)), f"cannot be read: {error}") from error
+        raise LaunchFileError(Position(str(path)), f"cannot be read as UTF-8 text: {error}") from error
     return read_mapping(text, str(path))
-
-
-def _with_setting(document: Document, setting: str) -> Document:
-    """`node.parameter=value` laid over the document."""
-    where = Position(f"--set {setting}")
-    path, equals, text = setting.partition("=")
-    node, *parameters = path.strip().split(".")
-    if not equals or not parameters or not all([node, *parameters]):
-        raise LaunchFileError(where, "expected node.parameter=value, such as simulator.seed=7")
-    _known_node(document, node, where)
-    return document.overlaid(_parameter(node, parameters, read_value(text, str(where)), where))
-
-
-def _with_seed(document: Document, seed: int) -> Document:
-    where = Position(f"--seed {seed}")
-    targets = document.data.get("seed_parameters", [])
-    if not targets:
-        raise LaunchFileError(where, "this launch file has no 'seed_parameters', so nothing in it takes a seed")
-    for target in targets:
-        node, *parameters = str(target).split(".")
-        if not parameters:
-            raise LaunchFileError(document.position(("seed_parameters",)), f"'{target}': expected node.parameter")
-        _known_node(document, node, document.position(("seed_parameters",)))
-        document = document.overlaid(_parameter(node, parameters, seed, where))
-    return document
-
-
-def _made_headless(document: Document) -> Document:
-    values = document.data.get("headless", {})
-    for target, value in values.items() if isinstance(values, dict) else ():
-        where = document.position(("headless", target))
-        node, *parameters = target.split(".")
-        if not parameters:
-            raise LaunchFileError(where, f"'{target}': expected node.parameter")
-        _known_node(document, node, where)
-        document = document.overlaid(_parameter(node, parameters, value, where))
-    return document
-
-
-def _known_node(document: Document, node: str, where: Position) -> None:
-    nodes = document.data.get("nodes")
-    known = list(nodes) if isinstance(nodes, dict) else []
-    if node not in known:
-        raise LaunchFileError(where, f"there is no node '{node}'; {nearest(node, known)}")
-
-
-def _parameter(node: str, parameters: Sequence[str], value: Any, where: Position) -> Document:
-    path = ("nodes", node, "parameters", *parameters)
-    data: Any = value
-    for key in reversed(path):
-        data = {key: data}
-    return Document(data, {path: where})
 
 
 def _finding(document: Document, details: ErrorDetails) -> LaunchFileError:
     """One finding of pydantic with the position in the file and the nearest valid key."""
     path = tuple(str(part) for part in details["loc"] if part != "[key]")
-    where = document.position(path)
     name = ".".join(path) or "the launch file"
     if details["type"] == "extra_forbidden":
-        return LaunchFileError(where, f"unknown key '{path[-1]}'; {nearest(path[-1], _keys_at(path[:-1]))}")
+        return document.error(path, f"unknown key '{path[-1]}'; {nearest(path[-1], _keys_at(path[:-1]))}")
     if details["type"] == "missing":
-        return LaunchFileError(where, f"{name} is missing")
-    message = details["msg"][0].lower() + details["msg"][1:]
-    if details["type"] == "literal_error":
-        message += f"; {nearest(str(details['input']), _QUOTED.findall(details['msg']))}"
+        return document.error(path, f"{name} is missing")
+    message = _EXPECTED.get(details["type"], details["msg"][0].lower() + details["msg"][1:])
+    if details["type"] == "string_pattern_mismatch":
+        is_module = path[-1] in ("module", "after_run")
+        message = f"expected {'names joined by dots, such as nodes.camera' if is_module else 'a name such as my_node'}"
     found = details["input"]
-    return LaunchFileError(where, f"{name}: {message}, found {found!r}"[:500])
+    message += f", found {found!r:.200}"
+    if details["type"] == "literal_error":
+        message += f"; {nearest(str(found), _QUOTED.findall(details['msg']))}"
+    elif details["type"] in ("int_type", "float_type") and isinstance(found, str):
+        message += "; write a number, without quotes"
+    return document.error(path, f"{name}: {message}")
+
+
+_EXPECTED = {
+    "bool_type": "expected true or false",
+    "dict_type": "expected a mapping 'key: value'",
+    "model_type": "expected a mapping 'key: value'",
+    "list_type": "expected a list in brackets",
+    "string_type": "expected a text, in quotes if it could be something else",
+}
+"""Type of a finding of pydantic -> what to write instead."""
 
 
 def _keys_at(path: KeyPath) -> list[str]:
@@ -198,33 +207,18 @@ def _keys_at(path: KeyPath) -> list[str]:
     return list(model.model_fields)
 
 
-def _check_references(file: LaunchFile, document: Document) -> None:
-    """Names of nodes inside the file exist, and `after` has no circle."""
-    for name, node in file.nodes.items():
-        for index, other in enumerate(node.after):
-            if other not in file.nodes:
-                where = document.position(("nodes", name, "after", str(index)))
-                raise LaunchFileError(where, f"'{name}' comes after '{other}', no node; {nearest(other, file.nodes)}")
-    start_waves(file, document)
-    for index, target in enumerate(file.seed_parameters):
-        if target.partition(".")[0] not in file.nodes or "." not in target:
-            where = document.position(("seed_parameters", str(index)))
-            raise LaunchFileError(where, f"'{target}' is no node.parameter; {nearest(target, file.nodes)}")
-
-
-def start_waves(file: LaunchFile, document: Document | None = None) -> list[list[str]]:
+def start_waves(file: LaunchFile) -> list[list[str]]:
     """Nodes in the order of their start: each wave needs only nodes of earlier waves.
 
-    Raises LaunchFileError if nodes wait for each other in a circle.
+    Raises LaunchFileError if nodes wait for each other in a circle, which `load` has refused before.
     """
     waves: list[list[str]] = []
     placed: set[str] = set()
     while len(placed) < len(file.nodes):
         wave = [name for name, node in file.nodes.items() if name not in placed and placed.issuperset(node.after)]
         if not wave:
-            circle = [name for name in file.nodes if name not in placed]
-            where = document.position(("nodes", circle[0], "after")) if document else Position("launch file")
-            raise LaunchFileError(where, f"these nodes wait for each other ('after'): {', '.join(circle)}")
+            left = [name for name in file.nodes if name not in placed]
+            raise LaunchFileError(Position("launch file"), f"these nodes can never start: {', '.join(left)}")
         waves.append(wave)
         placed.update(wave)
     return waves

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,14 +15,21 @@ from ruamel.yaml.events import (
     CollectionEndEvent,
     CollectionStartEvent,
     DocumentStartEvent,
+    Event,
     NodeEvent,
     ScalarEvent,
 )
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
 
-MAX_CHARACTERS = 1_000_000
+MAX_CHARACTERS = 100_000
 MAX_DEPTH = 20
+MAX_FINDINGS = 20
+"""So many are told at once; more of them help nobody."""
 
 KeyPath = tuple[str, ...]
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -31,16 +41,53 @@ class Position:
     column: int = 0
 
     def __str__(self) -> str:
-        return f"{self.source}:{self.line}:{self.column}" if self.line else self.source
+        source = printable(self.source)
+        return f"{source}:{self.line}:{self.column}" if self.line else source
 
 
 class LaunchFileError(ValueError):
-    """Something in a launch file is wrong. The message begins with its position."""
+    """Something in a launch file is wrong: one finding or several, a line each, that begin with their positions.
 
-    def __init__(self, position: Position, message: str) -> None:
-        super().__init__(f"{position}: {message}")
+    Attributes:
+        position: Of the first finding.
+        message: Of the first finding, without what a terminal would obey.
+        others: Further findings.
+    """
+
+    def __init__(self, position: Position, message: str, others: Sequence[LaunchFileError] = ()) -> None:
         self.position = position
-        self.message = message
+        self.message = printable(message)
+        self.others = tuple(others)
+        super().__init__(position, message)
+
+    def __str__(self) -> str:
+        lines = [f"{error.position}: {error.message}" for error in self]
+        hidden = len(lines) - MAX_FINDINGS
+        return "\n".join(lines[:MAX_FINDINGS] + ([f"and {hidden} more"] if hidden > 0 else []))
+
+    def __iter__(self) -> Iterator[LaunchFileError]:
+        """Each finding."""
+        return iter((self, *self.others))
+
+    @classmethod
+    def of(cls, findings: Sequence[LaunchFileError]) -> LaunchFileError:
+        """One error that tells all findings, each once, from the top of each file down; at least one is needed."""
+        flat = {(one.position, one.message): one for found in findings for one in found}
+        sources = list(dict.fromkeys(position.source for position, _ in flat))
+        places = sorted(flat, key=lambda key: (sources.index(key[0].source), key[0].line, key[0].column))
+        first, *others = (flat[place] for place in places)
+        return cls(first.position, first.message, others)
+
+
+def raise_any(findings: Sequence[LaunchFileError]) -> None:
+    """Raises one LaunchFileError with all findings; nothing if there are none."""
+    if findings:
+        raise LaunchFileError.of(findings)
+
+
+def printable(text: str) -> str:
+    """The text with control characters, which a terminal would obey, written as escapes."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 @dataclass
@@ -57,11 +104,16 @@ class Document:
                 return self.positions[path[:length]]
         return Position("launch file")
 
+    def error(self, path: KeyPath, message: str) -> LaunchFileError:
+        """An error at the place where `path` was written."""
+        return LaunchFileError(self.position(path), message)
+
     def overlaid(self, top: Document) -> Document:
         """This document with `top` laid over it: mappings merge, all else is replaced, null removes a key."""
         merged = Document(dict(self.data), dict(self.positions))
         for path, position in top.positions.items():
-            merged.positions[path] = position
+            if path:  # what is missing at the top level is missing in the launch file
+                merged.positions[path] = position
         merged.data = _merged(self.data, top.data)
         return merged
 
@@ -82,96 +134,181 @@ def _merged(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
 def read_mapping(text: str, source: str) -> Document:
     """Reads a YAML text whose top level is a mapping.
 
-    Tags, anchors, aliases, duplicate keys, keys that are no strings, more than one document, more than
-    1 000 000 characters and more than 20 levels are refused.
+    Tags, anchors, aliases, duplicate keys, keys that are no strings, numbers that are not finite, control characters,
+    more than one document, more than 100 000 characters and more than 20 levels are refused.
 
-    Raises LaunchFileError with the position.
+    Raises LaunchFileError with the positions of all that is refused; what is no YAML ends the search.
     """
-    loaded = _load(text, source)
+    node = _composed(text, source)
     start = Position(source, 1, 1)
-    if loaded is None:
+    if node is None or (isinstance(node, ScalarNode) and _tag(node) == "null"):
         raise LaunchFileError(start, "the file is empty; expected a mapping such as 'nodes: {camera: {...}}'")
-    if not isinstance(loaded, dict):
-        raise LaunchFileError(start, f"expected a mapping at the top level, found {type(loaded).__name__}")
-    document = Document({}, {(): start})
-    document.data = _plain(loaded, (), document.positions, source)
-    return document
+    if not isinstance(node, MappingNode):
+        raise LaunchFileError(start, f"expected a mapping at the top level, found a {_kind(node)}")
+    reader = _Reader(source, {(): start})
+    data = reader.plain(node, ())
+    raise_any(reader.findings)
+    return Document(data, reader.positions)
 
 
 def read_value(text: str, source: str) -> Any:
-    """Reads one YAML value, such as the right side of `--set camera.rate_hz=15`."""
-    loaded = _load(text, source)
-    return _plain(loaded, (), {(): Position(source)}, source)
+    """Reads one YAML value, such as the right side of `--set camera.rate_hz=15`; raises LaunchFileError."""
+    reader = _Reader(source, {})
+    try:
+        node = _composed(text, source)
+        value = None if node is None else reader.plain(node, ())
+        raise_any(reader.findings)
+    except LaunchFileError as error:  # lines and columns of an argument would only confuse
+        raise LaunchFileError.of([LaunchFileError(Position(source), one.message) for one in error]) from error
+    return value
 
 
-def _load(text: str, source: str) -> Any:
+def _composed(text: str, source: str) -> Node | None:
+    """The tree of nodes; None of an empty text."""
     if len(text) > MAX_CHARACTERS:
         raise LaunchFileError(Position(source), f"{len(text)} characters; at most {MAX_CHARACTERS} are read")
+    refused: list[LaunchFileError] = []
     try:
-        _refuse_unwanted(text, source)
-        return _yaml().load(text)
+        _refuse_unwanted(text, source, refused)
+        raise_any(refused)
+        node: Node | None = _yaml().compose(text)
+        return node
+    except ReaderError as error:
+        before = text[: error.position]
+        where = Position(source, before.count("\n") + 1, len(before) - before.rfind("\n"))
+        letter = text[error.position : error.position + 1]
+        raise LaunchFileError.of([*refused, LaunchFileError(where, f"control character {letter!r}")]) from error
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = Position(source, mark.line + 1, mark.column + 1) if mark else Position(source)
-        problem = str(error.problem or "")
-        if not problem or problem.startswith("but "):
-            problem = f"{error.context or 'cannot be read as YAML'} {problem}"
-        raise LaunchFileError(where, " ".join(problem.split())) from error
-    except (YAMLError, RecursionError) as error:
+        raise LaunchFileError.of([*refused, LaunchFileError(where, _explained(error))]) from error
+    except (YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, LaunchFileError):
+            raise
         raise LaunchFileError(Position(source), f"cannot be read as YAML: {' '.join(str(error).split())}") from error
 
 
+_EXPLANATIONS = (
+    (r"found character '\\t'", "a tab: indent with spaces"),
+    (r"mapping values are not allowed here", "no ': ' can stand here: wrong indentation, or a text that needs quotes"),
+    (r"found character '(.)' that cannot start", r"a value that begins with '\1' needs quotes"),
+    (r"found unexpected end of stream", "it ends inside quotes"),
+    (r"(found unknown escape character .*)", r"\1: in double quotes write '\\\\' for '\\', or use single quotes"),
+    (r"expected <block end>, but found", "wrong indentation: this line belongs to nothing above it"),
+    (r"expected ',' or '(.)', but got '<stream end>'", r"it ends before a '\1'"),
+)
+
+
+def _explained(error: MarkedYAMLError) -> str:
+    """What the parser says, in words for people who have not read the grammar of YAML."""
+    problem = " ".join(str(error.problem or "").split())
+    for pattern, explanation in _EXPLANATIONS:
+        found = re.match(pattern, problem)
+        if found:
+            return found.expand(explanation)
+    if not problem or problem.startswith("but "):
+        problem = f"{error.context or 'cannot be read as YAML'} {problem}"
+    return " ".join(problem.split())
+
+
 def _yaml() -> YAML:
-    yaml = YAML(typ="rt", pure=True)
+    yaml = YAML(typ="safe", pure=True)
     yaml.version = (1, 2)
-    yaml.allow_duplicate_keys = False
     return yaml
 
 
-def _refuse_unwanted(text: str, source: str) -> None:
-    """Refuses what a launch file never needs, before anything is built from the text."""
+def _refuse_unwanted(text: str, source: str, refused: list[LaunchFileError]) -> None:
+    """Collects what a launch file never needs, before anything is built from the text."""
     depth = 0
     for event in _yaml().parse(text):
         where = Position(source, event.start_mark.line + 1, event.start_mark.column + 1)
-        if isinstance(event, DocumentStartEvent) and (event.version or event.tags):
-            raise LaunchFileError(where, "'%' directives are refused: a launch file is YAML 1.2")
-        if isinstance(event, AliasEvent):
-            raise LaunchFileError(where, "aliases are refused: write the value out")
-        if isinstance(event, NodeEvent) and event.anchor is not None:
-            raise LaunchFileError(where, f"anchor '&{event.anchor}' is refused: write the value out")
-        if isinstance(event, ScalarEvent | CollectionStartEvent) and event.ctag is not None:
-            raise LaunchFileError(where, f"tag '{event.ctag}' is refused: launch files hold plain values only")
-        if isinstance(event, ScalarEvent) and event.value == "<<" and event.style is None:
-            raise LaunchFileError(where, "merge keys '<<' are refused: write the values out")
+        message = _refusal(event)
+        if message:
+            refused.append(LaunchFileError(where, message))
         depth += isinstance(event, CollectionStartEvent)
         depth -= isinstance(event, CollectionEndEvent)
         if depth > MAX_DEPTH:
             raise LaunchFileError(where, f"more than {MAX_DEPTH} levels of nesting")
 
 
-def _plain(value: Any, path: KeyPath, positions: dict[KeyPath, Position], source: str) -> Any:
-    """Builtin data of a loaded value; fills in `positions`."""
-    if isinstance(value, dict):
-        result = {}
-        for key, item in value.items():
-            line, column = value.lc.key(key)  # type: ignore[attr-defined]
-            where = Position(source, line + 1, column + 1)
-            if not isinstance(key, str):
-                raise LaunchFileError(where, f"key {key!r} is no string; write it in quotes")
-            positions[*path, str(key)] = where
-            result[str(key)] = _plain(item, (*path, str(key)), positions, source)
+def _refusal(event: Event) -> str:
+    if isinstance(event, DocumentStartEvent) and (event.version or event.tags):
+        return "'%' directives are refused: a launch file is YAML 1.2"
+    if isinstance(event, AliasEvent):
+        return f"alias '*{event.anchor}' is refused: write the value out"
+    if isinstance(event, NodeEvent) and event.anchor is not None:
+        return f"anchor '&{event.anchor}' is refused: write the value out"
+    if isinstance(event, ScalarEvent | CollectionStartEvent) and event.ctag is not None:
+        tag = str(event.ctag).replace("tag:yaml.org,2002:", "!!")
+        return f"tag '{tag}' is refused: launch files hold plain values only"
+    if isinstance(event, ScalarEvent) and event.value == "<<" and event.style is None:
+        return "merge keys '<<' are refused: write the values out"
+    return ""
+
+
+class _Reader:
+    """Builtin data of a tree of nodes; collects positions and findings on the way."""
+
+    def __init__(self, source: str, positions: dict[KeyPath, Position]) -> None:
+        self.positions = positions
+        self.findings: list[LaunchFileError] = []
+        self._source = source
+        self._constructor = _yaml().constructor
+
+    def plain(self, node: Node, path: KeyPath) -> Any:
+        """Data of the node at `path`."""
+        if isinstance(node, MappingNode):
+            return self._mapping(node, path)
+        if isinstance(node, SequenceNode):
+            for index, item in enumerate(node.value):
+                self.positions[*path, str(index)] = self._at(item)
+            return [self.plain(item, (*path, str(index))) for index, item in enumerate(node.value)]
+        return self._scalar(node)
+
+    def _mapping(self, node: MappingNode, path: KeyPath) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, item in node.value:
+            where = self._at(key_node)
+            key = key_node.value
+            if not isinstance(key_node, ScalarNode) or _tag(key_node) != "str":
+                shown = f"'{key}'" if isinstance(key, str) else f"a {_kind(key_node)}"
+                self.findings.append(LaunchFileError(where, f"key {shown} is no string; write it in quotes"))
+            elif _CONTROL.search(key):
+                self.findings.append(LaunchFileError(where, f"control characters in the key {key[:80]!r}"))
+            elif key in result:
+                first = self.positions[*path, key]
+                self.findings.append(LaunchFileError(where, f"duplicate key '{key}': it is in line {first.line} too"))
+            else:
+                self.positions[*path, key] = where
+                result[key] = self.plain(item, (*path, key))
         return result
-    if isinstance(value, list):
-        for index in range(len(value)):
-            line, column = value.lc.item(index)  # type: ignore[attr-defined]
-            positions[*path, str(index)] = Position(source, line + 1, column + 1)
-        return [_plain(item, (*path, str(index)), positions, source) for index, item in enumerate(value)]
-    if value is None or isinstance(value, bool):
+
+    def _scalar(self, node: Node) -> Any:
+        if _tag(node) not in ("str", "int", "float", "bool", "null"):
+            self._refuse(node, f"'{node.value}' would be a {_tag(node)}, which is not taken; write it in quotes")
+            return None
+        try:
+            value = self._constructor.construct_object(node, deep=True)
+        except ValueError:  # more digits than Python converts
+            self._refuse(node, f"a number of {len(node.value)} characters is refused")
+            return None
+        if isinstance(value, float) and not math.isfinite(value):
+            self._refuse(node, f"'{node.value}' is refused: numbers are finite")
+        if isinstance(value, str) and _CONTROL.search(value):
+            self._refuse(node, f"control characters in {value[:80]!r}")
         return value
-    for builtin in (int, float, str):
-        if isinstance(value, builtin):
-            return builtin(value)
-    raise LaunchFileError(
-        next((positions[path[:n]] for n in range(len(path), -1, -1) if path[:n] in positions), Position(source)),
-        f"{type(value).__name__} values are not taken; write it in quotes",
-    )
+
+    def _refuse(self, node: Node, message: str) -> None:
+        self.findings.append(LaunchFileError(self._at(node), message[:300]))
+
+    def _at(self, node: Node) -> Position:
+        return Position(self._source, node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def _tag(node: Node) -> str:
+    """`int` of `tag:yaml.org,2002:int`."""
+    return str(node.tag).rpartition(":")[2]
+
+
+def _kind(node: Node) -> str:
+    return "list" if isinstance(node, SequenceNode) else "mapping" if isinstance(node, MappingNode) else "single value"

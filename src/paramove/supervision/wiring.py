@@ -2,68 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from paramove.bus.topics import CLOCK
+from paramove.bus import topics
+from paramove.bus.topics import CLOCK, Topic
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
-from paramove.supervision.launch_file import Launch, nearest
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.names import nearest
+from paramove.supervision.parameters import wrong_parameters
+from paramove.supervision.positions import LaunchFileError, raise_any
 
 
 def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:
-    """Interface of every node; raises LaunchFileError at the first `module` or `after_run` that does not exist."""
-    interfaces = {}
+    """Interface of every node.
+
+    Raises LaunchFileError with every `module` and `after_run` that does not exist, and with the wrong parameters of
+    the nodes that do.
+    """
+    interfaces: dict[str, Interface] = {}
+    findings = []
     for name, node in launch.file.nodes.items():
         try:
             interfaces[name] = read_interface(node.module, workspace)
         except InterfaceError as error:
-            raise launch.error(("nodes", name, "module"), str(error)) from error
+            findings.append(launch.error(("nodes", name, "module"), str(error)))
     if launch.file.after_run is not None:
         try:
             source_of(launch.file.after_run, workspace)
         except InterfaceError as error:
-            raise launch.error(("after_run",), str(error)) from error
+            findings.append(launch.error(("after_run",), str(error)))
+    if findings:
+        raise_any([*findings, *wrong_parameters(launch, interfaces, workspace)])
     return interfaces
 
 
-def check_wiring(launch: Launch, interfaces: Mapping[str, Interface]) -> None:
+def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> None:
     """Checks topics, parameters and access to ground truth.
 
-    Every topic that is heard has a speaker, no topic has two, only nodes with `truth: true` know a truth topic, and
-    every parameter is one that its node takes.
+    Every topic that is heard has a speaker, no topic has two, only nodes with `truth: true` know a truth topic, topics
+    that the file names exist, and each node's own Config takes its parameters.
 
-    Raises LaunchFileError at the place in the launch file.
+    Raises LaunchFileError with all that is wrong, each at its place in the launch file.
     """
-    _check_parameters(launch, interfaces)
-    bus = launch.file.bus
-    if bus.clock == "simulated" and clock_speaker(interfaces) is None:
-        raise launch.error(("bus", "clock"), "the clock is simulated, but no node of this launch file says it")
-    if bus.lockstep and bus.clock != "simulated":
-        raise launch.error(("bus", "lockstep"), "lockstep needs 'clock: simulated'")
-    speakers: dict[str, str] = {}
-    for name, interface in interfaces.items():
-        for topic in interface.says:
-            said = _on_bus(launch, name, topic.name)
-            if said in speakers:
-                raise launch.error(
-                    ("nodes", name),
-                    f"'{name}' and '{speakers[said]}' both say {said}; a topic has one speaker (remap one of them)",
-                )
-            speakers[said] = name
-    for name, interface in interfaces.items():
-        for topic in (*interface.hears, *interface.says):
-            if topic.truth and not launch.file.nodes[name].truth:
-                raise launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
-        for topic in interface.hears:
-            heard = _on_bus(launch, name, topic.name)
-            optional = launch.file.nodes[name].optional_topics
-            if heard in speakers or heard.startswith("status/") or topic.name in optional or "*" in optional:
-                continue
-            raise launch.error(
-                ("nodes", name),
-                f"'{name}' hears {heard}, which no node of this launch file says; "
-                "add its speaker, or name it in 'optional_topics' of the node",
-            )
+    raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
+
+
+def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+    """What is wrong with the clock and the topics."""
+    yield from _clock(launch, interfaces)
+    yield from _speakers(launch, interfaces)
+    yield from _hearers(launch, interfaces)
+    yield from _named_topics(launch, interfaces)
 
 
 def clock_speaker(interfaces: Mapping[str, Interface]) -> str | None:
@@ -71,23 +61,84 @@ def clock_speaker(interfaces: Mapping[str, Interface]) -> str | None:
     return next((name for name, interface in interfaces.items() if CLOCK in interface.says), None)
 
 
-def _on_bus(launch: Launch, node: str, topic: str) -> str:
-    return launch.file.nodes[node].remaps.get(topic, topic)
+def on_bus(launch: Launch, node: str, topic: Topic) -> str:
+    """Name on the bus of a topic of a node, after its remaps."""
+    return launch.file.nodes[node].remaps.get(topic.name, topic.name)
 
 
-def _check_parameters(launch: Launch, interfaces: Mapping[str, Interface]) -> None:
+def unsaid(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
+    """Each node with a topic that it hears and that no node says; status topics come from every node."""
+    said = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.says}
+    for name, interface in interfaces.items():
+        for topic in interface.hears:
+            heard = on_bus(launch, name, topic)
+            if heard not in said and not heard.startswith("status/"):
+                yield name, topic
+
+
+def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+    bus = launch.file.bus
+    if bus.clock == "simulated" and clock_speaker(interfaces) is None:
+        yield launch.error(("bus", "clock"), "the clock is simulated, but no node of this launch file says it")
+    if bus.lockstep and bus.clock != "simulated":
+        yield launch.error(("bus", "lockstep"), "lockstep needs 'clock: simulated'")
+
+
+def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+    speakers: dict[str, str] = {}
+    for name, interface in interfaces.items():
+        for topic in interface.says:
+            said = on_bus(launch, name, topic)
+            other = speakers.setdefault(said, name)
+            if other != name:
+                yield launch.error(
+                    ("nodes", name),
+                    f"'{name}' and '{other}' both say {said}; a topic has one speaker (remap one of them)",
+                )
+
+
+def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+    for name, interface in interfaces.items():
+        for topic in (*interface.hears, *interface.says):
+            if topic.truth and not launch.file.nodes[name].truth:
+                yield launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
+    for name, topic in unsaid(launch, interfaces):
+        optional = launch.file.nodes[name].optional_topics
+        if topic.name not in optional and "*" not in optional:
+            yield launch.error(
+                ("nodes", name),
+                f"'{name}' hears {on_bus(launch, name, topic)}, which no node of this launch file says; "
+                "add its speaker, or name it in 'optional_topics' of the node",
+            )
+
+
+def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+    """Topics that `remaps` and `optional_topics` name and that are not there, or are of another kind."""
     for name, interface in interfaces.items():
         node = launch.file.nodes[name]
-        if interface.parameters is not None:
-            for parameter in node.parameters:
-                if parameter not in interface.parameters:
-                    raise launch.error(
-                        ("nodes", name, "parameters", parameter),
-                        f"'{name}' has no parameter '{parameter}'; {nearest(parameter, interface.parameters)}",
-                    )
-        known = {topic.name for topic in (*interface.hears, *interface.says)}
-        for topic in node.remaps:
-            if topic not in known:
-                raise launch.error(
-                    ("nodes", name, "remaps", topic), f"'{name}' does not use {topic}; {nearest(topic, known)}"
-                )
+        hears = {topic.name for topic in interface.hears}
+        for index, optional in enumerate(node.optional_topics):
+            if optional != "*" and optional not in hears:
+                path = ("nodes", name, "optional_topics", str(index))
+                yield launch.error(path, f"'{name}' does not hear {optional!r}; {nearest(optional, hears)}")
+        used = {topic.name: topic for topic in (*interface.hears, *interface.says)}
+        for topic, target in node.remaps.items():
+            path = ("nodes", name, "remaps", topic)
+            if topic not in used:
+                yield launch.error(path, f"'{name}' does not use {topic!r}; {nearest(topic, used)}")
+                continue
+            refusal = _refused_target(used[topic], target)
+            if refusal:
+                yield launch.error(path, refusal)
+
+
+def _refused_target(topic: Topic, target: str) -> str:
+    """Why a topic cannot be remapped to `target`; "" if it can."""
+    if not topics.is_name(target):
+        return f"{target!r} is no name of a topic: parts of lower-case letters, digits and '_', joined by '/'"
+    if topic.truth or target.startswith(("truth/", "status/")):
+        return f"{topic.name} cannot become {target}: truth and status topics are not remapped"
+    known = {other.name: other for other in topics.TOPICS}.get(target, topic)
+    if known.type is not topic.type:
+        return f"{topic.name} cannot become {target}: it carries {topic.type_name}, {target} {known.type_name}"
+    return ""

@@ -1,0 +1,137 @@
+"""Parameters of nodes, checked by the nodes' own Config before anything starts.
+
+The modules are imported in one process of its own, because they import heavy libraries. Only nodes are asked that are
+given parameters or need some, so this costs under a second for the launch files of this project.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from paramove.supervision.interfaces import Interface
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.names import nearest
+from paramove.supervision.positions import LaunchFileError
+
+PATIENCE_S = 120.0
+"""For importing the modules, on a busy machine with cold caches."""
+
+
+def wrong_parameters(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> Iterator[LaunchFileError]:
+    """What the nodes' own Config refuses of their parameters, and modules that cannot be imported."""
+    asked = {
+        name: (launch.file.nodes[name].module, launch.file.nodes[name].parameters)
+        for name, interface in interfaces.items()
+        if interface.has_config and (launch.file.nodes[name].parameters or interface.needs_parameters)
+    }
+    if not asked:
+        return
+    answers, ending = _ask(list(asked.values()), workspace)
+    for (name, (module, _)), answer in zip(asked.items(), answers, strict=False):
+        if isinstance(answer, str):
+            yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {answer}")
+            continue
+        for finding in answer:
+            path = ("nodes", name, "parameters", *finding["path"])
+            yield launch.error(path, _sentence(name, ".".join(finding["path"]), finding))
+    if len(answers) < len(asked):
+        name, (module, _) = list(asked.items())[len(answers)]
+        yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {ending}")
+
+
+def _sentence(node: str, parameter: str, finding: dict[str, Any]) -> str:
+    if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # the second of dataclasses
+        return f"'{node}' has no parameter '{parameter}'; {nearest(finding['path'][-1], finding['known'])}"
+    if finding["type"] == "missing":
+        return f"'{node}' needs the parameter '{parameter}'"
+    return f"'{node}' refuses {parameter or 'its parameters'}: {finding['message']}, found {finding['found']}"
+
+
+def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Path) -> tuple[list[Any], str]:
+    """Answers of a process that imports the modules in turn, and how it ended if an answer is missing."""
+    try:
+        answer = subprocess.run(
+            [sys.executable, "-m", __name__],
+            input=json.dumps(asked),
+            cwd=workspace,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        said = error.stdout.decode() if error.stdout else ""
+        return [json.loads(line) for line in said.splitlines()], f"it took more than {PATIENCE_S:g} s"
+    last = answer.stderr.strip().splitlines()[-1:] or [f"the process ended with exit code {answer.returncode}"]
+    return [json.loads(line) for line in answer.stdout.splitlines()], last[0]
+
+
+def _answer(module: str, parameters: dict[str, Any]) -> str | list[dict[str, Any]]:
+    """Findings about the parameters, or why the module cannot be imported."""
+    try:
+        config = getattr(importlib.import_module(module), "Config", None)
+    except (Exception, SystemExit) as error:  # whatever a module does when it is imported is told, not repeated
+        return f"{type(error).__name__}: {error}"
+    if not isinstance(config, type) or not issubclass(config, BaseModel):
+        return []
+    try:
+        config.model_validate(parameters)
+    except ValidationError as error:
+        return [_finding(config, details) for details in error.errors()]
+    return []
+
+
+def _finding(config: type[BaseModel], details: ErrorDetails) -> dict[str, Any]:
+    path = [str(part) for part in details["loc"]]
+    return {
+        "path": path,
+        "type": details["type"],
+        "message": _message(details),
+        "found": f"{details['input']!r:.200}",
+        "known": _keys_at(config, path[:-1]),
+    }
+
+
+def _message(details: ErrorDetails) -> str:
+    message = details["msg"].removeprefix("Value error, ")
+    return message[:1].lower() + message[1:]
+
+
+def _keys_at(model: type[BaseModel], path: Sequence[str]) -> list[str]:
+    """Valid keys of the mapping at `path` of a Config; none where it is no model or dataclass."""
+    kind: Any = model
+    for key in path:
+        field = _fields(kind).get(key)
+        inner = [field, *get_args(field)]
+        kind = next((candidate for candidate in inner if _fields(candidate)), None)
+    return list(_fields(kind))
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    """Name -> type of the fields of a model or a dataclass."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return {name: field.annotation for name, field in kind.model_fields.items()}
+    if isinstance(kind, type) and hasattr(kind, "__dataclass_fields__"):
+        return {name: field.type for name, field in kind.__dataclass_fields__.items()}
+    return {}
+
+
+def main() -> None:
+    """Reads modules and parameters from standard input; writes an answer per line as JSON."""
+    answers, sys.stdout = sys.stdout, sys.stderr  # what a module prints is no answer
+    for module, parameters in json.load(sys.stdin):
+        answers.write(json.dumps(_answer(module, parameters)) + "\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""What a launch file and the command line say about nodes by name: values set, and names that must exist."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from paramove.supervision.names import nearest
+from paramove.supervision.positions import Document, LaunchFileError, Position, read_value
+
+Findings = list[LaunchFileError]
+
+
+def with_values(
+    document: Document, settings: Sequence[str], seed: int | None, headless: bool
+) -> tuple[Document, Findings]:
+    """The document with the values that `--headless`, `--set` and `--seed` give, and what is wrong with these.
+
+    Args:
+        document: Launch file with its overlays.
+        settings: Each `node.parameter=value`; the value is YAML.
+        seed: Written into each of the file's `seed_parameters`.
+        headless: Sets the parameters that the file names under `headless`, before `settings`.
+    """
+    findings: Findings = []
+    values: list[tuple[str, Any, Position]] = []
+    if headless and isinstance(document.data.get("headless"), dict):
+        for target, value in document.data["headless"].items():
+            values.append((target, value, document.position(("headless", target))))
+    for setting in settings:
+        where = Position(f"--set {setting}")
+        target, equals, text = setting.partition("=")
+        if not equals or not all(target.strip().split(".")) or "." not in target:
+            findings.append(LaunchFileError(where, "expected node.parameter=value, such as simulator.seed=7"))
+            continue
+        try:
+            values.append((target.strip(), read_value(text, str(where)), where))
+        except LaunchFileError as error:
+            findings.append(error)
+    if seed is not None:
+        where = Position(f"--seed {seed}")
+        targets = document.data.get("seed_parameters")
+        if not targets or not isinstance(targets, list):
+            message = "this launch file has no 'seed_parameters', so nothing in it takes a seed"
+            findings.append(LaunchFileError(where, message))
+            targets = []
+        values += [(str(target), seed, where) for target in targets]
+    for target, value, where in values:
+        node, *parameters = target.split(".")
+        if node not in _nodes(document):
+            findings.append(LaunchFileError(where, f"there is no node '{node}'; {nearest(node, _nodes(document))}"))
+        elif all(parameters) and parameters:  # else `wrong_references` tells of it
+            document = document.overlaid(_parameter(node, parameters, value, where))
+    return document, findings
+
+
+def _parameter(node: str, parameters: Sequence[str], value: Any, where: Position) -> Document:
+    path = ("nodes", node, "parameters", *parameters)
+    data: Any = value
+    for key in reversed(path):
+        data = {key: data}
+    return Document(data, {path: where})
+
+
+def _nodes(document: Document) -> dict[str, Any]:
+    nodes = document.data.get("nodes")
+    return nodes if isinstance(nodes, dict) else {}
+
+
+def wrong_references(document: Document) -> Findings:
+    """Names inside the file that name nothing, and circles of `after`; whatever else may be wrong with the file."""
+    findings: Findings = []
+    nodes = _nodes(document)
+    after = {name: _after(node) for name, node in nodes.items()}
+    for name, others in after.items():
+        for index, other in enumerate(others):
+            if other not in nodes:
+                path = ("nodes", name, "after", str(index))
+                findings.append(
+                    document.error(path, f"'{name}' comes after '{other}', no node; {nearest(other, nodes)}")
+                )
+    for circle in _circles(after):
+        where = ("nodes", circle[0], "after")
+        findings.append(document.error(where, f"these nodes wait for each other ('after'): {', '.join(circle)}"))
+    seeds, headless = document.data.get("seed_parameters"), document.data.get("headless")
+    targets: list[tuple[str, str, Any]] = [
+        ("seed_parameters", str(index), seed) for index, seed in enumerate(seeds if isinstance(seeds, list) else ())
+    ]
+    targets += [("headless", target, target) for target in (headless if isinstance(headless, dict) else ())]
+    for key, place, target in targets:
+        node, *parameters = str(target).split(".")
+        if node not in nodes or not parameters or not all(parameters):
+            remedy = f"write {node}.<parameter>" if node in nodes else nearest(node, nodes)
+            message = f"'{target}' is no node.parameter; {remedy}"
+            findings.append(document.error((key, place), message))
+    return findings
+
+
+def _after(node: Any) -> list[str]:
+    after = node.get("after") if isinstance(node, dict) else None
+    return [other for other in after if isinstance(other, str)] if isinstance(after, list) else []
+
+
+def _circles(after: dict[str, list[str]]) -> list[list[str]]:
+    """Nodes that wait for themselves, over others or not; each circle once, in the order of the file."""
+    reached: dict[str, set[str]] = {}
+    for name in after:
+        found: set[str] = set()
+        waiting = list(after[name])
+        while waiting:
+            other = waiting.pop()
+            if other not in found:
+                found.add(other)
+                waiting += after.get(other, [])
+        reached[name] = found
+    circles: list[list[str]] = []
+    for name in after:
+        if name in reached[name] and not any(name in circle for circle in circles):
+            circles.append([other for other in after if other in reached[name] and name in reached.get(other, ())])
+    return circles
