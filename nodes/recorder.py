@@ -1,10 +1,13 @@
 """Recorder: keeps every recorded topic in `recording.mcap` of the run's folder.
 
+When its process is started again it goes on in `recording.2.mcap`, ….
+
 Hears   every topic that the topic table marks as recorded
 """
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
+from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 
 HEARS = tuple(topic for topic in topics.TOPICS if topic.recorded)
@@ -21,8 +24,8 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
-    with RecordingWriter(bus.run_folder / config.file, "paramove recorder") as recording:
-        bus.ready("recording")
+    with RecordingWriter(next_part(bus.run_folder / config.file), "paramove recorder") as recording:
+        bus.ready(f"recording to {recording.path.name}")
         for count, heard in enumerate(bus.events(*HEARS), start=1):
             recording.write(heard.topic.name, heard.message, heard.captured_ns, heard.published_ns, heard.sequence)
             if count % REPORT_EVERY == 0:

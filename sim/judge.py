@@ -5,6 +5,7 @@ Hears   truth/layout   TruthLayout         once, latched   world
         truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
 
 Writes `truth.mcap` (the view as JPEG) and `truth.json` (the verdict, renewed every few seconds) into the run folder.
+When its process is started again it goes on in `truth.2.mcap`, ….
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pydantic import Field
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
+from paramove.recording.parts import PartedRecording, next_part
 from paramove.recording.writer import RecordingWriter
 from sim.verdict import Verdict
 
@@ -46,9 +48,11 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then write the verdict."""
     cv2.setNumThreads(1)
-    recording = RecordingWriter(bus.run_folder / "truth.mcap", "paramove judge") if config.record else None
     judge = Judge(bus.run_folder / "truth.json")
-    bus.ready("waits for the truth")
+    path = bus.run_folder / "truth.mcap"
+    earlier = judge.recall(PartedRecording(path))
+    recording = RecordingWriter(next_part(path), "paramove judge") if config.record else None
+    bus.ready(f"goes on after {earlier} recorded states" if earlier else "waits for the truth")
     try:
         for heard in bus.events(*HEARS):
             if heard.topic is topics.TRUTH_LAYOUT:
@@ -74,14 +78,28 @@ class Judge:
         self._verdict: Verdict | None = None
         self._begun_s = 0.0
 
+    def recall(self, recording: PartedRecording) -> int:
+        """Take in what an earlier process recorded of this run; returns the number of states."""
+        for recorded in recording.read({topics.TRUTH_LAYOUT.name, topics.TRUTH_STATE.name}):
+            if recorded.topic == topics.TRUTH_LAYOUT.name:
+                self.begin(recorded.message)
+            elif self._verdict is not None:
+                self._verdict.take(recorded.message)
+        states = 0 if self._verdict is None else self._verdict.states
+        if states and self._path.is_file():
+            lasted_s = json.loads(self._path.read_text(encoding="utf-8")).get("wall_s", 0.0)
+            self._begun_s = time.monotonic() - lasted_s
+        return states
+
     def begin(self, layout: Any) -> None:
-        """The run's layout is known."""
-        self._verdict = Verdict(layout)
+        """The run's layout is known. It is said once, and again to a process that was started again."""
+        if self._verdict is None:
+            self._verdict = Verdict(layout)
 
     def take(self, state: Any) -> str:
         """Take in a state; now and then write the verdict and return it as a sentence, else ""."""
         if self._verdict is None:
-            raise RuntimeError("truth/state came before truth/layout; the simulator says the layout first")
+            return ""  # this process was started late and has not been told the layout yet
         if self._verdict.states == 0:
             self._begun_s = time.monotonic()
         self._verdict.take(state)

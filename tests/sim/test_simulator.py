@@ -13,6 +13,8 @@ from pydantic import ValidationError
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
+from paramove.recording.parts import PartedRecording
+from paramove.recording.writer import RecordingWriter
 from paramove.robots.description import RobotDescription
 from sim import judge, simulator
 from sim.judge import Judge
@@ -74,8 +76,7 @@ def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> No
     file = folder / "truth.json"
     found = Judge(file)
     assert not found.write()["success"]
-    with pytest.raises(RuntimeError, match="layout first"):
-        found.take(state(simulation))
+    assert found.take(state(simulation)) == ""  # not told the layout yet
     found.begin(layout(simulation))
     sentences = []
     for tick in range(1, judge.RENEW_STATES + 1):
@@ -88,3 +89,27 @@ def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> No
     assert summary["unwanted_contacts"] == 0
     assert set(summary["objects"]) == {"yellow", "green", "blue"}
     assert summary["realtime_factor"] > 0
+
+
+def test_judge_that_was_started_again_recalls_what_was_recorded(folder: Path) -> None:
+    simulation = Simulation(3, RobotDescription.load(ROBOT), camera=False)
+    told, path = layout(simulation), folder / "truth.mcap"
+    whole, first, second = (Judge(folder / f"{name}.json") for name in ("whole", "first", "second"))
+    with RecordingWriter(path, "a test") as recording:
+        for judged in (whole, first):
+            judged.begin(told)
+        recording.write(topics.TRUTH_LAYOUT.name, told, 0, 0, 1)
+        for tick in range(1, 9):
+            simulation.run_to_tick(tick)
+            truth = state(simulation)
+            recording.write(topics.TRUTH_STATE.name, truth, tick, tick, tick)
+            whole.take(truth)
+    assert second.recall(PartedRecording(path)) == 8
+    second.begin(told)  # is said to every newcomer
+    simulation.run_to_tick(9)
+    for judged in (whole, second):
+        judged.take(state(simulation))
+    by_wall = ("wall_s", "realtime_factor")
+    found, expected = ({k: v for k, v in judged.write().items() if k not in by_wall} for judged in (second, whole))
+    assert found == expected
+    assert not first.recall(PartedRecording(folder / "none.mcap"))

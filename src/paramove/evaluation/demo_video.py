@@ -20,7 +20,6 @@ from paramove.evaluation.recorded_run import recording_in
 from paramove.evaluation.run_summary import RunEvaluation
 from paramove.evaluation.story import Story
 from paramove.evaluation.video_frame import SIZE, VideoFrame
-from paramove.recording.reader import read
 
 Picture = NDArray[np.uint8]
 
@@ -70,15 +69,15 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
 
 def view_times(folder: Path) -> Iterator[float]:
     """Times of the recorded views, s."""
-    for recorded in read(recording_in(folder, "truth.mcap"), {topics.TRUTH_VIEW.name}):
+    for recorded in recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name}):
         yield recorded.log_ns * 1e-9
 
 
 def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Picture, Picture]]:
     """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the newest one by then."""
-    cameras = read(recording_in(folder, "recording.mcap"), {topics.CAMERA_IMAGE.name})
+    cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
     newest, following = None, next(cameras, None)
-    for place, view in enumerate(read(recording_in(folder, "truth.mcap"), {topics.TRUTH_VIEW.name})):
+    for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
         while following is not None and following.log_ns <= view.log_ns:
             newest, following = following, next(cameras, None)
         if place % every == 0 and newest is not None:

@@ -19,7 +19,8 @@ from ruamel.yaml import YAML
 from paramove.bus import topics
 from paramove.evaluation.traffic import Traffic
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.recording.reader import Recorded, read
+from paramove.recording.parts import PartedRecording
+from paramove.recording.reader import Recorded
 
 FloatArray = NDArray[np.float64]
 
@@ -85,6 +86,15 @@ class Truth:
         return int(np.abs(self.time_s - time_s).argmin())
 
 
+@dataclass(frozen=True)
+class RecordingGap:
+    """Nothing was recorded between two times, s, in `recording` (what was said) or `truth`."""
+
+    recording: str
+    begin_s: float
+    end_s: float
+
+
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
     """All that is needed to evaluate a run.
@@ -98,6 +108,7 @@ class RecordedRun:
         facts: Of `run.yaml`.
         end_s: When the application was done, else when the recording ended.
         done: Whether the application said that it was done.
+        gaps: Times at which nothing was recorded because the recorder or the judge was being started again.
     """
 
     folder: Path
@@ -108,6 +119,7 @@ class RecordedRun:
     facts: dict[str, Any] = field(default_factory=dict)
     end_s: float = 0.0
     done: bool = False
+    gaps: tuple[RecordingGap, ...] = ()
 
     def heard(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
@@ -128,36 +140,43 @@ def load_run(folder: Path) -> RecordedRun:
         for name, messages in said.items()
     }
     traffic.cut(end_ns)
+    truth = _read_truth(truth_file, end_ns)
     return RecordedRun(
         folder=folder,
         said=kept,
         traffic=traffic,
-        truth=_read_truth(truth_file, end_ns),
+        truth=truth,
         verdict=_read_json(folder / "truth.json"),
         facts=_read_yaml(folder / "run.yaml"),
         end_s=end_ns * 1e-9,
         done=done,
+        gaps=tuple(
+            RecordingGap(name, gap.begin_ns * 1e-9, min(gap.end_ns, end_ns) * 1e-9)
+            for name, parts in (("recording", recording), ("truth", truth_file))
+            for gap in parts.gaps
+            if gap.begin_ns < end_ns
+        ),
     )
 
 
-def recording_in(folder: Path, name: str) -> Path:
-    """The recording of that name, finished or not; raises RunFolderError."""
-    for candidate in (folder / name, folder / f"{name}.part"):
-        if candidate.is_file():
-            return candidate
+def recording_in(folder: Path, name: str) -> PartedRecording:
+    """The recording of that name, finished or not, with all its parts; raises RunFolderError."""
+    recording = PartedRecording(folder / name)
+    if recording.parts:
+        return recording
     found = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
     raise RunFolderError(f"{folder} holds no {name} ({found}); a folder below runs/ of a simulated run is needed")
 
 
-def _read_recording(path: Path) -> tuple[dict[str, list[Recorded]], Traffic]:
+def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded]], Traffic]:
     said: dict[str, list[Recorded]] = defaultdict(list)
     traffic = Traffic()
-    for recorded in read(path):
+    for recorded in recording.read():
         traffic.take(recorded)
         if recorded.topic not in HEAVY:
             said[recorded.topic].append(recorded)
     if not said:
-        raise RunFolderError(f"{path} holds no message")
+        raise RunFolderError(f"{_names(recording)} holds no message")
     return dict(said), traffic
 
 
@@ -168,16 +187,20 @@ def _end_of(said: dict[str, list[Recorded]], traffic: Traffic) -> tuple[int, boo
     return traffic.last_ns, False
 
 
-def _read_truth(path: Path, end_ns: int) -> Truth:
+def _names(recording: PartedRecording) -> str:
+    return ", ".join(map(str, recording.parts))
+
+
+def _read_truth(recording: PartedRecording, end_ns: int) -> Truth:
     layout: Any = None
     states: list[Any] = []
-    for recorded in read(path, {topics.TRUTH_LAYOUT.name, topics.TRUTH_STATE.name}):
+    for recorded in recording.read({topics.TRUTH_LAYOUT.name, topics.TRUTH_STATE.name}):
         if recorded.topic == topics.TRUTH_LAYOUT.name:
             layout = recorded.message
         elif recorded.message.time_ns <= end_ns:
             states.append(recorded.message)
     if layout is None or not states:
-        raise RunFolderError(f"{path} holds no {'state' if layout is not None else 'layout'} of the world")
+        raise RunFolderError(f"{_names(recording)} holds no {'state' if layout is not None else 'layout'} of the world")
     shoulder = np.array(layout.world_from_shoulder)
     objects: dict[str, list[Any]] = defaultdict(list)
     for state in states:

@@ -226,9 +226,15 @@ def _topics(summary: dict[str, Any]) -> str:
     heads = ("node", "topic", "declared, Hz", "measured, Hz", "messages", "longest gap, s", "lost")
     return _section(
         "What was said on the bus",
-        "Rates in simulated time. Lost: gaps in the sequence numbers of the recording.",
+        "Rates in simulated time. Lost: gaps in the sequence numbers of the recording." + _gaps(summary),
         _table(heads, rows, numbers=(2, 3, 4, 5, 6)),
     )
+
+
+def _gaps(summary: dict[str, Any]) -> str:
+    gaps = summary["gaps"]
+    found = [f"of the {gap['recording']} from {gap['begin_s']:.2f} to {gap['end_s']:.2f} s" for gap in gaps]
+    return f" Nothing was recorded {' and '.join(found)}: its process was started again." if found else ""
 
 
 def _speech(summary: dict[str, Any]) -> str:

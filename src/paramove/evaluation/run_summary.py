@@ -132,6 +132,7 @@ class RunEvaluation:
             ],
             "topic_rates": run.traffic.rates(speakers(run.folder / "launch.yaml", self.workspace)),
             "loss": run.traffic.loss(),
+            "gaps": [{"recording": g.recording, "begin_s": g.begin_s, "end_s": g.end_s} for g in run.gaps],
             "versions": _versions(run.facts),
             "wall": self._wall(),
         }

@@ -81,6 +81,7 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
             below(physical["both"]["max"], 2.0),
         ),
         ("messages lost", str(summary["loss"]["total"]), "0", summary["loss"]["total"] == 0),
+        *((f"not recorded ({gap['recording']})", seconds_of(gap), "", False) for gap in summary["gaps"]),
         ("times real time", "–" if factor is None else f"{factor:.1f}", "", True),
     ]
 
@@ -88,6 +89,11 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
 def all_right(summary: dict[str, Any]) -> bool:
     """Whether every object's opening is known."""
     return all(rule["right"] for rule in summary["rules"])
+
+
+def seconds_of(gap: dict[str, Any]) -> str:
+    """From when until when nothing was recorded."""
+    return f"{gap['begin_s']:.2f} to {gap['end_s']:.2f} s"
 
 
 def below(value: float | None, limit: float) -> bool:

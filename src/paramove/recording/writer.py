@@ -14,6 +14,8 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[imp
 from mcap.writer import CompressionType, Writer
 
 CHUNK_BYTES = 64 * 1024
+CHUNK_NS = 250_000_000
+"""Of the time of publication; a longer chunk would lose more with a process that is killed."""
 
 
 class RecordingExistsError(FileExistsError):
@@ -40,6 +42,7 @@ class RecordingWriter:
         self._file = self._part.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library=library)
+        self._chunk_begun_ns: int | None = None
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 
@@ -53,6 +56,11 @@ class RecordingWriter:
             publish_ns: When it was said.
             sequence: Of the publisher.
         """
+        if self._chunk_begun_ns is None:
+            self._chunk_begun_ns = publish_ns
+        elif not 0 <= publish_ns - self._chunk_begun_ns < CHUNK_NS:
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._chunk_begun_ns = publish_ns
         self._writer.add_message(
             channel_id=self._channel(topic, message),
             log_time=log_ns,

@@ -1,0 +1,81 @@
+"""A recording in several files: whoever records goes on in a further file after its process was started again.
+
+`recording.mcap`, `recording.2.mcap`, `recording.3.mcap`, …; each with the ending `.part` while it is not finished. No
+file is ever written over or added to, so what a killed process has written stays as it is.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from paramove.recording.reader import Recorded, read
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Nothing was recorded between two times of the bus clock, because nobody did."""
+
+    begin_ns: int
+    end_ns: int
+
+
+def part_path(path: Path, number: int) -> Path:
+    """File of the part with a number from 1; the first bears the recording's own name."""
+    return path if number == 1 else path.with_name(f"{path.stem}.{number}{path.suffix}")
+
+
+def next_part(path: Path) -> Path:
+    """The first part of a recording of which there is no file yet, finished or not."""
+    for number in itertools.count(1):
+        part = part_path(path, number)
+        if not part.exists() and not _unfinished(part).exists():
+            return part
+    raise AssertionError
+
+
+class PartedRecording:
+    """All parts of a recording, read as one.
+
+    Args:
+        path: Of the first part.
+
+    Attributes:
+        parts: The files that there are, in order; unfinished ones end with their last whole chunk.
+        gaps: Between parts, as far as they were read last.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.parts: list[Path] = []
+        self.gaps: list[Gap] = []
+        for number in itertools.count(1):
+            part = part_path(path, number)
+            found = next((file for file in (part, _unfinished(part)) if file.is_file()), None)
+            if found is None:
+                break
+            self.parts.append(found)
+
+    def read(self, only: Collection[str] = ()) -> Iterator[Recorded]:
+        """The messages of all parts (see `paramove.recording.reader.read`).
+
+        A latched value that a later part was told again is left out.
+        """
+        self.gaps = []
+        newest: dict[str, tuple[int, int]] = {}
+        for part in self.parts:
+            before, first = dict(newest), True
+            for recorded in read(part, only):
+                said = (recorded.publish_ns, recorded.sequence)
+                if said <= before.get(recorded.topic, (-1, -1)):
+                    continue
+                if before and first:
+                    self.gaps.append(Gap(max(time_ns for time_ns, _ in before.values()), recorded.publish_ns))
+                first = False
+                newest[recorded.topic] = max(said, newest.get(recorded.topic, said))
+                yield recorded
+
+
+def _unfinished(part: Path) -> Path:
+    return part.with_name(part.name + ".part")
