@@ -178,12 +178,12 @@ class Instructor:
         yield from self._turn_box()
         yield from self._show(name)
 
-    def _point(self, _: str) -> Script:
+    def _point(self, wanted: str) -> Script:
         yield from self._empty_hand()
         if not self._arranged:
             self._arranged = True
             yield from self._arrange()
-        name = self._next_to_point()
+        name = self._next_to_point(wanted)
         if name is None:
             self.doing = "sees nothing left to do"
             yield Step(1.0)
@@ -363,11 +363,13 @@ class Instructor:
         )
         return candidates[int(self._order.integers(len(candidates)))]
 
-    def _next_to_point(self) -> str | None:
+    def _next_to_point(self, wanted: str) -> str | None:
         left = [colour for colour in tool_box.COLOURS if not self._sees.is_done(colour)]
         self._to_point = [colour for colour in self._to_point if colour in left]
         if not self._to_point:
             self._to_point = [left[place] for place in self._order.permutation(len(left))]
+        if wanted in left:  # the robot asks for it because it stands in the way of the last one
+            self._to_point = [wanted, *(colour for colour in left if colour != wanted)]
         return self._to_point.pop(0) if self._to_point else None
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from paramove.bus import topics
 from paramove.bus.subscriber import Heard
@@ -40,6 +40,7 @@ class Story:
         goals: Every goal as often as it was sent.
         outcomes: Outcomes of the next relocations in stage 3: (state, reason, where the object is then; None: in its
             opening). When they are used up, all go well.
+        in_the_way: Of the next refusals: places in the goal's `avoid`.
         deaf: How many goals the arm does not hear.
         answers: Request -> what the instructor does then.
     """
@@ -55,6 +56,7 @@ class Story:
         self.stages: list[ApplicationStage] = []
         self.calibrations: list = []
         self.outcomes: list[tuple[int, str, Place | None]] = []
+        self.in_the_way: list[list[int]] = []
         self.deaf = 0
         self.places: dict[str, Place] = {}
         self.calibrated = False
@@ -63,7 +65,7 @@ class Story:
             Speech.REQUEST_LET_GO: lambda _: self.later(1.0, self.hand, False),
             Speech.REQUEST_SHOW_RULES: lambda _: self.show(*OPENINGS),
             Speech.REQUEST_SHOW_RULE_AGAIN: lambda name: self.show(name),
-            Speech.REQUEST_POINT_AT_OBJECT: lambda _: self.point(),
+            Speech.REQUEST_POINT_AT_OBJECT: lambda name: self.point(name or None),
             Speech.REQUEST_HELP: lambda name: self.put(1.0, name, PLACES[name]),
         }
         self._known: set[str] = set()
@@ -179,7 +181,7 @@ class Story:
         if applying and goal.kind == RelocationGoal.KIND_RELOCATE and self.outcomes:
             state, reason, place = self.outcomes.pop(0)
         if state == REFUSED:
-            self._say(goal.id, state, reason)
+            self._say(goal.id, state, reason, self.in_the_way.pop(0) if self.in_the_way else [])
             return
         target = (goal.to.x, goal.to.y)
         if goal.kind == RelocationGoal.KIND_PLACE_HELD or (goal.kind == RelocationGoal.KIND_RELOCATE and not applying):
@@ -193,8 +195,8 @@ class Story:
             self.later(0.8 * MOTION_S, self.vanish, goal.object, target)
         self.later(MOTION_S, self._say, goal.id, state, reason)
 
-    def _say(self, name: str, state: RelocationStatus.State, reason: str = "") -> None:
-        status = RelocationStatus(goal_id=name, state=state, reason=reason)
+    def _say(self, name: str, state: RelocationStatus.State, reason: str = "", in_the_way: Sequence[int] = ()) -> None:
+        status = RelocationStatus(goal_id=name, state=state, reason=reason, in_the_way=in_the_way)
         self._heard(topics.RELOCATION_STATUS, status)
         self.learner.on_goal_status(status)
 

@@ -243,8 +243,27 @@ def test_a_refusal_is_told_and_help_is_asked_for() -> None:
     story.outcomes = [(REFUSED, "the forearm would come within 2.0 mm of standing_0", None)]
     assert story.run(), story.learner.sentence
     asked = next(speech for speech in story.speech if speech.request == Speech.REQUEST_HELP)
-    assert asked.sentence.startswith("I cannot do that: the forearm would come within 2.0 mm of standing_0.")
+    assert "the forearm would come within 2.0 mm of standing_0." in asked.sentence
+    assert asked.sentence.startswith("I cannot reach yellow at (17.0, 5.0) cm")
     assert [goal.attempt for goal in story.relocations()] == [1, 1, 1, 1]
+
+
+def test_what_stands_in_the_way_is_put_away_first() -> None:
+    story = Story()
+    story.outcomes = [(REFUSED, "the forearm would come within 2.0 mm of standing_1", None)]
+    story.in_the_way = [[1]]
+    assert story.run(), story.learner.sentence
+    assert "blue stands in the way of yellow. Please point at blue first." in story.sentences()
+    assert [goal.object for goal in story.relocations()][:2] == ["yellow", "blue"]
+    assert "HELP" not in story.requests()
+
+
+def test_help_is_asked_for_where_each_stands_in_the_way_of_the_other() -> None:
+    story = Story()
+    story.outcomes = [(REFUSED, "too near to standing_1", None), (REFUSED, "too near to standing_0", None)]
+    story.in_the_way = [[1], [0]]
+    assert story.run(), story.learner.sentence
+    assert story.requests().count("HELP") == 1
 
 
 def test_help_is_asked_for_again_when_nobody_comes() -> None:

@@ -45,11 +45,13 @@ class Clearance:
         distance: m; at most 0.05.
         sample: Which sample of the path.
         pair: The two parts.
+        standing: Which of the standing objects; None if it is something else.
     """
 
     distance: float
     sample: int
     pair: tuple[str, str]
+    standing: int | None = None
 
 
 class ClearanceChecker:
@@ -156,7 +158,8 @@ class ClearanceChecker:
             for one, two in pairs:
                 distance = mujoco.mj_geomDistance(self._model, self._data, one, two, _FAR, None)
                 if distance < worst.distance:
-                    worst = Clearance(distance, k, (self._name(one), self._name(two)))
+                    number = upright.index(two) if two in upright else None
+                    worst = Clearance(distance, k, (self._name(one), self._name(two)), number)
         return worst
 
     @property

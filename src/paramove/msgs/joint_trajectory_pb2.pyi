@@ -38,7 +38,7 @@ class TrajectoryPhase(_message.Message):
     def __init__(self, name: _Optional[str] = ..., start_s: _Optional[float] = ...) -> None: ...
 
 class TrajectoryStatus(_message.Message):
-    __slots__ = ("captured", "trajectory_id", "state", "time_s", "duration_s", "reason")
+    __slots__ = ("captured", "trajectory_id", "state", "time_s", "duration_s", "reason", "code")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[TrajectoryStatus.State]
@@ -59,10 +59,12 @@ class TrajectoryStatus(_message.Message):
     TIME_S_FIELD_NUMBER: _ClassVar[int]
     DURATION_S_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    CODE_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     trajectory_id: str
     state: TrajectoryStatus.State
     time_s: float
     duration_s: float
     reason: str
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., trajectory_id: _Optional[str] = ..., state: _Optional[_Union[TrajectoryStatus.State, str]] = ..., time_s: _Optional[float] = ..., duration_s: _Optional[float] = ..., reason: _Optional[str] = ...) -> None: ...
+    code: str
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., trajectory_id: _Optional[str] = ..., state: _Optional[_Union[TrajectoryStatus.State, str]] = ..., time_s: _Optional[float] = ..., duration_s: _Optional[float] = ..., reason: _Optional[str] = ..., code: _Optional[str] = ...) -> None: ...

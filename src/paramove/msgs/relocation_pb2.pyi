@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class RelocationGoal(_message.Message):
-    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid")
+    __slots__ = ("id", "kind", "object", "frame", "to", "attempt", "avoid", "asked_again")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[RelocationGoal.Kind]
@@ -33,6 +33,7 @@ class RelocationGoal(_message.Message):
     TO_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
     AVOID_FIELD_NUMBER: _ClassVar[int]
+    ASKED_AGAIN_FIELD_NUMBER: _ClassVar[int]
     id: str
     kind: RelocationGoal.Kind
     object: str
@@ -40,7 +41,8 @@ class RelocationGoal(_message.Message):
     to: Position
     attempt: int
     avoid: _containers.RepeatedCompositeFieldContainer[Position]
-    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., **kwargs) -> None: ...
+    asked_again: bool
+    def __init__(self, id: _Optional[str] = ..., kind: _Optional[_Union[RelocationGoal.Kind, str]] = ..., object: _Optional[str] = ..., frame: _Optional[str] = ..., to: _Optional[_Union[Position, _Mapping]] = ..., attempt: _Optional[int] = ..., avoid: _Optional[_Iterable[_Union[Position, _Mapping]]] = ..., asked_again: bool = ..., **kwargs) -> None: ...
 
 class Position(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -53,7 +55,7 @@ class Position(_message.Message):
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
 class RelocationStatus(_message.Message):
-    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad")
+    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad", "in_the_way")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[RelocationStatus.State]
@@ -75,6 +77,7 @@ class RelocationStatus(_message.Message):
     REASON_FIELD_NUMBER: _ClassVar[int]
     HOLDING_FIELD_NUMBER: _ClassVar[int]
     ELBOW_TURN_RAD_FIELD_NUMBER: _ClassVar[int]
+    IN_THE_WAY_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     goal_id: str
     state: RelocationStatus.State
@@ -82,4 +85,5 @@ class RelocationStatus(_message.Message):
     reason: str
     holding: bool
     elbow_turn_rad: float
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ...) -> None: ...
+    in_the_way: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ..., in_the_way: _Optional[_Iterable[int]] = ...) -> None: ...

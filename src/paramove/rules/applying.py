@@ -23,6 +23,8 @@ class Applying(Stage):
         self._attempt = 0
         self._began_s = 0.0
         self._failure = ""
+        self._avoided: tuple[str, ...] = ()
+        self._stuck: set[str] = set()
 
     def enter(self) -> None:
         """Ask the instructor to point."""
@@ -71,13 +73,15 @@ class Applying(Stage):
         self._attempt += 1
         self._began_s, self._failure = self.mind.now_s, ""
         mind = self.mind
+        standing = mind.table.standing(but=self._object)
+        self._avoided = tuple(standing)
         mind.errand.start(
             RelocationGoal.KIND_RELOCATE,
             mind.now_s,
             self._object,
             source=mind.goals.position(self._source),
             target=mind.goals.position(mind.rules[self._object]),
-            avoid=mind.table.standing(but=self._object).values(),
+            avoid=standing.values(),
             attempt=self._attempt,
         )
         self.go("relocating")
@@ -87,13 +91,25 @@ class Applying(Stage):
         if outcome is None:
             return
         if outcome.state == RelocationStatus.STATE_REFUSED:
-            self._ask_for_help(f"I cannot do that: {outcome.reason}.")
+            self._refused(outcome)
         elif outcome.state == RelocationStatus.STATE_FAILED:
             self._failure = outcome.reason or "it failed"
             self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
             self.go("returning")
         else:
             self.go("looking")
+
+    def _refused(self, outcome: RelocationStatus) -> None:
+        """No way round a standing object: that one first. Only where each stands in the other's way is help needed."""
+        self._stuck.add(self._object)
+        in_the_way = (self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided))
+        other = next((name for name in in_the_way if name not in self._stuck | self.mind.done), "")
+        if other:
+            sentence = f"{other} stands in the way of {self._object}. Please point at {other} first."
+            self.mind.tell(sentence, Speech.REQUEST_POINT_AT_OBJECT, other)
+            self.go("waiting")
+        else:
+            self._ask_for_help(f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}.")
 
     def _returning(self) -> None:
         """The arm may have been left anywhere: bring it to its base pose before looking."""
@@ -134,12 +150,14 @@ class Applying(Stage):
         seen = self.mind.table.objects.get(self._object)
         came = seen is not None and seen.at_rest and seen.time_s > self.mind.now_s - self.for_s
         if came and self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S:
+            self._stuck.clear()
             self._ask()
         elif self.for_s > self.mind.options.patience_s:
             self._ask_for_help(f"I still need help with {self._object}.")
 
     def _put_away(self) -> ApplicationStage.Stage | None:
         self.mind.done.add(self._object)
+        self._stuck.clear()
         self.mind.tell(f"{self._object} is put away.")
         if set(self.mind.options.objects) <= self.mind.done:
             self.mind.tell("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
