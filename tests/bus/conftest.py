@@ -11,6 +11,11 @@ from typing import Any
 import pytest
 import zmq
 
+from paramove.bus.endpoint import socket_path
+from paramove.bus.envelope import Envelope, pack
+from paramove.bus.schema_hash import schema_hash
+from paramove.bus.topics import Topic
+
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
@@ -61,3 +66,27 @@ def wait() -> Wait:
         raise AssertionError(f"not within {seconds} s: {condition}")
 
     return until
+
+
+class RawSpeaker:
+    """A program that is not ours at a topic's socket: it says any bytes, with an envelope that fits if wanted."""
+
+    def __init__(self, context: zmq.Context[Any], folder: Path, topic: Topic, epoch: int = 1) -> None:
+        self.topic = topic
+        self.epoch = epoch
+        self.sequence = 0
+        self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
+        self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
+        self.socket.bind(f"ipc://{socket_path(folder, topic.name)}")
+
+    def frames(self, payload: bytes, published_ns: int = 0, **changed: Any) -> list[bytes]:
+        """A well-formed message of any payload; `changed` are fields of the envelope."""
+        self.sequence += 1
+        fitting = Envelope(schema_hash(self.topic.type), 5, self.epoch, self.sequence, published_ns, published_ns)
+        return [self.topic.name.encode() + b"\0" + pack(fitting._replace(**changed), payload), payload]
+
+    def say(self, payload: bytes, published_ns: int = 0, **changed: Any) -> None:
+        self.socket.send_multipart(self.frames(payload, published_ns, **changed))
+
+    def subscribed(self) -> bool:
+        return bool(self.socket.poll(0)) and self.socket.recv()[:1] == b"\x01"

@@ -160,7 +160,7 @@ def test_truth_needs_its_folder(folder: Path) -> None:
 
 
 def test_a_fork_cannot_say(speaker: Bus, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("paramove.bus.bus.os.getpid", lambda: 1)
+    monkeypatch.setattr("paramove.bus.exchange.os.getpid", lambda: 1)
     with pytest.raises(RuntimeError, match="cannot be used after a fork"):
         speaker.publish(topics.GESTURES, Gesture())
 

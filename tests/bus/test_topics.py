@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.schema_hash import schema_hash, type_of_hash
+from paramove.bus.schema_hash import hash_of, schema_hash, type_of_hash
 from paramove.bus.topics import Profile
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.node_status_pb2 import NodeStatus
@@ -47,5 +47,12 @@ def test_schema_hashes_differ_between_types_and_find_their_type() -> None:
 
 
 def test_schema_hash_is_the_same_in_every_process_and_release() -> None:
-    """A pinned value: it changes only when clock.proto does."""
-    assert schema_hash(Clock) == 0x2A66455DB97F00FF
+    """A pinned value: it covers the name of the type and its generation, nothing else."""
+    assert schema_hash(Clock) == hash_of("paramove.msgs.Clock", 1) == 0x61541BA9BCF96F72
+    assert type_of_hash(hash_of("paramove.msgs.Clock", 3)) == "paramove.msgs.Clock of generation 3"
+
+
+def test_only_topics_whose_rate_is_of_the_bus_clock_have_a_budget() -> None:
+    without = {topic.name for topic in topics.TOPICS if topic.rate_hz and not topic.budget_hz}
+    assert without == {"clock"}
+    assert topics.status("camera").budget_hz is None

@@ -16,12 +16,14 @@ import time
 from typing import Any
 
 import zmq
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
-from paramove.bus.envelope import RefusedError, unpack
+from paramove.bus.envelope import Reason, RefusedError, unpack
 from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
+from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import TICK_PERIOD_NS
@@ -30,6 +32,7 @@ from paramove.msgs.clock_pb2 import Clock, TickDone
 _log = logging.getLogger(__name__)
 
 COMPLAINT_PERIOD_S = 5.0
+MAX_ANSWER_BYTES = 2**18
 
 
 class LockstepBarrier:
@@ -48,6 +51,7 @@ class LockstepBarrier:
         members: Nodes that time waits for at present.
         lost: Nodes that have left, in order.
         tick: Number of the newest beat. 0 is the handshake.
+        refused: How many answers were not what a member says.
     """
 
     def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:
@@ -63,6 +67,7 @@ class LockstepBarrier:
         self._newcomers: dict[str, TickDone] = {}
         self.lost: list[str] = []
         self.tick = 0
+        self.refused = 0
         if self._lockstep:
             bus.hold()
             self._open()
@@ -123,8 +128,10 @@ class LockstepBarrier:
         self._socket: zmq.Socket[Any] = self._exchange.context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.ROUTER_HANDOVER, 1)  # a restarted member comes with the name of the dead one
         self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.MAXMSGSIZE, MAX_ANSWER_BYTES)
+        foreign = ForeignConnections(self._socket, SERVICE)
         self._socket.bind(f"ipc://{path}")
-        self._exchange.add_socket(self._socket, ownership)
+        self._exchange.add_socket(self._socket, ownership, foreign)
 
     def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
         """Reads answers until there is one or a member ended; complains about whom it waits for."""
@@ -144,12 +151,15 @@ class LockstepBarrier:
             frames = self._socket.recv_multipart(zmq.NOBLOCK)
             try:
                 if len(frames) != 3:
-                    continue
-                unpack(frames[1], frames[2], schema_hash(TickDone), 2**20)
-            except RefusedError as error:
-                _log.warning("lockstep: answer refused: %s", error)
+                    raise RefusedError(Reason.FRAMES, f"{len(frames)} frames, expected 3: sender, header, answer")
+                unpack(frames[1], frames[2], schema_hash(TickDone), MAX_ANSWER_BYTES)
+                answer = TickDone.FromString(frames[2])
+            except (RefusedError, DecodeError) as error:
+                self.refused += 1
+                if self.refused == 10 ** (len(str(self.refused)) - 1):
+                    _log.warning("lockstep: answer refused (number %d): %s", self.refused, error)
                 continue
-            changed |= self._take(TickDone.FromString(frames[2]))
+            changed |= self._take(answer)
         return changed
 
     def _take(self, answer: TickDone) -> bool:
@@ -182,7 +192,8 @@ class LockstepBarrier:
         self._unwatch(node)
         try:
             self._pidfds[node] = os.pidfd_open(pid)
-        except ProcessLookupError:
+        except OSError as error:
+            _log.warning("lockstep: %s cannot join as process %d: %s", node, pid, error.strerror)
             return False
         self._exchange.watch_descriptor(self._pidfds[node])
         return True

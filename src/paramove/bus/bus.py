@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -61,7 +60,6 @@ class Bus:
         self.run_folder = run_folder or Path()
         self.dropped: Counter[str] = Counter()
         self.exchange = Exchange(node, settings)
-        self._pid = os.getpid()
         self._heard: list[str] = []
         self._backlog: list[Heard] = []
         self._held: list[tuple[Topic, Any, int | None]] = []
@@ -89,6 +87,11 @@ class Bus:
     def has_failed(self) -> bool:
         """Whether the newest state said is `failed`."""
         return self._status.state == NodeStatus.STATE_FAILED
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the newest state said is that the node is about to end well."""
+        return self._status.state == NodeStatus.STATE_STOPPED
 
     @property
     def stopped(self) -> bool:
@@ -122,10 +125,7 @@ class Bus:
             KeyError: the node does not say this topic.
             TypeError, ValueError: see `Publisher.publish`.
         """
-        if os.getpid() != self._pid:
-            raise RuntimeError(
-                f"the bus of {self.node} was made in process {self._pid} and cannot be used after a fork"
-            )
+        self.exchange.check_process()
         if topic.name not in self.exchange.publishers:
             said = ", ".join(sorted(self.exchange.publishers))
             raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to SAYS")
@@ -292,6 +292,7 @@ class Bus:
 
     def _next_turn(self) -> bool:
         """Waits for the next turn; False once the bus was stopped."""
+        self.exchange.housekeeping()
         self._trim_backlog()
         turn = self._turns.next(self._heard)
         if turn is None:

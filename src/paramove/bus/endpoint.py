@@ -16,6 +16,8 @@ from typing import Any
 
 import zmq
 
+_EVENTS = int(zmq.EVENTS)
+
 PATH_BYTES = 107
 """Longest path of a Unix socket on Linux."""
 
@@ -38,6 +40,14 @@ def socket_path(folder: Path, name: str) -> Path:
             f"{size - PATH_BYTES} bytes shorter"
         )
     return path
+
+
+def holder_of(path: Path) -> str:
+    """What the holder of a socket path wrote into its lock, such as "pid 12 (camera)"; "" if nobody ever held it."""
+    try:
+        return path.with_name(path.name + ".lock").read_text(encoding="utf-8", errors="replace")[:200].strip()
+    except OSError:
+        return ""
 
 
 def prepare_folder(folder: Path) -> None:
@@ -129,6 +139,4 @@ def is_alive(path: Path) -> bool:
 
 def can_read(socket: zmq.Socket[Any]) -> bool:
     """Whether a message is waiting. Cheaper than to receive and catch `zmq.Again`."""
-    events = socket.getsockopt(zmq.EVENTS)
-    assert isinstance(events, int)
-    return bool(events & 1)  # POLLIN; as an enum it would cost more than the question
+    return bool(socket.getsockopt(_EVENTS) & 1)  # type: ignore[operator]  # POLLIN; enums would cost more

@@ -1,6 +1,7 @@
 """The fixed header of every message on the bus.
 
-A message is three frames: topic name ending in `\\0`, this header, payload (protobuf). 56 bytes, little-endian:
+A message is two frames: the topic's name ending in `\\0` with this header behind it, and the payload (protobuf). The
+header has 56 bytes, little-endian:
 
     offset  size  field
     0       2     magic, 0x4D50
@@ -33,7 +34,8 @@ MAGIC = 0x4D50
 VERSION = 1
 _LAYOUT = struct.Struct("<HBBQQIQqqI")
 _CRC = struct.Struct("<I")
-SIZE = _LAYOUT.size + _CRC.size
+_WHOLE = struct.Struct("<HBBQQIQqqII")
+SIZE = _WHOLE.size
 
 FLAG_WELCOME = 1
 """Said because somebody subscribed; the sequence is that of the newest message said so far."""
@@ -44,6 +46,7 @@ FLAG_LAST_VALUE = 2
 class Reason(enum.Enum):
     """Why a message was refused."""
 
+    CONNECTION = "connection"
     FRAMES = "frames"
     SIZE = "size"
     MAGIC = "magic"
@@ -52,6 +55,7 @@ class Reason(enum.Enum):
     LENGTH = "length"
     CRC = "crc"
     EPOCH = "epoch"
+    BUDGET = "budget"
     DECODE = "decode"
 
 
@@ -122,8 +126,8 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
     """
     if len(header) != SIZE:
         raise RefusedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")
-    magic, version, flags, found, publisher, epoch, sequence, published_ns, captured_ns, length = _LAYOUT.unpack(
-        header[: _LAYOUT.size]
+    magic, version, flags, found, publisher, epoch, sequence, published_ns, captured_ns, length, crc = _WHOLE.unpack(
+        header
     )
     if magic != MAGIC:
         raise RefusedError(Reason.MAGIC, f"magic is {magic:#06x}, expected {MAGIC:#06x}: not a message of this bus")
@@ -135,7 +139,6 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
         raise RefusedError(
             Reason.LENGTH, f"payload has {len(payload)} bytes, header says {length}, allowed are {max_bytes}"
         )
-    (crc,) = _CRC.unpack(header[_LAYOUT.size :])
     if crc != zlib.crc32(payload, zlib.crc32(header[: _LAYOUT.size])):
         raise RefusedError(Reason.CRC, f"CRC of sequence {sequence} is wrong: the bytes were damaged on their way")
     return Envelope(schema, publisher, epoch, sequence, published_ns, captured_ns, flags, length)
@@ -143,8 +146,8 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
 
 def _schema_sentence(found: int, expected: int) -> str:
     """Names both sides of a schema mismatch."""
-    names = [type_of_hash(value) or "a type or schema version unknown here" for value in (found, expected)]
+    names = [type_of_hash(value) or "a type unknown here" for value in (found, expected)]
     return (
         f"schema hash is {found:#018x} ({names[0]}), the topic carries {expected:#018x} ({names[1]}); "
-        "run every process from the same installation"
+        "correct the speaker, or run every process from the same installation"
     )

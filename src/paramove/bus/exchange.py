@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import os
 import time
@@ -13,6 +12,7 @@ from typing import Any
 import zmq
 
 from paramove.bus.endpoint import Ownership
+from paramove.bus.monitor import ForeignConnections
 from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard, Subscriber
@@ -20,13 +20,11 @@ from paramove.bus.topics import Topic
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.node_status_pb2 import NodeStatus
 
-_log = logging.getLogger(__name__)
-
 Marks = Mapping[str, tuple[int, int]]
 """Topic name on the bus -> epoch and sequence of the newest message said."""
 
 WATCH_PERIOD_S = 0.25
-DRAIN_LIMIT = 10_000
+DRAIN_LIMIT = 1000
 """Messages taken from one topic at once, so that a flood on it cannot keep the process from everything else."""
 
 
@@ -52,6 +50,8 @@ class Exchange:
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._poller.register(self._wake, zmq.POLLIN)
         self._others: list[zmq.Socket[Any]] = []
+        self._foreign: list[ForeignConnections] = []
+        self._pid = os.getpid()
         self._watch_due_s = 0.0
         self._second_due_s = 0.0
         self._closed = False
@@ -61,6 +61,7 @@ class Exchange:
         settings = self.settings
         publisher = Publisher(self.context, settings.folder_of(topic), topic, self.node, settings.name_of(topic))
         self._owned.append(publisher.ownership)
+        self._foreign.append(publisher.foreign)
         self.publishers[topic.name] = publisher
         self._poller.register(publisher.socket, zmq.POLLIN)
         return publisher
@@ -75,9 +76,16 @@ class Exchange:
             self._poller.register(subscriber.socket, zmq.POLLIN)
         return self.subscribers[topic.name]
 
-    def add_socket(self, socket: zmq.Socket[Any], ownership: Ownership | None = None) -> None:
+    def add_socket(
+        self,
+        socket: zmq.Socket[Any],
+        ownership: Ownership | None = None,
+        foreign: ForeignConnections | None = None,
+    ) -> None:
         """Lets `wait` return when `socket` can be read; it is closed with the others."""
         self._others.append(socket)
+        if foreign is not None:
+            self._foreign.append(foreign)
         self._poller.register(socket, zmq.POLLIN)
         if ownership is not None:
             self._owned.append(ownership)
@@ -102,7 +110,7 @@ class Exchange:
         Returns:
             The sockets and descriptors that could be read.
         """
-        self._housekeeping()
+        self.housekeeping()
         until_due_s = min(self._watch_due_s, self._second_due_s) - time.monotonic()
         found = self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s))))
         ready: set[object] = {item for item, _ in found}
@@ -192,10 +200,14 @@ class Exchange:
         if self._closed:
             return
         self.stopped = self._closed = True
+        if os.getpid() != self._pid:
+            return  # a fork: the sockets and the thread behind them are the parent's
         for subscriber in self.subscribers.values():
             subscriber.close()
         for publisher in self.publishers.values():
             publisher.close()
+        for foreign in self._foreign:
+            foreign.close()
         for socket in self._others:
             socket.close()
         self.context.term()
@@ -204,14 +216,27 @@ class Exchange:
             ownership.release()
         os.close(self._wake)
 
-    def _housekeeping(self) -> None:
+    def check_process(self) -> None:
+        """Raises RuntimeError after a fork: libzmq's thread, which moves every message, exists in the parent alone."""
+        if os.getpid() != self._pid:
+            raise RuntimeError(
+                f"the bus of {self.node} was made in process {self._pid} and cannot be used after a fork; "
+                "make a Bus in the new process, under another name"
+            )
+
+    def housekeeping(self) -> None:
+        """What is due a few times a second; for a loop that is never without messages, so that `wait` is not called."""
+        self.check_process()
         now_s = time.monotonic()
         if now_s >= self._watch_due_s:
             self._watch_due_s = now_s + WATCH_PERIOD_S
-            for name, subscriber in self.subscribers.items():
+            for foreign in self._foreign:
+                foreign.look()
+            for subscriber in self.subscribers.values():
                 if subscriber.is_deaf():
-                    _log.warning("topic %s: connection given up by libzmq, opened anew", subscriber.name)
-                    self.reopen(name)
+                    self._poller.unregister(subscriber.socket)
+                    subscriber.revive()
+                    self._poller.register(subscriber.socket, zmq.POLLIN)
         if now_s >= self._second_due_s:
             self._second_due_s = now_s + 1.0
             self.every_second()

@@ -14,7 +14,7 @@ from typing import Any
 import zmq
 
 from paramove.bus import topics
-from paramove.bus.endpoint import is_alive, socket_path
+from paramove.bus.endpoint import holder_of, is_alive, socket_path
 from paramove.bus.subscriber import Heard, Subscriber
 from paramove.bus.topics import Topic
 
@@ -90,11 +90,7 @@ def speakers(folder: Path) -> list[Speaker]:
 def speaker(folder: Path, topic: Topic) -> Speaker:
     """Who says one topic."""
     path = socket_path(folder, topic.name)
-    try:
-        holder = path.with_name(path.name + ".lock").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        holder = ""
-    return Speaker(topic, is_alive(path), holder)
+    return Speaker(topic, is_alive(path), holder_of(path))
 
 
 def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Heard]:
@@ -151,7 +147,6 @@ def _poll(subscribers: list[Subscriber], end_s: float) -> None:
     """Waits until something can be read, not beyond `end_s`; opens sockets anew that have gone deaf."""
     poller = zmq.Poller()
     for subscriber in subscribers:
-        if subscriber.is_deaf():
-            subscriber.reopen()
+        subscriber.revive()
         poller.register(subscriber.socket, zmq.POLLIN)
     poller.poll(max(0, min(_POLL_MS, int(1000 * (end_s - time.monotonic())))))

@@ -10,8 +10,13 @@ import zmq
 
 from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
 from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_WELCOME, Envelope, pack, publisher_id
+from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.topics import Profile, Topic
+
+_NOBLOCK = int(zmq.NOBLOCK)
+_NOBLOCK_SNDMORE = int(zmq.NOBLOCK | zmq.SNDMORE)
+"""As plain numbers: to combine enums takes longer than to send."""
 
 LINGER_MS = 500
 """How long closing waits for messages said just before."""
@@ -35,6 +40,7 @@ class Publisher:
         epoch: Of this start.
         sequence: Of the newest message said.
         subscriptions: How many have been answered since the start.
+        foreign: Connections that did not speak ZeroMQ; `foreign.look()` is to be called a few times a second.
 
     Raises:
         TopicTakenError, BusFolderError: see `paramove.bus.endpoint`.
@@ -57,10 +63,11 @@ class Publisher:
         self._last: tuple[Envelope, bytes] | None = None
         self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
         self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
-        self.socket.setsockopt(zmq.SNDHWM, topic.high_water_mark)
+        self.socket.setsockopt(zmq.SNDHWM, topic.speaker_high_water_mark)
         self.socket.setsockopt(zmq.LINGER, LINGER_MS)
         # A subscriber only ever sends subscriptions.
         self.socket.setsockopt(zmq.MAXMSGSIZE, 1024)
+        self.foreign = ForeignConnections(self.socket, self.name)
         self.socket.bind(f"ipc://{path}")
 
     def publish(self, message: Any, captured_ns: int, now_ns: int) -> int:
@@ -78,12 +85,12 @@ class Publisher:
             raise ValueError(
                 f"message on {self.topic.name} has {len(payload)} bytes, the topic allows {self.topic.max_bytes}"
             )
-        self.serve()
         self.sequence += 1
         envelope = Envelope(self._schema, self._publisher, self.epoch, self.sequence, now_ns, captured_ns)
         if self.topic.profile is Profile.LATCHED:
             self._last = (envelope, payload)
         self._send(envelope, payload)
+        self.serve()
         return self.sequence
 
     def serve(self) -> None:
@@ -96,6 +103,7 @@ class Publisher:
 
     def close(self) -> None:
         """Closes the socket; messages already said are still delivered for `LINGER_MS`."""
+        self.foreign.close()
         self.socket.close()
 
     def _welcome(self) -> None:
@@ -108,4 +116,5 @@ class Publisher:
             )
 
     def _send(self, envelope: Envelope, payload: bytes) -> None:
-        self.socket.send_multipart([self._frame, pack(envelope, payload), payload], zmq.NOBLOCK)
+        self.socket.send(self._frame + pack(envelope, payload), _NOBLOCK_SNDMORE)
+        self.socket.send(payload, _NOBLOCK)

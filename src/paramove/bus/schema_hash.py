@@ -1,7 +1,10 @@
-"""A number per message type that differs as soon as its schema differs.
+"""A number per message type, carried by every message.
 
 Protobuf decodes almost any bytes as almost any type. The envelope carries this number, so that a message of another
-type, or of another version of the type, is refused before it is decoded.
+type is refused before it is decoded. It covers the full name of the type and its generation, not its fields: a schema
+grows by new fields, which protobuf keeps or ignores, so programs of different releases understand each other. What
+would break that (a field that changes its number, type or label) is caught by a test against the schemas of every
+release in `tests/data/releases`; whoever really needs it raises the type's generation here.
 """
 
 from __future__ import annotations
@@ -11,46 +14,38 @@ from typing import Any
 
 from paramove.bus import topics
 
+GENERATIONS: dict[str, int] = {}
+"""Full name of a message type -> how often its schema was changed so that old and new cannot read each other; else 1.
+
+Counts for the type that stands in the topic table, also if the change was in a type within it.
+"""
+
 _KNOWN: dict[Any, int] = {}
 
 
 def schema_hash(message_type: type[Any]) -> int:
-    """First 64 bits (little-endian) of SHA-256 over the schema of `message_type` and all types it contains.
+    """First 64 bits (little-endian) of SHA-256 over "<full name> <generation>"."""
+    known = _KNOWN.get(message_type)
+    if known is None:
+        name = str(message_type.DESCRIPTOR.full_name)
+        known = _KNOWN[message_type] = hash_of(name, GENERATIONS.get(name, 1))
+    return known
 
-    Full names, field numbers, field names, types, labels and enum values count; comments and file layout do not.
-    """
-    if message_type not in _KNOWN:
-        lines: dict[str, str] = {}
-        _describe(message_type.DESCRIPTOR, lines)
-        text = "\n".join(lines[name] for name in sorted(lines))
-        _KNOWN[message_type] = int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
-    return _KNOWN[message_type]
+
+def hash_of(name: str, generation: int) -> int:
+    """The number of one generation of a message type."""
+    return int.from_bytes(hashlib.sha256(f"{name} {generation}".encode()).digest()[:8], "little")
 
 
 def type_of_hash(value: int) -> str | None:
-    """Full name of the message type in the topic table that has this hash; None if there is none."""
-    types = [topic.type for topic in topics.TOPICS] + [topics.status("x").type]
-    return next((str(kind.DESCRIPTOR.full_name) for kind in types if schema_hash(kind) == value), None)
+    """Name of the message type in the topic table that has this number, with its generation if it is not the present.
 
-
-def _describe(descriptor: Any, lines: dict[str, str]) -> None:
-    """Adds the line of this message type and of every type it refers to; recursive types end at the known name."""
-    if descriptor.full_name in lines:
-        return
-    lines[descriptor.full_name] = ""  # known from here on
-    parts = [f"message {descriptor.full_name}"]
-    for field in sorted(descriptor.fields, key=lambda field: field.number):
-        refers_to = field.message_type or field.enum_type
-        oneof = field.containing_oneof.name if field.containing_oneof else ""
-        # `label` and its successor `is_repeated` do not both exist in every supported protobuf.
-        repeated = getattr(field, "is_repeated", None)
-        if repeated is None:
-            repeated = field.label == field.LABEL_REPEATED
-        kind = refers_to.full_name if refers_to else ""
-        parts.append(f"{field.number} {field.name} {field.type} {kind} {bool(repeated)} {oneof}")
-        if field.message_type:
-            _describe(field.message_type, lines)
-        elif field.enum_type:
-            values = sorted((value.number, value.name) for value in field.enum_type.values)
-            lines[field.enum_type.full_name] = f"enum {field.enum_type.full_name} {values}"
-    lines[descriptor.full_name] = "; ".join(parts)
+    None if there is none.
+    """
+    for kind in {topic.type for topic in topics.TOPICS} | {topics.status("x").type}:
+        name = str(kind.DESCRIPTOR.full_name)
+        present = GENERATIONS.get(name, 1)
+        for generation in range(1, present + 10):
+            if hash_of(name, generation) == value:
+                return name if generation == present else f"{name} of generation {generation}"
+    return None

@@ -13,6 +13,10 @@ from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
 _log = logging.getLogger(__name__)
 
 
+MAX_SENTENCE = 4000
+"""Characters; an exception may carry a whole document."""
+
+
 class StatusReporter:
     """Says `status/<node>`.
 
@@ -37,6 +41,7 @@ class StatusReporter:
 
     def change(self, state: NodeStatus.State, sentence: str, now_ns: int) -> None:
         """Says a state and a sentence at once, if they are new."""
+        sentence = sentence[:MAX_SENTENCE]
         if (state, sentence) == (self._state, self._sentence) and self._publisher.sequence:
             return
         self._state, self._sentence = state, sentence

@@ -10,15 +10,21 @@ from typing import Any
 
 import zmq
 from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
-from zmq.utils.monitor import parse_monitor_message
 
-from paramove.bus.endpoint import can_read, socket_path
+from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
+from paramove.bus.endpoint import can_read, holder_of, socket_path
 from paramove.bus.envelope import SIZE, Envelope, Reason, RefusedError, unpack
+from paramove.bus.monitor import Monitor
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
 from paramove.bus.topics import Topic
 
 _log = logging.getLogger(__name__)
+
+_NOBLOCK = int(zmq.NOBLOCK)
+_RCVMORE = int(zmq.RCVMORE)
+_PASSED_OVER_AT_ONCE = 200
+"""Refused messages that are read in one call, so that a flood of them cannot keep the process from everything else."""
 
 DEAF_AFTER_S = 0.3
 """A socket that was disconnected and has not tried again for so long never will."""
@@ -62,7 +68,8 @@ class Subscriber:
         self.connected = False
         self.reopened = 0
         self._context = context
-        self._endpoint = f"ipc://{socket_path(folder, self.name)}"
+        self._path = socket_path(folder, self.name)
+        self._budget = RateBudget(topic.budget_hz)
         self._frame = self.name.encode() + b"\0"
         self._schema = schema_hash(topic.type)
         self._disconnected_s: float | None = None
@@ -74,31 +81,41 @@ class Subscriber:
         return self.counter.epoch is not None
 
     def receive(self) -> Heard | None:
-        """Next new message, or None if none is waiting. Repeated and refused ones are counted and passed over."""
-        while True:
+        """Next new message, or None if none is waiting.
+
+        Repeated and refused ones are counted and passed over. After many of them it also returns None.
+        """
+        for _ in range(_PASSED_OVER_AT_ONCE):
             raw = self.receive_raw()
             if raw is None:
                 return None
             envelope, payload = raw
             try:
-                message = self.topic.type.FromString(payload)
-            except (DecodeError, ValueError) as error:
+                if not self._budget.admits(envelope.epoch, envelope.published_ns):
+                    raise RefusedError(Reason.BUDGET, self._budget_sentence())
+                message = self._decode(payload)
+            except RefusedError as error:
                 self.counter.messages -= 1
-                self._refuse(RefusedError(Reason.DECODE, f"payload is no {self.topic.type_name}: {error}"))
+                self._refuse(error)
                 continue
             return Heard(self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload)
+        return None
 
     def receive_raw(self) -> tuple[Envelope, bytes] | None:
-        """Like `receive`, with the payload left encoded."""
-        while can_read(self.socket):
-            frames = self.socket.recv_multipart(zmq.NOBLOCK)
+        """Like `receive`, with the payload left encoded and however fast they come."""
+        for _ in range(_PASSED_OVER_AT_ONCE):
+            if not can_read(self.socket):
+                return None
             try:
-                envelope = self._check(frames)
+                envelope, payload = self._read()
             except RefusedError as error:
                 self._refuse(error)
                 continue
-            if self.counter.accept(envelope) is Arrival.NEW:
-                return envelope, frames[2]
+            arrival = self.counter.accept(envelope)
+            if arrival is Arrival.NEW:
+                return envelope, payload
+            if arrival is Arrival.OUTDATED:
+                self._log_refusal(RefusedError(Reason.EPOCH, self._two_speakers_sentence(envelope)))
         return None
 
     def is_deaf(self) -> bool:
@@ -107,8 +124,7 @@ class Subscriber:
         To be asked a few times a second. libzmq drops a connection for ever when a message exceeds MAXMSGSIZE or the
         other side does not speak its protocol. Also keeps `connected` up to date.
         """
-        while self._monitor.poll(0):
-            event = parse_monitor_message(self._monitor.recv_multipart(zmq.NOBLOCK))["event"]
+        for event in self._monitor.events():
             if event == zmq.EVENT_DISCONNECTED:
                 self.connected, self._disconnected_s = False, time.monotonic()
             elif event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
@@ -116,6 +132,20 @@ class Subscriber:
             else:  # it tries again
                 self._disconnected_s = None
         return self._disconnected_s is not None and time.monotonic() - self._disconnected_s > DEAF_AFTER_S
+
+    def revive(self) -> bool:
+        """Opens the socket anew if libzmq has given it up, and counts that; whether it was so."""
+        if not self.is_deaf():
+            return False
+        self._refuse(
+            RefusedError(
+                Reason.CONNECTION,
+                f"libzmq ended the connection to {holder_of(self._path) or 'its speaker'} for good: a message above "
+                f"{self.topic.max_bytes} bytes, or no ZeroMQ; opened anew",
+            )
+        )
+        self.reopen()
+        return True
 
     def reopen(self) -> None:
         """Closes the socket and opens another. Counts go on: what is missed meanwhile is a loss."""
@@ -126,8 +156,7 @@ class Subscriber:
 
     def close(self) -> None:
         """Closes the socket; messages not yet received are gone."""
-        self.socket.disable_monitor()
-        self._monitor.close(linger=0)
+        self._monitor.close()
         self.socket.close(linger=0)
 
     def _open(self) -> None:
@@ -137,23 +166,55 @@ class Subscriber:
         self.socket.setsockopt(zmq.MAXMSGSIZE, max(self.topic.max_bytes, SIZE))
         self.socket.setsockopt(zmq.RECONNECT_IVL, 20)
         self.socket.setsockopt(zmq.RECONNECT_IVL_MAX, 200)
-        self._monitor: zmq.Socket[Any] = self.socket.get_monitor_socket(
+        self._monitor = Monitor(
+            self.socket,
             zmq.EVENT_DISCONNECTED
             | zmq.EVENT_CONNECT_RETRIED
             | zmq.EVENT_CONNECT_DELAYED
             | zmq.EVENT_CONNECTED
-            | zmq.EVENT_HANDSHAKE_SUCCEEDED
+            | zmq.EVENT_HANDSHAKE_SUCCEEDED,
         )
-        self.socket.connect(self._endpoint)
+        self.socket.connect(f"ipc://{self._path}")
         self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
 
-    def _check(self, frames: list[bytes]) -> Envelope:
-        if len(frames) != 3 or frames[0] != self._frame:
-            raise RefusedError(Reason.FRAMES, f"{len(frames)} frames, expected 3: topic, header, payload")
-        return unpack(frames[1], frames[2], self._schema, self.topic.max_bytes)
+    def _read(self) -> tuple[Envelope, bytes]:
+        """The next message, checked but for its sequence and content; raises RefusedError."""
+        socket = self.socket
+        head = socket.recv(_NOBLOCK)
+        frames = 1
+        payload = b""
+        while socket.getsockopt(_RCVMORE):
+            payload = socket.recv(_NOBLOCK)
+            frames += 1
+        if frames != 2 or not head.startswith(self._frame):
+            raise RefusedError(Reason.FRAMES, f"{frames} frames, expected 2: topic and header, payload")
+        return unpack(head[len(self._frame) :], payload, self._schema, self.topic.max_bytes), payload
+
+    def _decode(self, payload: bytes) -> Any:
+        try:
+            return self.topic.type.FromString(payload)
+        except (DecodeError, ValueError) as error:
+            raise RefusedError(Reason.DECODE, f"payload is no {self.topic.type_name}: {error}") from error
 
     def _refuse(self, error: RefusedError) -> None:
-        """Counts; the first of each reason is logged, the others only counted so that a flood fills no disk."""
         self.counter.refused[error.reason] += 1
-        if self.counter.refused[error.reason] == 1:
-            _log.warning("topic %s: message refused (%s): %s", self.name, error.reason.value, error)
+        self._log_refusal(error)
+
+    def _log_refusal(self, error: RefusedError) -> None:
+        """Of each reason the 1st, 10th, 100th, ... is logged, so that a flood fills no disk."""
+        count = self.counter.refused[error.reason]
+        if count == 10 ** (len(str(count)) - 1):
+            _log.warning("topic %s: message refused (%s, number %d): %s", self.name, error.reason.value, count, error)
+
+    def _budget_sentence(self) -> str:
+        rate_hz = self.topic.budget_hz or 0.0
+        return (
+            f"{holder_of(self._path) or 'its speaker'} says more than {ALLOWANCE * rate_hz:g} a second and {BURST} at "
+            f"once; the topic's rate is {rate_hz:g} Hz. What is beyond is dropped; correct the speaker"
+        )
+
+    def _two_speakers_sentence(self, envelope: Envelope) -> str:
+        return (
+            f"two speakers: epoch {envelope.epoch} speaks on after epoch {self.counter.epoch} has replaced it and is "
+            f"not heard; the lock is held by {holder_of(self._path) or 'nobody'}. End the other process"
+        )

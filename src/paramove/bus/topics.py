@@ -47,6 +47,7 @@ class Topic:
         profile: See `Profile`.
         frame: Coordinate frame of spatial content; "" where there is none or the message says it.
         recorded: Whether the recorder keeps it.
+        max_bytes: Largest payload; a larger one is refused at the publisher and by every subscriber.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Topic:
     profile: Profile
     frame: str = ""
     recorded: bool = False
+    max_bytes: int = 2**16
 
     @property
     def type_name(self) -> str:
@@ -72,21 +74,33 @@ class Topic:
         return self.type in (RawImage, CompressedImage)
 
     @property
-    def high_water_mark(self) -> int:
-        """How many messages may wait in each direction before the newest is dropped (and counted as lost)."""
-        return 4 if self.is_image else 1000
+    def budget_hz(self) -> float | None:
+        """Nominal rate by the messages' own publish times, which a listener enforces; None where there is none.
+
+        The clock makes that time, and a status follows the wall clock also in simulated time.
+        """
+        return None if self.type in (Clock, NodeStatus) else self.rate_hz
 
     @property
-    def max_bytes(self) -> int:
-        """Largest payload; a larger one is refused at the publisher and by every subscriber."""
-        return 16 * 2**20 if self.is_image else 2**20
+    def high_water_mark(self) -> int:
+        """How many messages may wait at the listener before the newest is dropped (and counted as lost)."""
+        return 16 if self.is_image else 1000
+
+    @property
+    def speaker_high_water_mark(self) -> int:
+        """How many may wait at the speaker, for each listener. Few images: their memory is the speaker's."""
+        return 4 if self.is_image else 1000
 
 
 _LATEST, _QUEUE, _LATCHED = Profile.LATEST, Profile.QUEUE, Profile.LATCHED
+_IMAGE_BYTES = 2**24
+_MOVEMENT_BYTES = 2**20
 
 CLOCK = Topic("clock", Clock, 15, _QUEUE)
-CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical")
-CAMERA_IMAGE = Topic("camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True)
+CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
+CAMERA_IMAGE = Topic(
+    "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=_IMAGE_BYTES
+)
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
 GESTURES = Topic("gestures", Gesture, None, _QUEUE, recorded=True)
 CALIBRATION_PLANE = Topic("calibration/plane", PlaneCalibration, None, _LATCHED, "right_shoulder", recorded=True)
@@ -95,17 +109,17 @@ APPLICATION_STAGE = Topic("application/stage", ApplicationStage, 1, _LATCHED, re
 SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)
 RELOCATION_GOAL = Topic("relocation/goal", RelocationGoal, None, _QUEUE, "right_shoulder", recorded=True)
 RELOCATION_STATUS = Topic("relocation/status", RelocationStatus, None, _QUEUE, recorded=True)
-ARM_TRAJECTORY = Topic("arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True)
+ARM_TRAJECTORY = Topic("arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _QUEUE, recorded=True)
 ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)
 ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
 OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
-WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True)
+WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
 TRUTH_STATE = Topic("truth/state", TruthState, 15, _QUEUE, "world")
-TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view")
+TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view", max_bytes=_IMAGE_BYTES)
 
 TOPICS: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 """Every topic but the status topics, which exist once per node: see `status`."""
