@@ -26,6 +26,10 @@ RunsOption = Annotated[
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="NODE.PARAM=VALUE", help="as in paramove launch; may be repeated")
 ]
+WithOption = Annotated[
+    list[str] | None,
+    typer.Option("--with", metavar="OVERLAY", help="as in paramove launch: --with sim --with real_time"),
+]
 JobsOption = Annotated[int, typer.Option(min=1, help="runs at the same time; each uses about two cores")]
 AgainOption = Annotated[bool, typer.Option("--again", help="run every seed again, also those with a result")]
 
@@ -37,6 +41,7 @@ def rule_learning(
     json_file: JsonFileOption = None,
     runs: RunsOption = None,
     settings: SetOption = None,
+    overlays: WithOption = None,
     again: AgainOption = False,
     video: Annotated[bool, typer.Option("--video", help="with video and report of every run; slower")] = False,
     drop_recordings: Annotated[
@@ -49,7 +54,7 @@ def rule_learning(
     succeeded; 3 fewer did; 130 interrupted.
     """
     console = Console(highlight=False, emoji=False)
-    results = _batch(console, seeds, jobs, runs, settings or [], again, video, drop_recordings)
+    results = _batch(console, seeds, jobs, runs, settings or [], overlays or [], again, video, drop_recordings)
     from paramove.evaluation.batch_table import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
 
     wide = Console(highlight=False, emoji=False, width=max(console.width, TABLE_WIDTH))
@@ -86,7 +91,7 @@ def homography(
     if run_folder is not None:
         folders = [run_folder]
     else:
-        results = _batch(console, str(seeds), jobs, runs, settings or [], False, False, False)
+        results = _batch(console, str(seeds), jobs, runs, settings or [], [], False, False, False)
         folders = [Path(result["run_folder"]) for result in results]
     rows: list[dict[str, Any]] = []
     for folder in folders:
@@ -120,6 +125,7 @@ def _batch(
     jobs: int,
     runs: Path | None,
     settings: list[str],
+    overlays: list[str],
     again: bool,
     video: bool,
     drop_recordings: bool,
@@ -136,8 +142,8 @@ def _batch(
         Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
     folder = (runs or workspace / RUNS).resolve()
-    options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings))
-    results = {} if again else finished(folder, wanted, settings)
+    options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays))
+    results = {} if again else finished(folder, wanted, settings, overlays)
     if results:
         console.print(
             f"results of {len(results)} seeds are taken from {folder} (--again runs them anew)", soft_wrap=True

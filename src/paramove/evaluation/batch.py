@@ -37,6 +37,7 @@ class BatchOptions:
         report: Whether each run gets its report.
         keep_recordings: Whether the recordings stay; a run takes about 0.5 GB.
         settings: `node.parameter=value`, as `paramove launch --set`.
+        overlays: As `paramove launch --with`; none: the launch file's own.
     """
 
     workspace: Path
@@ -46,6 +47,7 @@ class BatchOptions:
     report: bool = False
     keep_recordings: bool = True
     settings: tuple[str, ...] = ()
+    overlays: tuple[str, ...] = ()
 
 
 def seeds_of(text: str) -> list[int]:
@@ -64,14 +66,16 @@ def result_file(folder: Path, seed: int) -> Path:
     return folder / f"seed_{seed:04d}.json"
 
 
-def finished(folder: Path, seeds: Iterable[int], settings: Sequence[str] = ()) -> dict[int, dict[str, Any]]:
-    """Results that are there already and were made with the same settings."""
+def finished(
+    folder: Path, seeds: Iterable[int], settings: Sequence[str] = (), overlays: Sequence[str] = ()
+) -> dict[int, dict[str, Any]]:
+    """Results that are there already and were made with the same settings and overlays."""
     found = {}
     for seed in seeds:
         path = result_file(folder, seed)
         if path.is_file():
             result = json.loads(path.read_text(encoding="utf-8"))
-            if result.get("settings", []) == list(settings):
+            if result.get("settings", []) == list(settings) and result.get("overlays", []) == list(overlays):
                 found[seed] = result
     return found
 
@@ -108,12 +112,14 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
     environment = os.environ | {"PARAMOVE_DOMAIN": f"eval-{os.getpid()}-{seed}"}
     launch = [sys.executable, "-m", "paramove.cli.main", "launch", APPLICATION, f"--seed={seed}", f"--runs={runs}"]
     launch += [f"--set={setting}" for setting in options.settings]
+    launch += [f"--with={overlay}" for overlay in options.overlays]
     launch += [] if options.video else ["--headless"]
     launched = children.call(launch, options.workspace, environment, options.folder / f"seed_{seed:04d}.log")
     folder = (runs / "latest").resolve()
     result: dict[str, Any] = {
         "seed": seed,
         "settings": list(options.settings),
+        "overlays": list(options.overlays),
         "exit_code": launched,
         "run_folder": str(folder),
     }
