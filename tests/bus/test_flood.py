@@ -1,0 +1,137 @@
+"""A speaker gone wild: what is too much is dropped and attributed, and its listeners' loops go on."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.budget import ALLOWANCE, BURST
+from paramove.bus.bus import Bus
+from paramove.bus.envelope import Reason
+from paramove.bus.publisher import Publisher
+from paramove.bus.settings import BusSettings
+from paramove.bus.subscriber import Subscriber
+from paramove.bus.turns import Tick
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.tracked_objects_pb2 import TrackedObjects
+from tests.bus.conftest import RawSpeaker, Wait
+
+Context = zmq.Context[Any]
+SECOND_NS = 10**9
+
+
+def test_beyond_the_budget_is_dropped_counted_and_attributed(
+    context: Context, folder: Path, wait: Wait, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A hundred times the rate of 15 Hz for ten seconds of the bus clock."""
+    publisher = Publisher(context, folder, topics.OBJECTS_TRACKED, "colour_tracker")
+    subscriber = Subscriber(context, folder, topics.OBJECTS_TRACKED)
+    wait(lambda: subscriber.receive() is None and subscriber.welcomed, publisher.serve)
+    heard = []
+    said = 15_000
+    for number in range(said):
+        now_ns = number * 10 * SECOND_NS // said
+        publisher.publish(TrackedObjects(), now_ns, now_ns)
+        if number % 100 == 99:
+            wait(
+                lambda: subscriber.counter.sequence == publisher.sequence,
+                lambda: heard.extend(iter(subscriber.receive, None)),
+            )
+    counter = subscriber.counter
+    assert len(heard) == counter.messages == int(BURST + ALLOWANCE * 15 * 10 - 1e-3)
+    assert counter.refused == {Reason.BUDGET: said - len(heard)}
+    assert counter.lost == 0
+    assert re.search(
+        rf"topic objects/tracked: .*budget.*: pid {os.getpid()} \(colour_tracker\) says more than 18 a second and 20 "
+        r"at once; the topic's rate is 15 Hz\. What is beyond is dropped; correct the speaker",
+        caplog.text,
+    )
+
+
+def test_events_have_no_budget(context: Context, folder: Path, wait: Wait) -> None:
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    wait(lambda: subscriber.receive() is None and subscriber.welcomed, publisher.serve)
+    for _ in range(500):
+        publisher.publish(Gesture(), 0, 0)
+    wait(lambda: subscriber.receive() and subscriber.counter.messages == 500)
+
+
+@pytest.mark.parametrize("kind", ["refused", "repeated", "beyond the budget"])
+def test_one_call_passes_over_no_more_than_two_hundred(kind: str, context: Context, folder: Path, wait: Wait) -> None:
+    speaker = RawSpeaker(context, folder, topics.OBJECTS_TRACKED)
+    subscriber = Subscriber(context, folder, topics.OBJECTS_TRACKED)
+    wait(speaker.subscribed)
+    for _ in range(900):
+        if kind == "refused":
+            speaker.socket.send_multipart([b"objects/tracked\0", b""])
+        elif kind == "repeated":
+            speaker.sequence = 0
+            speaker.say(b"")
+        else:
+            speaker.say(b"")
+    wait(lambda: subscriber.socket.poll(0))
+    passed_over = []
+    counter = subscriber.counter
+
+    def count() -> int:
+        before = counter.refused.total() + counter.repeated
+        subscriber.receive()
+        passed_over.append(counter.refused.total() + counter.repeated - before)
+        return counter.refused.total() + counter.repeated
+
+    wait(lambda: count() >= 900 - BURST)
+    assert max(passed_over) <= 200
+
+
+_FLOODER = """
+import sys, time, zmq
+from pathlib import Path
+from paramove.bus import topics
+from paramove.bus.publisher import Publisher
+topic = topics.by_name(sys.argv[2])
+publisher = Publisher(zmq.Context(), Path(sys.argv[1]), topic, "wild")
+message = topic.type()
+while True:
+    now_ns = time.monotonic_ns()
+    publisher.publish(message, now_ns, now_ns)
+"""
+
+
+@pytest.mark.parametrize("topic", [topics.OBJECTS_TRACKED, topics.GESTURES], ids=lambda topic: topic.name)
+def test_a_listener_under_a_flood_still_has_ticks_other_messages_and_a_status(
+    topic: topics.Topic, folder: Path, wait: Wait
+) -> None:
+    """As fast as a process can; with a budget (objects/tracked) and without (gestures)."""
+    settings = BusSettings(folder=folder)
+    with (
+        subprocess.Popen([sys.executable, "-c", _FLOODER, str(folder), topic.name]) as flooder,
+        Bus("operator", settings, (), (topics.SPEECH,)) as quiet,
+        Bus("listener", settings, (topic, topics.SPEECH)) as bus,
+    ):
+        subscriber = bus.exchange.subscribers["speech"]
+        wait(lambda: subscriber.welcomed, lambda: quiet.exchange.wait(0), lambda: bus.exchange.wait(0))
+        ticks = sentences = 0
+        status = bus.exchange.publishers["status/listener"]
+        said_before = status.sequence
+        for event in bus.events(tick=True):
+            ticks += isinstance(event, Tick)
+            if isinstance(event, Tick):
+                quiet.publish(topics.SPEECH, topics.SPEECH.type(sentence=str(ticks)))
+            elif event.topic is topics.SPEECH:
+                sentences += 1
+                assert event.message.sentence == str(sentences)
+            if ticks >= 20 and sentences >= 15 and status.sequence >= said_before + 2:
+                break
+        flooded = bus.exchange.subscribers[topic.name].counter
+        flooder.kill()
+        assert flooded.messages + flooded.refused.total() > 1000
+        assert bool(flooded.refused[Reason.BUDGET]) == (topic is topics.OBJECTS_TRACKED)
