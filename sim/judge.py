@@ -86,10 +86,16 @@ class Judge:
             elif self._verdict is not None:
                 self._verdict.take(recorded.message)
         states = 0 if self._verdict is None else self._verdict.states
-        if states and self._path.is_file():
-            lasted_s = json.loads(self._path.read_text(encoding="utf-8")).get("wall_s", 0.0)
-            self._begun_s = time.monotonic() - lasted_s
+        if states:
+            self._begun_s = self._begun_before()
         return states
+
+    def _begun_before(self) -> float:
+        """When an earlier process took in its first state, by the monotonic clock that all processes share."""
+        try:
+            return float(json.loads(self._path.read_text(encoding="utf-8"))["begun_monotonic_s"])
+        except (OSError, ValueError, KeyError):
+            return time.monotonic()
 
     def begin(self, layout: Any) -> None:
         """The run's layout is known. It is said once, and again to a process that was started again."""
@@ -115,6 +121,7 @@ class Judge:
         else:
             summary = self._verdict.summary()
             wall_s = time.monotonic() - self._begun_s if self._verdict.states else 0.0
+            summary["begun_monotonic_s"] = round(self._begun_s, 3)
             summary["wall_s"] = round(wall_s, 3)
             summary["realtime_factor"] = round(summary.get("simulated_s", 0.0) / wall_s, 3) if wall_s > 0 else None
         beside = self._path.with_suffix(".json.new")

@@ -109,7 +109,7 @@ def test_judge_that_was_started_again_recalls_what_was_recorded(folder: Path) ->
     simulation.run_to_tick(9)
     for judged in (whole, second):
         judged.take(state(simulation))
-    by_wall = ("wall_s", "realtime_factor")
+    by_wall = ("begun_monotonic_s", "wall_s", "realtime_factor")
     found, expected = ({k: v for k, v in judged.write().items() if k not in by_wall} for judged in (second, whole))
     assert found == expected
     assert not first.recall(PartedRecording(folder / "none.mcap"))
