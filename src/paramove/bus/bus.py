@@ -59,6 +59,7 @@ class Bus:
         self.settings = settings
         self.run_folder = run_folder or Path()
         self.dropped: Counter[str] = Counter()
+        self._taken_up: Heard | Tick | None = None
         self.exchange = Exchange(node, settings)
         self._heard: list[str] = []
         self._backlog: list[Heard] = []
@@ -82,6 +83,14 @@ class Bus:
     def now_ns(self) -> int:
         """Time of the bus clock: monotonic time of the machine, or simulated time since the start of the run."""
         return self._turns.now_ns
+
+    @property
+    def taken_up(self) -> str:
+        """What a loop was given last, such as "gestures, sequence 12" or "tick 3"; "" before."""
+        event = self._taken_up
+        if isinstance(event, Tick):
+            return f"tick {event.number}"
+        return f"{event.topic.name}, sequence {event.sequence}" if event else ""
 
     @property
     def has_failed(self) -> bool:
@@ -269,6 +278,7 @@ class Bus:
     def _timed(self, event: Heard | Tick) -> Iterator[Heard | Tick]:
         """Yields one event and accounts for the time until the node comes back."""
         started_ns = time.perf_counter_ns()
+        self._taken_up = event
         try:
             yield event
         finally:
