@@ -35,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
         topics.ARM_JOINT_STATES: synthesizer.on_joint_states,
         topics.ARM_TRAJECTORY_STATUS: synthesizer.on_trajectory_status,
     }
-    bus.ready("waiting for a goal")
+    bus.ready(synthesizer.sentence)
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
             hear[event.topic](event.message)
@@ -45,6 +45,7 @@ def run(bus: Bus, config: Config) -> None:
             bus.publish(topics.ARM_TRAJECTORY, trajectory)
         for status in says.statuses:
             bus.publish(topics.RELOCATION_STATUS, status)
+        bus.ready(synthesizer.sentence)
 
 
 if __name__ == "__main__":

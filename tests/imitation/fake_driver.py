@@ -20,7 +20,7 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, checker, planner
 
 PERIOD_NS = 66_666_667
-HELD_OPENING = 0.3  # at which the fingers stop on an object
+HELD_OPENING = 0.43  # at which the fingers stop on an object
 
 
 def goal(
@@ -60,14 +60,24 @@ class FakeDriver:
         graspable: Whether an object is there when the hand closes.
         slips_at: Phase in which the object is lost, "" for never.
         refuses: Which motion (from 1) of each goal is refused; 0 for none.
-        stops: Which motion (from 1) is stopped halfway; 0 for none.
+        stops: Which motion (from 1) is stopped underway; 0 for none.
+        stops_at: Share of that motion after which it is stopped.
+        stale: How many trajectories are refused because they come too late.
         deaf: How many trajectories are not heard.
         angles: Commanded angles of arm and fingers, [6], rad.
     """
 
     def __init__(
-        self, graspable: bool = True, slips_at: str = "", refuses: int = 0, stops: int = 0, deaf: int = 0
+        self,
+        graspable: bool = True,
+        slips_at: str = "",
+        refuses: int = 0,
+        stops: int = 0,
+        deaf: int = 0,
+        stops_at: float = 0.5,
+        stale: int = 0,
     ) -> None:
+        self.stops_at, self.stale = stops_at, stale
         self.graspable, self.slips_at, self.refuses, self.stops, self.deaf = graspable, slips_at, refuses, stops, deaf
         self.angles = HOAP3.base_pose[JOINTS].copy()
         self.heard: list[JointTrajectory] = []
@@ -94,10 +104,14 @@ class FakeDriver:
             yield self._status(TrajectoryStatus.STATE_EXECUTING)
             return
         self.playing, self.time_s = trajectory, 0.0
-        assert np.abs(np.array(trajectory.points[0].position_rad) - self.angles).max() < np.deg2rad(2.0), (
+        assert np.abs(np.array(trajectory.points[0].position_rad) - self.angles)[:5].max() < np.deg2rad(2.0), (
             "starts elsewhere"
         )
-        if self._number == self.refuses:
+        if self.stale:
+            self.stale -= 1
+            yield self._status(TrajectoryStatus.STATE_REFUSED, "age 1.5 s, allowed up to 1 s", "stale")
+            self.playing = None
+        elif self._number == self.refuses:
             yield self._status(TrajectoryStatus.STATE_REFUSED, "not armed")
             self.playing = None
         else:
@@ -111,7 +125,7 @@ class FakeDriver:
         times = [point.time_s for point in self.playing.points]
         self.angles = np.array(self.playing.points[int(np.searchsorted(times, self.time_s - 1e-9))].position_rad)
         self._feel()
-        if self._number == self.stops and self.time_s > 0.5 * times[-1]:
+        if self._number == self.stops and self.time_s > self.stops_at * times[-1]:
             yield self._status(TrajectoryStatus.STATE_STOPPED, "joint right_elbow stuck")
             self.playing = None
         elif self.time_s < times[-1]:
@@ -146,9 +160,11 @@ class FakeDriver:
         if self.opening > HELD_OPENING + 0.1 or self._phase == self.slips_at:
             self.held = False
 
-    def _status(self, state: TrajectoryStatus.State, reason: str = "") -> TrajectoryStatus:
+    def _status(self, state: TrajectoryStatus.State, reason: str = "", code: str = "") -> TrajectoryStatus:
         assert self.playing is not None
-        return TrajectoryStatus(trajectory_id=self.playing.id, state=state, time_s=self.time_s, reason=reason)
+        return TrajectoryStatus(
+            trajectory_id=self.playing.id, state=state, time_s=self.time_s, reason=reason, code=code
+        )
 
 
 class Cell:
@@ -165,6 +181,17 @@ class Cell:
         self.statuses: list[RelocationStatus] = []
         self.events: list[Heard | Tick] = []
         self.now_ns = 0
+        self.feel()
+
+    def restart(self) -> None:
+        """The synthesizer's process is a new one."""
+        self.synthesizer = Synthesizer(RememberedPlans(planner(), checker()))
+
+    def feel(self) -> None:
+        """The joints are heard."""
+        measured = self.driver.measured()
+        self._heard(topics.ARM_JOINT_STATES, measured)
+        self.synthesizer.on_joint_states(measured)
 
     def tick(self) -> None:
         self.now_ns += PERIOD_NS
@@ -173,9 +200,7 @@ class Cell:
         self.statuses.extend(says.statuses)
         answers = [status for trajectory in says.trajectories for status in self.driver.hear(trajectory)]
         answers.extend(self.driver.step())
-        measured = self.driver.measured()
-        self._heard(topics.ARM_JOINT_STATES, measured)
-        self.synthesizer.on_joint_states(measured)
+        self.feel()
         for answer in answers:
             self._heard(topics.ARM_TRAJECTORY_STATUS, answer)
             self.synthesizer.on_trajectory_status(answer)

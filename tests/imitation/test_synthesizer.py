@@ -233,18 +233,6 @@ def test_a_refused_motion_fails_the_goal_and_the_next_one_is_done() -> None:
     assert cell.do(relocate("again")).state == SUCCEEDED
 
 
-def test_after_a_stop_underway_nothing_is_planned_any_more() -> None:
-    """Where the arm is then is not known to the planner: a person must look."""
-    cell = Cell(FakeDriver(stops=1))
-    last = cell.do(relocate())
-    assert last.state == FAILED
-    assert "joint right_elbow stuck" in last.reason
-    for kind in (RelocationGoal.KIND_REST, RelocationGoal.KIND_RELOCATE):
-        again = cell.do(goal(kind, f"again{kind}", source=PLACE, target=OPENINGS[0]))
-        assert again.state == REFUSED
-        assert "a person must bring it to its base pose" in again.reason
-
-
 def test_only_so_many_goals_are_remembered() -> None:
     cell = Cell()
     for number in range(REMEMBERED_GOALS + 5):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from paramove.imitation.arm_pose import UnreachablePoseError
 from paramove.imitation.clearance import ClearanceChecker
+from paramove.imitation.joint_path import joined, joint_motion
 from paramove.imitation.motion import PlannedMotion
 from paramove.imitation.relocation import RelocationPlanner
 
@@ -20,10 +21,19 @@ LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing obj
 _HIGHER_ENTRY = 0.065
 _HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
 _BEHIND_ROW = 0.004
+_HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 
 
 class NoClearPlanError(ValueError):
-    """No way of doing the motion is both reachable and clear; the message says why, way by way."""
+    """No way of doing the motion is both reachable and clear; the message says why, way by way.
+
+    Attributes:
+        in_the_way: Numbers of the standing objects that ways would come too close to.
+    """
+
+    def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
+        super().__init__(message)
+        self.in_the_way = in_the_way
 
 
 class _Way(Protocol):
@@ -67,6 +77,45 @@ class ClearPlans:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
         return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)
 
+    def home(self, angles: FloatArray, holding: bool, standing: FloatArray) -> PlannedMotion:
+        """From measured `angles` [6], rad, wherever they are, to the base pose.
+
+        A held object is put down where it is. An empty hand is opened and withdrawn as after a placing; where it is
+        already above all objects, or where that cannot be done, the arm goes straight in joint angles.
+        """
+        planner = self.planner
+        here = planner.arm.kinematics.forward(angles[:5]).gripper
+        span = planner.arm.fingers_open - planner.arm.fingers_closed
+        opening = 0.0 if holding else float(np.clip((angles[5] - planner.arm.fingers_closed) / span, 0.0, 1.0))
+        start = np.array([*angles[:5], planner.arm.fingers_angle(opening)])
+        grasped = self._checker.grasp_height
+        below = np.array([here[0], here[1], min(here[2], grasped)])
+        put_down: list[_Way] = [partial(planner.deliver, here, below, [], upward) for upward in (False, True)]
+        leave: list[_Way] = [partial(planner.leave, here, opening, upward) for upward in (False, True)]
+        learned = [partial(self._from, start, way, holding) for way in ([*put_down, *leave] if holding else leave)]
+        straight = partial(self._straight, start, planner.base_angles, "retreat")
+        high = here[2] > grasped + _HIGH and not holding
+        return self._first([straight, *learned] if high else [*learned, straight], standing)
+
+    def _from(self, start: FloatArray, way: _Way, holding: bool) -> PlannedMotion:
+        """The motion, begun with a way to its first sample."""
+        motion = way()
+        return joined(self._straight(start, motion.angles[0], "gather", holding), motion)
+
+    def _straight(self, start: FloatArray, end: FloatArray, phase: str, holding: bool = False) -> PlannedMotion:
+        planner = self.planner
+        kinematics = planner.arm.kinematics
+        return joint_motion(
+            start,
+            end,
+            kinematics,
+            planner.velocity,
+            planner.acceleration,
+            phase,
+            planner.options.sample_period,
+            holding,
+        )
+
     def offer(self, place: FloatArray, standing: FloatArray) -> PlannedMotion:
         """Go to `place` with an open hand."""
         return self._first([partial(self.planner.offer, place)], standing)
@@ -76,9 +125,14 @@ class ClearPlans:
         return self._first([partial(self.planner.fingers, here, start, end)], standing)
 
     def _first(self, ways: Sequence[_Way], standing: FloatArray) -> PlannedMotion:
+        if len(standing) > self._checker.n_standing:
+            raise NoClearPlanError(
+                f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
+            )
         middle = self._checker.surface_z + self._checker.cylinder.height / 2
         middles = np.column_stack([standing, np.full(len(standing), middle)])
         reasons = []
+        in_the_way = set()
         for way in ways:
             try:
                 motion = way()
@@ -88,9 +142,11 @@ class ClearPlans:
             closest = self._checker.smallest(motion.angles, middles, motion.holding, every=6)
             if closest.distance >= LEAST_CLEARANCE:
                 return motion
+            if closest.standing is not None:
+                in_the_way.add(closest.standing)
             phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
             reasons.append(
                 f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
                 f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
             )
-        raise NoClearPlanError("; ".join(dict.fromkeys(reasons)))
+        raise NoClearPlanError("; ".join(dict.fromkeys(reasons)), frozenset(in_the_way))

@@ -76,6 +76,7 @@ class ClearanceChecker:
         self._qpos = [int(self._model.jnt_qposadr[self._model.joint(n).id]) for n in robot.joint_names]
         self._data.qpos[self._qpos] = robot.base_pose
         self._moving, self._fixed = self._geoms(side)
+        self._held, self._surface_geom = self._model.geom("held").id, self._model.geom("surface").id
         self._hand_names = {f"{side}_hand", f"{side}_thumb"}
 
     def _compile(self, model_path: Path) -> mujoco.MjModel:
@@ -144,23 +145,35 @@ class ClearanceChecker:
         q = np.asarray(angles, dtype=np.float64)
         held = np.asarray(holding, dtype=bool)
         upright = self._place(np.asarray(standing, dtype=np.float64).reshape(-1, 3))
-        held_geom = self._model.geom("held").id
-        surface = self._model.geom("surface").id
+        always = self._pairs(upright)
+        holding_too = np.concatenate([always, [[self._held, other] for other in upright]]) if upright else always
         columns = [self._qpos[i] for i in (*self._arm.indices, self._arm.fingers_index)]
         worst = Clearance(_FAR, 0, ("", ""))
         for k in range(0, len(q), every):
             self._data.qpos[columns] = q[k]
             mujoco.mj_kinematics(self._model, self._data)
-            pairs = [(g, other) for g in self._moving for other in (surface, *upright)]
-            pairs += [(g, other) for g in self._hand_geoms for other in self._fixed]
-            if held[k]:
-                pairs += [(held_geom, other) for other in upright]
-            for one, two in pairs:
+            for one, two in self._near(holding_too if held[k] else always, worst.distance):
                 distance = mujoco.mj_geomDistance(self._model, self._data, one, two, _FAR, None)
                 if distance < worst.distance:
                     number = upright.index(two) if two in upright else None
                     worst = Clearance(distance, k, (self._name(one), self._name(two)), number)
         return worst
+
+    def _pairs(self, upright: list[int]) -> NDArray[np.int64]:
+        """Shapes whose distance counts, [P, 2], without a held object."""
+        pairs = [(g, other) for g in self._moving for other in (self._surface_geom, *upright)]
+        pairs += [(g, other) for g in self._hand_geoms for other in self._fixed]
+        return np.array(pairs, dtype=np.int64)
+
+    def _near(self, pairs: NDArray[np.int64], distance: float) -> list[tuple[int, int]]:
+        """The pairs that may be closer than `distance`, by the spheres around them; the surface is a box, exactly."""
+        one, two = pairs.T
+        away, radius = self._data.geom_xpos[one] - self._data.geom_xpos[two], self._model.geom_rbound
+        apart = np.linalg.norm(away, axis=1) - radius[two]
+        over = two == self._surface_geom
+        beyond = np.maximum(np.abs(away[over]) - self._model.geom_size[self._surface_geom], 0.0)
+        apart[over] = np.linalg.norm(beyond, axis=1)
+        return [(int(a), int(b)) for a, b in pairs[apart - radius[one] < distance]]
 
     @property
     def _hand_geoms(self) -> list[int]:

@@ -51,9 +51,9 @@ class RelocationPlanner:
     ) -> None:
         self.movement, self.solver, self.arm = movement, solver, arm
         self.options = options or RelocationOptions()
-        self._velocity = np.asarray(velocity, dtype=np.float64)
-        self._acceleration = np.asarray(acceleration, dtype=np.float64)
-        base = np.asarray(base_angles, dtype=np.float64)
+        self.velocity = np.asarray(velocity, dtype=np.float64)
+        self.acceleration = np.asarray(acceleration, dtype=np.float64)
+        self.base_angles = base = np.asarray(base_angles, dtype=np.float64)
         self._base = self._pose_of(base[:5])
         self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
@@ -183,11 +183,7 @@ class RelocationPlanner:
 
     def _outward(self, gripper: FloatArray) -> FloatArray:
         """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
-        least, width = self.solver.reach[0] + self.options.reach_margin, self.options.reach_width
-        distance = np.linalg.norm(gripper, axis=1, keepdims=True)
-        beyond = distance - least
-        softened = np.where(beyond > width, beyond, np.clip(beyond + width, 0.0, None) ** 2 / (4.0 * width))
-        return np.asarray(gripper * (least + softened) / distance)
+        return self.solver.moved_outward(gripper, self.options.reach_margin, self.options.reach_width)
 
     def _move(
         self, path: Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
@@ -257,12 +253,12 @@ class RelocationPlanner:
         fingers = closed + opening * (opened - closed)
         angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)
         share = self.options.limit_share
-        stretched = slowed_times(angles, path.period, share * self._velocity, share * self._acceleration)
+        stretched = slowed_times(angles, path.period, share * self.velocity, share * self.acceleration)
         holding = np.concatenate(path.holding).astype(np.float64)
         columns = np.concatenate([angles, poses.gripper], axis=1)
         times, values = resampled(stretched, columns, path.period)
         for _ in range(_SLOWING_ROUNDS):
-            excess = largest_excess(values[:, :6], path.period, self._velocity, self._acceleration) / _FINAL_SHARE
+            excess = largest_excess(values[:, :6], path.period, self.velocity, self.acceleration) / _FINAL_SHARE
             if excess <= 1.0:
                 break
             stretched = 1.01 * excess * stretched

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
@@ -10,23 +11,22 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
 
 from paramove.imitation.arm_pose import UnreachablePoseError
+from paramove.imitation.arm_state import FELT_OPENING, ArmState
 from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
+from paramove.imitation.goals import FRAME, GoalRefusedError, centimetres, point_of, standing_of
 from paramove.imitation.motion import PlannedMotion
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
-from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 
 FloatArray = NDArray[np.float64]
 
-FRAME = "right_shoulder"
-FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
+STALE_TRIES = 3
+NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
+RESTARTED = "the synthesizer was restarted; the motion it had begun was ended where it led; send a new goal"
 
 _ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
-
-
-class GoalRefusedError(ValueError):
-    """A goal cannot be done; the message says why and what would work."""
 
 
 @dataclass(frozen=True)
@@ -59,19 +59,8 @@ class _Running:
     time_s: float = 0.0
     phase: str = ""
     motions: int = 0
+    stale: int = 0
     elbow_turn: float = 0.0
-
-
-@dataclass
-class _Hand:
-    """What the robot knows of its arm between goals: None where an unplanned stop left it."""
-
-    at_base: bool = True
-    gripper: FloatArray | None = None  # where it waits, if not at the base pose
-    opening: float = 1.0  # ξ that the last motion ended with
-    measured: float = 1.0  # ξ of the measured fingers
-    lost: bool = False
-    known: bool = True
 
 
 class Synthesizer:
@@ -84,8 +73,9 @@ class Synthesizer:
     def __init__(self, plans: ClearPlans) -> None:
         self._plans = plans
         self._arm = plans.planner.arm
-        self._hand = _Hand()
+        self._hand = ArmState(self._arm, plans.planner.base_angles)
         self._running: _Running | None = None
+        self._waiting: RelocationGoal | None = None
         self._newest: dict[str, RelocationStatus] = {}
         self._statuses: list[RelocationStatus] = []
         self._trajectories: list[JointTrajectory] = []
@@ -104,22 +94,34 @@ class Synthesizer:
         """Whether the hand is commanded to be closed and its fingers feel something."""
         return self._commanded_opening() < FELT_OPENING < self._hand.measured
 
+    @property
+    def sentence(self) -> str:
+        """What it does, for people."""
+        if self._running is not None:
+            return f"goal {self._running.goal.id}: {self._running.phase or 'begins'}"
+        if self._waiting is not None:
+            return f"goal {self._waiting.id} waits until the arm rests, for where it is is not known yet"
+        return "waiting for a goal"
+
     def on_goal(self, goal: RelocationGoal) -> None:
-        """Accept or refuse a goal. The same id again is answered with its newest status and not done twice."""
+        """Accept or refuse a goal. The same id again is answered with its newest status and not done twice.
+
+        While it is not known where the arm is (see `ArmState`), the newest goal waits until the arm rests.
+        """
         known = self._newest.get(goal.id)
         if known is not None:
             self._statuses.append(known)
-            return
-        try:
-            self._begin(goal)
-        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
-            self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
+        elif goal.asked_again:
+            self._say(goal.id, RelocationStatus.STATE_FAILED, reason=RESTARTED)
+        elif self._running is None and not self._hand.find_out(self._now_ns):
+            self._waiting = goal
+        else:
+            self._begin_or_refuse(goal)
 
     def on_joint_states(self, message: JointStates) -> None:
-        """Hear the measured joints: the fingers tell whether something is held."""
-        for joint in message.joints:
-            if joint.name == self._arm.fingers:
-                self._hand.measured = self._opening(joint.position)
+        """Hear the measured joints: where the arm is, and by the fingers whether something is held."""
+        if not self._hand.hear(message, self._now_ns):
+            return
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
             self._hand.lost |= self._hand.measured <= FELT_OPENING
@@ -128,13 +130,20 @@ class Synthesizer:
         """Hear how the driver fares with the motion under way."""
         running = self._running
         if running is None or running.message is None or status.trajectory_id != running.message.id:
+            self._on_status_of_others(status)
+            return
+        if status.state == TrajectoryStatus.STATE_REFUSED and status.code == "stale" and running.stale < STALE_TRIES:
+            running.stale += 1  # planning took longer than the driver waits: it is said again with the time of now
+            running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
+            return
+        if not math.isfinite(status.time_s):
             return
         running.acknowledged = True
         running.time_s = status.time_s
         if status.state == TrajectoryStatus.STATE_SUCCEEDED:
             self._next_motion(running)
         elif status.state in _ENDED:
-            self._hand.known = status.state == TrajectoryStatus.STATE_REFUSED
+            self._hand.forget()
             self._end(running, _Outcome(False, f"the arm driver ended the motion: {status.reason}"))
         else:
             self._say_phase(running)
@@ -142,6 +151,9 @@ class Synthesizer:
     def tick(self, now_ns: int) -> SynthesizerSays:
         """Once per turn: what is to be said."""
         self._now_ns = now_ns
+        if self._waiting is not None and self._running is None and self._hand.find_out(now_ns):
+            waiting, self._waiting = self._waiting, None
+            self._begin_or_refuse(waiting)
         running = self._running
         unheard = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
         if running is not None and running.message is not None and unheard:
@@ -152,61 +164,80 @@ class Synthesizer:
         self._trajectories, self._statuses = [], []
         return says
 
+    def _on_status_of_others(self, status: TrajectoryStatus) -> None:
+        """A motion that an earlier process began, or one that was given up here, moves the arm."""
+        if status.state in (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_EXECUTING):
+            self._hand.moved_by_others(self._now_ns)
+            if self._running is None:
+                self._hand.forget()
+
     # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
 
     def _relocate(self, goal: RelocationGoal) -> _Course:
-        source, target, standing = _point(goal, "from"), _point(goal, "to"), _standing(goal)
+        source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         if not self._hand.at_base:
-            raise GoalRefusedError("the arm is not at its base pose; send a goal of kind REST first")
+            raise GoalRefusedError(NOT_AT_BASE)
         fetch = self._plans.fetch(source, standing)
         lifted = fetch.gripper[-1]
         deliver = self._plans.deliver(lifted, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
             yield self._plans.leave(lifted, self._hand.opening, standing)
-            return _Outcome(False, f"felt nothing in the hand at {_cm(source)} cm")
+            return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm")
         yield deliver
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
-        yield self._plans.offer(_point(goal, "from"), _standing(goal))
+        if not self._hand.at_base:
+            raise GoalRefusedError(NOT_AT_BASE)
+        yield self._plans.offer(point_of(goal, "from"), standing_of(goal))
         return _Outcome(True)
 
     def _take(self, goal: RelocationGoal) -> _Course:
         here, options = self._waits_at(), self._plans.planner.options
-        yield self._plans.fingers(here, self._hand.opening, options.closed_opening, _standing(goal))
+        yield self._plans.fingers(here, self._hand.opening, options.closed_opening, standing_of(goal))
         if self.holding:
             return _Outcome(True)
-        yield self._plans.fingers(here, self._hand.opening, options.offer_opening, _standing(goal))
+        yield self._plans.fingers(here, self._hand.opening, options.offer_opening, standing_of(goal))
         return _Outcome(False, "closed the hand and felt nothing")
 
     def _release(self, goal: RelocationGoal) -> _Course:
         opening = self._plans.planner.options.offer_opening
-        yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, _standing(goal))
+        yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, standing_of(goal))
         return _Outcome(True)
 
     def _place_held(self, goal: RelocationGoal) -> _Course:
-        target = _point(goal, "to")
+        target = point_of(goal, "to")
         if not self.holding:
             raise GoalRefusedError("nothing is held; take an object first")
-        yield self._plans.deliver(self._waits_at(), target, _standing(goal))
+        yield self._plans.deliver(self._waits_at(), target, standing_of(goal))
         return self._placed(target)
 
     def _rest(self, goal: RelocationGoal) -> _Course:
-        if not self._hand.at_base:
-            yield self._plans.leave(self._waits_at(), self._hand.opening, _standing(goal))
+        if self._hand.found is not None:
+            yield self._plans.home(self._hand.found, self.holding, standing_of(goal))
+        elif not self._hand.at_base:
+            yield self._plans.leave(self._waits_at(), self._hand.opening, standing_of(goal))
         return _Outcome(True)
 
     def _placed(self, target: FloatArray) -> _Outcome:
         if self._hand.lost:
-            return _Outcome(False, f"the object slipped out of the hand on the way to {_cm(target)} cm")
+            return _Outcome(False, f"the object slipped out of the hand on the way to {centimetres(target)} cm")
         return _Outcome(True)
 
+    def _begin_or_refuse(self, goal: RelocationGoal) -> None:
+        try:
+            self._begin(goal)
+        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
+            self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
+            if isinstance(refusal, NoClearPlanError):
+                self._newest[goal.id].in_the_way.extend(sorted(refusal.in_the_way))
+
     def _begin(self, goal: RelocationGoal) -> None:
+        if not goal.id:
+            raise GoalRefusedError("a goal without an id; give each goal an id of its own")
         if self._running is not None:
             raise GoalRefusedError(f"busy with goal {self._running.goal.id}; one goal at a time")
-        if not self._hand.known:
-            raise GoalRefusedError("the arm was stopped at an unplanned place; a person must bring it to its base pose")
         if goal.frame != FRAME:
             raise GoalRefusedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
         course = self._courses.get(goal.kind)
@@ -228,12 +259,8 @@ class Synthesizer:
             return outcome
 
     def _next_motion(self, running: _Running) -> None:
-        motion = running.motion
-        assert motion is not None
-        base = motion.phases[-1][0] == "retreat"
-        self._hand.at_base = base
-        self._hand.gripper = None if base else motion.gripper[-1]
-        self._hand.opening = self._opening(float(motion.angles[-1, 5]))
+        assert running.motion is not None
+        self._hand.ended(running.motion)
         try:
             self._start_or_end(running, self._advance(running))
         except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as error:
@@ -244,7 +271,7 @@ class Synthesizer:
             self._end(running, step)
             return
         running.motions += 1
-        running.motion, running.acknowledged, running.time_s = step, False, 0.0
+        running.motion, running.acknowledged, running.time_s, running.stale = step, False, 0.0, 0
         running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
         running.message = self._trajectory(f"{running.goal.id}/{running.motions}", step)
         running.sent_ns = self._now_ns
@@ -294,33 +321,9 @@ class Synthesizer:
         if running is None or running.motion is None:
             return self._hand.opening
         sample = min(int(np.searchsorted(running.motion.times, running.time_s)), len(running.motion.times) - 1)
-        return self._opening(float(running.motion.angles[sample, 5]))
-
-    def _opening(self, fingers: float) -> float:
-        """ξ of an angle of the fingers."""
-        span = self._arm.fingers_open - self._arm.fingers_closed
-        return float(np.clip((fingers - self._arm.fingers_closed) / span, 0.0, 1.0))
+        return self._hand.opening_of(float(running.motion.angles[sample, 5]))
 
     def _waits_at(self) -> FloatArray:
         if self._hand.gripper is None:
             raise GoalRefusedError("the arm is at its base pose; offer the hand first")
         return self._hand.gripper
-
-
-def _point(goal: RelocationGoal, name: str) -> FloatArray:
-    if not goal.HasField(name):
-        raise GoalRefusedError(f"the goal lacks its position {name!r}")
-    position: Position = getattr(goal, name)
-    point = np.array([position.x, position.y, position.z])
-    if not np.isfinite(point).all():
-        raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
-    return point
-
-
-def _standing(goal: RelocationGoal) -> FloatArray:
-    """Places of the objects to keep clear of, [M, 2]."""
-    return np.array([[place.x, place.y] for place in goal.avoid]).reshape(-1, 2)
-
-
-def _cm(point: FloatArray) -> str:
-    return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"

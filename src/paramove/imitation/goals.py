@@ -1,0 +1,40 @@
+"""What a relocation goal asks for, checked before anything is planned."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal
+
+FloatArray = NDArray[np.float64]
+
+FRAME = "right_shoulder"
+
+
+class GoalRefusedError(ValueError):
+    """A goal cannot be done; the message says why and what would work."""
+
+
+def point_of(goal: RelocationGoal, name: str) -> FloatArray:
+    """Position `name` ("from" or "to") of a goal, [3], m; raises GoalRefusedError if it lacks or is not finite."""
+    if not goal.HasField(name):
+        raise GoalRefusedError(f"the goal lacks its position {name!r}")
+    position: Position = getattr(goal, name)
+    point = np.array([position.x, position.y, position.z])
+    if not np.isfinite(point).all():
+        raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
+    return point
+
+
+def standing_of(goal: RelocationGoal) -> FloatArray:
+    """Places of the objects to keep clear of, [M, 2], m; raises GoalRefusedError if one is not finite."""
+    places = np.array([[place.x, place.y] for place in goal.avoid]).reshape(-1, 2)
+    if not np.isfinite(places).all():
+        raise GoalRefusedError(f"the places to avoid are {places.tolist()}; finite numbers in m are needed")
+    return places
+
+
+def centimetres(point: FloatArray) -> str:
+    """A place in words, in cm."""
+    return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"
