@@ -1,21 +1,31 @@
-"""`paramove node`: the nodes on the bus."""
+"""`paramove node`: the nodes on the bus, looked at and, one at a time, stopped, started or restarted."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import threading
+import time
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from paramove.bus import inspection
+from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show
 from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.supervision.control import NoRunError, ask
 
-app = typer.Typer(name="node", help="Look at the nodes on the bus.", no_args_is_help=True)
+app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start or restart one.", no_args_is_help=True)
+
+NameArgument = Annotated[str, typer.Argument(help="name in the launch file", autocompletion=completions.nodes)]
+WaitOption = Annotated[float, typer.Option("--wait", min=0.0, metavar="SECONDS", help="for it to be done")]
+REFUSED = 1
+LOOK_PERIOD_S = 0.05
 
 
 @app.callback()
 def _group() -> None:
-    """Look at the nodes on the bus."""
+    """Look at the nodes on the bus; stop, start or restart one."""
 
 
 @app.command("list")
@@ -24,25 +34,97 @@ def list_nodes(
     as_json: JsonOption = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="how long to wait for an answer")] = 2.0,
 ) -> None:
-    """List the nodes: state, what they say of themselves, messages, losses, seconds spent."""
-    rows = []
-    for node, status in inspection.statuses(bus_folder(domain), seconds).items():
-        if status is None:
-            status = NodeStatus(sentence=f"alive, did not answer within {seconds:g} s")
-        state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower()
-        rows.append(
-            {
-                "node": node,
-                "state": state if status.state else "busy",
-                "pid": status.pid or None,
-                "processed": status.processed,
-                "seconds": round(status.processing_seconds, 3),
-                "heard": sum(count.messages for count in status.heard),
-                "lost": sum(count.lost for count in status.heard),
-                "refused": sum(count.refused for count in status.heard),
-                "sentence": status.sentence,
-            }
-        )
+    """List the nodes: state, what they say of themselves, messages, losses, seconds spent, restarts and last end."""
+    folder = bus_folder(domain)
+    try:
+        supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
+    except NoRunError:  # nodes that were started one by one
+        supervised = {}
+    said = inspection.statuses(folder, seconds)
+    rows = [_row(node, said.get(node), node in said, supervised.get(node), seconds) for node in {**supervised, **said}]
     if not rows and not as_json:
         typer.echo("no node is on the bus")
     show(rows, as_json)
+
+
+@app.command()
+def stop(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption = 10.0) -> None:
+    """Stop one node. A required one with `restart: never` takes the run with it; no other node does."""
+    _do("stop", name, bus_folder(domain), wait_s)
+
+
+@app.command()
+def start(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption = 40.0) -> None:
+    """Start a node that has ended or was stopped, and wait until it is ready."""
+    _do("start", name, bus_folder(domain), wait_s)
+
+
+@app.command()
+def restart(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption = 40.0) -> None:
+    """Stop one node, start it again, and wait until it is ready. An arm's driver comes back disarmed."""
+    _do("restart", name, bus_folder(domain), wait_s)
+
+
+def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
+    """Asks the supervisor and follows what comes of it."""
+    try:
+        before = _supervised(folder, name)
+        answer = ask(folder, {"do": action, "node": name})
+        if not answer["ok"]:
+            typer.echo(answer["sentence"], err=True)
+            raise typer.Exit(REFUSED)
+        found = _followed(folder, name, action, wait_s, None if action == "stop" else (before or {}).get("pid"))
+    except NoRunError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(REFUSED) from None
+    if found is None:
+        typer.echo(f"{name} was stopped; the run has ended with it")
+        return
+    typer.echo(f"{name} is {found['state']}: {found['sentence']}")
+    if found["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):
+        raise typer.Exit(REFUSED)
+
+
+def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> dict[str, Any] | None:
+    """The node's row once the action has come to its end or the patience to its; None if the run has ended."""
+    ends = ("stopped", "given up") if action == "stop" else ("ready", "degraded", "failed", "given up", "restarting")
+    end_s = time.monotonic() + wait_s
+    pause = threading.Event()
+    while True:
+        try:
+            row = _supervised(folder, name)
+        except NoRunError:
+            return None
+        if row is None or time.monotonic() > end_s:
+            return row
+        if row["state"] in ends and (row["pid"] is None or row["pid"] != old_pid):
+            return row
+        pause.wait(LOOK_PERIOD_S)
+
+
+def _supervised(folder: Path, name: str) -> dict[str, Any] | None:
+    rows: list[dict[str, Any]] = ask(folder, {"do": "list"})["nodes"]
+    return next((row for row in rows if row["node"] == name), None)
+
+
+def _row(
+    node: str, status: NodeStatus | None, alive: bool, supervised: dict[str, Any] | None, seconds: float
+) -> dict[str, Any]:
+    """A line of the list, from what the node says and what its supervisor knows of it."""
+    if status is None:
+        status = NodeStatus(sentence=f"alive, did not answer within {seconds:g} s" if alive else "")
+    state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower() if status.state else "busy"
+    known = supervised or {"state": state, "sentence": "", "restarts": None, "exit_reason": ""}
+    return {
+        "node": node,
+        "state": known["state"],
+        "pid": status.pid or known.get("pid"),
+        "processed": status.processed,
+        "seconds": round(status.processing_seconds, 3),
+        "heard": sum(count.messages for count in status.heard),
+        "lost": sum(count.lost for count in status.heard),
+        "refused": sum(count.refused for count in status.heard),
+        "restarts": known["restarts"],
+        "last_end": known["exit_reason"],
+        "sentence": status.sentence or known["sentence"],
+    }

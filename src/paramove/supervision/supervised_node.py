@@ -30,6 +30,8 @@ class State(enum.Enum):
     GIVEN_UP = "given up"
 
 
+USUAL_ENDS = ("", "finished", "stopped on request")
+"""What nodes say when there is no more to be said of their end."""
 ENDED = frozenset({State.STOPPED, State.FINISHED, State.GIVEN_UP})
 _SAID = {
     NodeStatus.STATE_READY: State.READY,
@@ -40,6 +42,8 @@ _SAID = {
 
 _AT_WORK = (State.READY, State.DEGRADED, State.FAILED)
 MEASURE_PERIOD_S = 1.0
+STOP_S = 5.0
+"""From SIGTERM to SIGKILL."""
 LONGEST_LOOK_S = 0.5
 """Silence between two looks counts for so long at most: a launcher that was stopped itself has heard nobody."""
 
@@ -56,7 +60,7 @@ class SupervisedNode:
     Attributes:
         sentence: What the node said last, or what happened to it in words that follow its name.
         event: What has just changed: `started`, `ready`, `degraded`, `failed`, `suspended`, `resumed`, `fault` (the
-            supervisor kills it), `ended`, `asked` (to end), `stopped`.
+            supervisor kills it), `ended`, `given_up`, `asked` (to end), `stopped` (it did not run).
         exit_code: Of its last end, negative: number of the signal; None before.
         exit_reason: How it ended last and why, in words that follow its name; empty before.
         came_back: How it ended and what it says since it is up again, once it was restarted; empty before.
@@ -95,6 +99,8 @@ class SupervisedNode:
         self._before = State.STARTING  # it was suspended
         self._suspended_s = 0.0
         self._end = ""
+        self._by_hand = ""  # what a person wants: that it is stopped or restarted
+        self._asked_s = 0.0
 
     @property
     def is_up(self) -> bool:
@@ -146,6 +152,8 @@ class SupervisedNode:
             self.process = None
             return code
         if self.state is State.STOPPING:
+            if self._by_hand and now_s >= self._deadline_s:
+                self.process.kill()
             return None
         self._look(self.process.halted(), now_s)
         if not self._killed_for:
@@ -192,8 +200,12 @@ class SupervisedNode:
     def conclude(self, code: int, now_s: float) -> None:
         """Draws the consequence of an end that nobody asked for: restart, finished or given up."""
         self.exit_code = code
+        if self._by_hand:
+            self._conclude_by_hand(code, now_s)
+            return
         self._end = self._killed_for or describe(code)
-        if not self._killed_for and self.status.state == NodeStatus.STATE_FAILED:
+        said_why = self.status.state == NodeStatus.STATE_STOPPED and self.status.sentence not in USUAL_ENDS
+        if not self._killed_for and (said_why or self.status.state == NodeStatus.STATE_FAILED):
             self._end += f" ({printable(self.status.sentence)})"
         verdict = self._policy.after_exit(FAILURE if self._killed_for else code, now_s)
         if self.settings.restart_ends_run and self.restarts > 0 and not self.came_back:
@@ -205,8 +217,45 @@ class SupervisedNode:
         else:
             self._become(State.GIVEN_UP if verdict.failed else State.FINISHED, self.exit_reason, "ended")
 
+    def stop_by_hand(self, now_s: float, restart: bool = False) -> None:
+        """Stops the node alone, because a person wants it so; it is killed if it takes too long.
+
+        Args:
+            now_s: On the monotonic clock.
+            restart: Whether it is started again when it has ended.
+        """
+        if self.process is None:
+            self.exit_reason = "was stopped by hand"
+            self._become(State.STOPPED, "by hand", "stopped")
+            return
+        self._by_hand = "restarted" if restart else "stopped"
+        self._asked_s = now_s
+        self._deadline_s = now_s + STOP_S
+        self.process.terminate()
+        self._become(State.STOPPING, f"to be {self._by_hand} by hand", "asked")
+
+    def start_by_hand(self, now_s: float) -> None:
+        """Starts a node that has ended, without waiting and beside the budget of restarts."""
+        self.restarts += 1
+        self._end = self.exit_reason
+        self.start(now_s)
+
+    def _conclude_by_hand(self, code: int, now_s: float) -> None:
+        """Draws the consequence of an end that a person asked for."""
+        restart = self._by_hand == "restarted"
+        self._end = f"was {self._by_hand} by hand"
+        self.exit_reason = self._end if code == OK else f"{self._end}, {describe(code)}"
+        self._by_hand = ""
+        self._become(State.STOPPED, f"by hand, {now_s - self._asked_s:.1f} s after it was asked", "ended")
+        if restart:
+            self.restarts += 1
+            self.start(now_s)
+        elif self.settings.required and self.settings.restart == "never":
+            self._become(State.GIVEN_UP, self.exit_reason, "given_up")
+
     def stop(self) -> None:
         """Asks the process to end; one that is not running just stops waiting."""
+        self._by_hand = ""
         if self.process is not None:
             self.process.terminate()
             self._become(State.STOPPING, "", "asked")

@@ -9,10 +9,11 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision import exit_codes
+from paramove.supervision import by_hand, exit_codes
+from paramove.supervision.control import Answer, ControlServer
 from paramove.supervision.domain import Domain
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.interrupts import Interrupts
@@ -21,12 +22,10 @@ from paramove.supervision.launch_schema import LaunchFile
 from paramove.supervision.listener import Listener
 from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
 from paramove.supervision.run_folder import RunFolder
-from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
+from paramove.supervision.supervised_node import ENDED, STOP_S, State, SupervisedNode
 
 TURN_S = 0.05
 """Longest wait between two looks at the bus; the end of a process is seen at once."""
-STOP_S = 5.0
-"""From SIGTERM to SIGKILL for one wave of nodes."""
 STOP_ALL_S = 10.0
 """For all waves together."""
 
@@ -84,6 +83,7 @@ class Supervisor:
         }
         self._listener_folder = domain.folder
         self._environment = node_environment(os.environ)
+        self._ending = False
 
     def run(self) -> Outcome:
         """Starts, supervises and ends the nodes, then calls `after_run`.
@@ -91,7 +91,13 @@ class Supervisor:
         An interrupted run is not judged: `after_run` is left out.
         """
         listener = Listener(self._listener_folder, self.nodes, self._hear, self._view.story)
-        with EventLog(self._folder.events) as self._events, Guard() as self._guard, self._interrupts:
+        control = ControlServer(self._listener_folder, self._by_hand)
+        with (
+            EventLog(self._folder.events) as self._events,
+            Guard() as self._guard,
+            self._interrupts,
+            control as self._control,
+        ):
             self._events.write("run_begins", pid=os.getpid())
             try:
                 outcome = self._supervise(listener)
@@ -105,6 +111,9 @@ class Supervisor:
                 outcome = self._judge(self._file.after_run, outcome)
             self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
+
+    def _by_hand(self, request: dict[str, Any]) -> Answer:
+        return by_hand.answer(self.nodes, request, self._ending)
 
     def _changed(self, node: SupervisedNode) -> None:
         """First the log, by which reactions are measured, then the screen."""
@@ -127,7 +136,7 @@ class Supervisor:
             self._start_due()
             for node, code in self._turn(listener):
                 node.conclude(code, time.monotonic())
-                if node.state is State.GIVEN_UP:
+                if node.state is State.GIVEN_UP and node.event == "ended":
                     self._show_log(node)
             outcome = self._outcome(limit_s)
             if outcome is not None:
@@ -144,13 +153,15 @@ class Supervisor:
         Returns the nodes that have just ended, with exit codes.
         """
         poll = select.poll()
-        poll.register(self._interrupts.wake_fd, select.POLLIN)
+        for descriptor in (self._interrupts.wake_fd, *self._control.descriptors):
+            poll.register(descriptor, select.POLLIN)
         for node in self.nodes.values():
             if node.process is not None:
                 poll.register(node.process.pidfd, select.POLLIN)
         poll.poll(TURN_S * 1e3)
         if not self._interrupts.urgent:
             _drain(self._interrupts.wake_fd)
+        self._control.serve()
         listener.listen()
         now_s = time.monotonic()
         checked = [(node, node.check(now_s)) for node in self.nodes.values()]
@@ -187,6 +198,7 @@ class Supervisor:
         return [node.name for node in waiting if given_up.intersection(node.settings.after)]
 
     def _stop_all(self, listener: Listener) -> None:
+        self._ending = True
         end_s = time.monotonic() + STOP_ALL_S
         for node in self.nodes.values():
             if not node.is_running:

@@ -1,0 +1,158 @@
+"""One node of a running application stopped, started, restarted by hand."""
+
+import json
+import os
+import signal
+import socket
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from paramove.cli.main import build
+from paramove.supervision import exit_codes
+from paramove.supervision.control import ControlServer, NoRunError, ask
+
+THREE = """
+nodes:
+  camera: {module: nodes.silent_actor, restart: on-failure}
+  arm: {module: nodes.silent_actor, restart: on-failure, restart_ends_run: true}
+  main: {module: nodes.silent_actor}
+"""
+
+
+def node(*arguments):
+    return CliRunner().invoke(build("node"), ["node", *arguments])
+
+
+def rows():
+    return {row["node"]: row for row in json.loads(node("list", "--json").stdout)}
+
+
+@pytest.fixture
+def launcher(workspace):
+    workspace.write(THREE)
+    started = workspace.start()
+    for name in ("camera", "arm", "main"):
+        workspace.await_happening(started, name, "ready")
+    return started
+
+
+def test_node_is_stopped_and_started_and_the_run_goes_on(workspace, launcher):
+    pid = rows()["camera"]["pid"]
+    done = node("stop", "camera")
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith("camera is stopped: by hand, ")
+    row = rows()["camera"]
+    assert (row["state"], row["pid"], row["last_end"]) == ("stopped", None, "was stopped by hand")
+    again = node("stop", "camera")
+    assert again.exit_code == 1
+    assert again.output == "camera does not run (stopped)\n"
+    done = node("start", "camera")
+    assert done.output == "camera is ready: all set\n"
+    row = rows()["camera"]
+    assert row["pid"] not in (None, pid)
+    assert row["restarts"] == 1
+    assert launcher.poll() is None
+
+
+def test_node_is_restarted(workspace, launcher):
+    pid = rows()["camera"]["pid"]
+    done = node("restart", "camera")
+    assert done.exit_code == 0, done.output
+    assert done.output == "camera is ready: all set\n"
+    row = rows()["camera"]
+    assert row["pid"] != pid
+    assert row["last_end"] == "was restarted by hand"
+    assert workspace.events.count("camera ended") == 1  # in order, not killed
+
+
+def test_list_keeps_the_reason_of_an_end(workspace, launcher):
+    first = rows()["camera"]["pid"]
+    os.kill(first, signal.SIGKILL)
+    workspace.await_happening(launcher, "camera", "ended")
+    assert rows()["camera"]["last_end"] == "was killed (SIGKILL); restart 1 in 0.5 s"
+    assert "was killed (SIGKILL)" in node("list").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("restart", "camra"), "there is no node 'camra'; did you mean 'camera'?"),
+        (("stop", "lamp"), "there is no node 'lamp'; there are: arm, camera, main"),
+        (("start", "camera"), "camera runs already (ready)"),
+        (("restart", "main"), "main cannot go on in a new process (restart: never in the launch file); end the run"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_the_reason(launcher, arguments, told):
+    done = node(*arguments)
+    assert done.exit_code == 1
+    assert told in done.output
+    assert launcher.poll() is None
+
+
+def test_run_ends_with_a_required_node_that_cannot_be_started_again(launcher):
+    done = node("stop", "main")
+    assert done.exit_code in (0, 1), done.output
+    shown = launcher.communicate(timeout=60)[0]
+    assert launcher.returncode == exit_codes.FAILURE
+    assert "main was stopped by hand; the run cannot go on without it" in shown
+
+
+def test_run_ends_after_the_restart_of_a_node_that_must_not_go_on(launcher):
+    node("restart", "arm")
+    shown = launcher.communicate(timeout=60)[0]
+    assert launcher.returncode == exit_codes.FAILURE
+    assert "arm was restarted by hand and is back: all set; the run has ended" in shown
+
+
+def test_nothing_runs(workspace):
+    assert node("stop", "camera").exit_code == 1
+    folder = Path(os.environ["XDG_RUNTIME_DIR"]) / "paramove" / "default"
+    folder.mkdir(parents=True, mode=0o700)
+    done = node("stop", "camera")
+    assert done.exit_code == 1
+    assert f"nothing is running that could be asked at {folder}" in done.output
+
+
+@pytest.fixture
+def server(workspace):
+    with ControlServer(Path(os.environ["XDG_RUNTIME_DIR"]), lambda request: {"ok": True, "heard": request}) as made:
+        yield made
+
+
+def connected():
+    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    client.settimeout(10)
+    client.connect(str(Path(os.environ["XDG_RUNTIME_DIR"]) / "control"))
+    return client
+
+
+@pytest.mark.parametrize("sent", [b"no json\n", b"[1, 2]\n", b"\xff\xfe\n", b"3\n"])
+def test_what_is_no_request_is_told_so(server, sent):
+    with connected() as client:
+        client.sendall(sent)
+        server.serve()
+        assert json.loads(client.recv(4096)) == {"ok": False, "sentence": "a request is an object in JSON on one line"}
+
+
+def test_request_may_come_in_pieces_and_too_long_a_one_is_hung_up_on(server):
+    with connected() as client, connected() as flood:
+        client.sendall(b'{"do": ')
+        flood.sendall(b"x" * 10_000)
+        for _ in range(3):
+            server.serve()
+        client.sendall(b'"list"}\n')
+        server.serve()
+        assert json.loads(client.recv(4096)) == {"ok": True, "heard": {"do": "list"}}
+        with pytest.raises((ConnectionResetError, AssertionError)):
+            assert flood.recv(10)
+        assert len(server.descriptors) == 1
+
+
+def test_socket_is_private_and_gone_afterwards(workspace):
+    folder = Path(os.environ["XDG_RUNTIME_DIR"])
+    with ControlServer(folder, lambda _: {}):
+        assert (folder / "control").stat().st_mode & 0o777 == 0o600
+    with pytest.raises(NoRunError, match="start it with `paramove launch`"):
+        ask(folder, {"do": "list"})
