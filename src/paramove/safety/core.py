@@ -119,12 +119,20 @@ class SafetyCore:
             else:
                 self.state = State.DISARMED
         elif self.state in (State.DISARMED, State.HOLD):
-            refusals = self.arming_faults(word, measured)
+            refusals = (*self._age_fault(now_ns, word), *self.arming_faults(word, measured))
             self.faults = refusals
             if not refusals:
                 self.state = State.ARMED
                 self._sent = None
         return None
+
+    def _age_fault(self, now_ns: int, word: ArmWord) -> tuple[Fault, ...]:
+        """A word to arm counts only while the person who said it still looks; one to disarm always counts."""
+        age_ms, allowed_ms = (now_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
+        if age_ms <= allowed_ms:
+            return ()
+        sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
+        return (Fault("arming_stale", "", sentence),)
 
     def arming_faults(self, word: ArmWord, measured: Measured) -> tuple[Fault, ...]:
         """Every check that fails; none means that the gate may be armed."""

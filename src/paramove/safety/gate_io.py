@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+PERSON_STOP = "person_stop"
+"""Code of the fault that a person's stop latches."""
+
 
 class State(enum.Enum):
     """What the gate lets pass: rows only in ARMED, a stop ramp in STOPPING."""
@@ -92,5 +95,6 @@ class SafetySettings:
 
     measured_timeout_ms: float = 500.0
     proposal_age_ms: float = 250.0
+    word_age_ms: float = 1000.0
     lost_rows_ms: float = 500.0
     pose_tolerance: float = float(np.deg2rad(0.5))

@@ -58,7 +58,7 @@ def check_trajectory(
     positions: Sequence[Sequence[float]],
     commanded: FloatArray,
     limits: MotionLimits,
-    start_tolerance: float,
+    start_tolerance: ArrayLike,
 ) -> CheckedPath:
     """Check a trajectory and expand it to rows at the stream's period.
 
@@ -68,7 +68,8 @@ def check_trajectory(
         positions: P lists of angles in rad, each as long as `joints`.
         commanded: The pose that the robot is commanded to hold now, [J], rad.
         limits: Of all J joints.
-        start_tolerance: How far the first point may lie from `commanded`, rad. The difference is faded out.
+        start_tolerance: How far the first point may lie from `commanded`, rad, for all joints or [J]. The difference is
+            faded out.
 
     Raises:
         TrajectoryRefusedError: With the point, the joint, what was asked and what is allowed.
@@ -76,7 +77,8 @@ def check_trajectory(
     places = _places(joints, limits)
     points = _points(joints, positions)
     times = _times(times_s, len(points))
-    _check_points(joints, points, places, commanded, limits, start_tolerance)
+    tolerance = np.broadcast_to(np.asarray(start_tolerance, dtype=np.float64), commanded.shape)[places]
+    _check_points(joints, points, places, commanded, limits, tolerance)
     segment, column, detour = largest_detour(times, points)
     if detour > MAX_DETOUR:
         allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
@@ -139,7 +141,7 @@ def _check_points(
     places: NDArray[np.intp],
     commanded: FloatArray,
     limits: MotionLimits,
-    start_tolerance: float,
+    tolerance: FloatArray,
 ) -> None:
     lower, upper = np.rad2deg(limits.lower[places]), np.rad2deg(limits.upper[places])
     degrees = np.rad2deg(points)
@@ -149,9 +151,9 @@ def _check_points(
         allowed = f"{lower[column]:.4g} to {upper[column]:.4g} deg"
         raise TrajectoryRefusedError("joint_limit", index, joints[column], f"{degrees[index, column]:.4g} deg", allowed)
     away = np.abs(points[0] - commanded[places])
-    if (away > start_tolerance).any():
-        column = int(np.argmax(away))
-        allowed = f"within {np.rad2deg(start_tolerance):.3g} deg of the commanded {_deg(commanded[places][column])}"
+    if (away > tolerance).any():
+        column = int(np.argmax(np.where(away > tolerance, away, 0.0)))
+        allowed = f"within {np.rad2deg(tolerance[column]):.3g} deg of the commanded {_deg(commanded[places][column])}"
         raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 

@@ -22,7 +22,7 @@ from paramove.robots.hoap3.execution import Execution
 from paramove.robots.hoap3.robot_report import RobotReport
 from paramove.robots.hoap3.stream import StreamWriter
 from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import ArmWord, Fault, Inputs, Proposal, State
+from paramove.safety.gate_io import PERSON_STOP, ArmWord, Fault, Inputs, Proposal, State
 from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
 
@@ -37,11 +37,11 @@ SAFETY_STATES = {
 }
 # A trajectory heard later than this after it was made is a replay or comes from a queue that was stuck.
 MAX_TRAJECTORY_AGE_S = 1.0
+# A driver that did nothing for longer has let the robot run out of rows; what waited for it meanwhile is dropped.
+MAX_STALL_S = 0.5
 # The stop ramp's path ahead of the last row sent; a ramp from the operating limits runs over 0.1 s of it.
 AHEAD_ROWS = 400
 TICKS_PER_PROGRESS = 5
-PERSON_STOP = "person_stop"
-"""Code of the fault that a person's stop latches."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +67,12 @@ class ArmDriver:
     def __init__(self, description: RobotDescription) -> None:
         self._description = description
         self._limits = MotionLimits.of(description)
+        self._start_tolerance = _start_tolerance(description)
         self._begin_at(0)
         self._report: RobotReport | None = None
         self._reported = False
         self._words: list[ArmWord] = []
+        self._asked: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
         self._execution: Execution | None = None
         self._statuses: list[TrajectoryStatus] = []
@@ -106,27 +108,25 @@ class ArmDriver:
         self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
-        """Accept or refuse a trajectory. The same id again is answered with its newest status and not played twice."""
-        known = self._last_status.get(message.id)
-        if known is not None:
-            self._statuses.append(known)
-            return
-        try:
-            self._begin(message, captured_ns)
-        except TrajectoryRefusedError as refusal:
-            self._refused += 1
-            self._say(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(refusal))
+        """Hear a trajectory: `tick` accepts or refuses it by its own time.
+
+        The same id again is answered with its newest status and not played twice.
+        """
+        self._asked.append((message, captured_ns))
 
     def tick(self, now_ns: int) -> DriverSays:
         """One camera period: what to send to the robot and what to say of it."""
         if not self._ticks:
             self._begin_at(now_ns)
+        stalled_s = (now_ns - self._now_ns) * 1e-9
+        stalled_s = stalled_s if stalled_s > MAX_STALL_S else 0.0
         self._now_ns = now_ns
         self._ticks += 1
+        self._judge_asked(stalled_s)
         words: list[ArmWord | None] = [*self._words] or [None]
         self._words.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
-        stop = self._stop or self._fault_of_stream(now_ns)
+        stop = self._stop or self._fault_of_stall(stalled_s) or self._fault_of_stream(now_ns)
         proposal = self._proposal(now_ns)
         targets = None
         for word in words:
@@ -140,6 +140,25 @@ class ArmDriver:
         joint_states = self._report.joint_states() if self._report and self._reported else None
         self._reported = False
         return DriverSays(stream, joint_states, statuses, self._safety_state(now_ns))
+
+    def _judge_asked(self, stalled_s: float) -> None:
+        """Accept or refuse what was heard since the last tick."""
+        asked, self._asked = self._asked, []
+        for message, captured_ns in asked:
+            known = self._last_status.get(message.id)
+            if known is not None:
+                self._statuses.append(known)
+                continue
+            try:
+                if stalled_s:
+                    allowed = f"up to {MAX_STALL_S:g} s; send it again"
+                    raise TrajectoryRefusedError(
+                        "stale", -1, "", f"the driver stood still for {stalled_s:.2f} s", allowed
+                    )
+                self._begin(message, captured_ns)
+            except TrajectoryRefusedError as refusal:
+                self._refused += 1
+                self._say(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(refusal), refusal.code)
 
     def _begin(self, message: JointTrajectory, captured_ns: int) -> None:
         report = self._report
@@ -161,7 +180,7 @@ class ArmDriver:
             [list(point.position_rad) for point in message.points],
             report.commanded if held is None else held,
             self._limits,
-            float(np.deg2rad(self._description.stream.start_tolerance_deg)),
+            self._start_tolerance,
         )
         start_index = report.next_index if report.epoch == self._writer.epoch else 0
         self._execution = Execution(message.id, path.rows, path.dt_s, start_index, self._now_ns)
@@ -178,6 +197,15 @@ class ArmDriver:
         if not len(rows):
             return None
         return Proposal(now_ns, self._writer.epoch, self._description.joint_names, first_index, rows, ahead)
+
+    def _fault_of_stall(self, stalled_s: float) -> Fault | None:
+        if not stalled_s or self._execution is None or self._core.state is not State.ARMED:
+            return None
+        sentence = (
+            f"the driver itself stood still for {stalled_s:.2f} s, allowed {MAX_STALL_S:g} s, so what it would send "
+            "is too old; the robot rests by its stop ramp; arm again"
+        )
+        return Fault("driver_stalled", "", sentence)
 
     def _fault_of_stream(self, now_ns: int) -> Fault | None:
         if self._execution is None or self._report is None or self._core.state is not State.ARMED:
@@ -206,8 +234,18 @@ class ArmDriver:
         elif self._ticks % TICKS_PER_PROGRESS == 0:
             self._say(name, TrajectoryStatus.STATE_EXECUTING, time_s, duration_s, "")
 
-    def _say(self, name: str, state: TrajectoryStatus.State, time_s: float, duration_s: float, reason: str) -> None:
-        status = TrajectoryStatus(trajectory_id=name, state=state, time_s=time_s, duration_s=duration_s, reason=reason)
+    def _say(
+        self,
+        name: str,
+        state: TrajectoryStatus.State,
+        time_s: float,
+        duration_s: float,
+        reason: str,
+        code: str = "",
+    ) -> None:
+        status = TrajectoryStatus(
+            trajectory_id=name, state=state, time_s=time_s, duration_s=duration_s, reason=reason, code=code
+        )
         status.captured.FromNanoseconds(self._now_ns)
         self._statuses.append(status)
         if state != TrajectoryStatus.STATE_REFUSED:  # a refused one that is sent again is judged again
@@ -222,3 +260,14 @@ class ArmDriver:
             SafetyFault(code=fault.code, joint=fault.joint, sentence=fault.sentence) for fault in self._core.faults
         )
         return message
+
+
+def _start_tolerance(description: RobotDescription) -> FloatArray:
+    """How far a trajectory may begin from the commanded pose, [J], rad.
+
+    Fingers that hold something are measured far from where they are commanded, and nobody but this driver knows the
+    command. The way from there to the trajectory is judged like the rest of it.
+    """
+    tolerance = np.full(description.n_joints, np.deg2rad(description.stream.start_tolerance_deg))
+    tolerance[[arm.fingers_index for arm in description.arms.values()]] = np.inf
+    return tolerance
