@@ -12,9 +12,15 @@ import typer
 from paramove.bus import topics
 from paramove.bus.settings import default_folder
 from paramove.bus.topics import Topic
+from paramove.cli import completions
 
 DomainOption = Annotated[
-    str | None, typer.Option("--domain", help="domain of the bus; default $PARAMOVE_DOMAIN, else 'default'")
+    str | None,
+    typer.Option(
+        "--domain",
+        help="domain of the bus; default $PARAMOVE_DOMAIN, else 'default'",
+        autocompletion=completions.domains,
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON")]
 

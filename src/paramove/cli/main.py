@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated
 
 import typer
 
+from paramove.cli.completions import typed_words
+
 COMMANDS: dict[str, tuple[str, str]] = {
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
+    "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
     "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
+    "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import and split demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "record": ("paramove.cli.record", "Record, inspect and replay what is said on the bus."),
@@ -66,9 +71,16 @@ def _placeholder(name: str) -> Callable[[], None]:
     return command
 
 
+def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> str | None:
+    """The command that is called, or whose options a shell asks for at a <Tab>; None where there is none yet."""
+    if "_PARAMOVE_COMPLETE" in environment:
+        arguments = typed_words(environment)
+    return next((argument for argument in arguments[1:] if not argument.startswith("-")), None)
+
+
 def main() -> None:
     """Entry point of the `paramove` script."""
-    build(next((argument for argument in sys.argv[1:] if not argument.startswith("-")), None))()
+    build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
 
 
 if __name__ == "__main__":

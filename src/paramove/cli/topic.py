@@ -8,11 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from paramove.bus import inspection, topics
+from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show, topic_named
 
 app = typer.Typer(name="topic", help="Look at what is said on the bus.", no_args_is_help=True)
 
-NameArgument = Annotated[str, typer.Argument(help="name of the topic, such as camera/image")]
+NameArgument = Annotated[
+    str, typer.Argument(help="name of the topic, such as camera/image", autocompletion=completions.topics)
+]
 LONGEST_BYTES = 32
 """Longer byte fields are shown by their length."""
 
@@ -89,7 +92,9 @@ def echo(
 
 @app.command()
 def hz(
-    names: Annotated[list[str] | None, typer.Argument(help="topics; default: all that are said")] = None,
+    names: Annotated[
+        list[str] | None, typer.Argument(help="topics; default: all that are said", autocompletion=completions.topics)
+    ] = None,
     domain: DomainOption = None,
     as_json: JsonOption = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="how long to listen")] = 3.0,

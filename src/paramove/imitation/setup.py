@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 from platformdirs import user_cache_path
@@ -18,6 +19,8 @@ from paramove.imitation.synthesizer import Synthesizer
 from paramove.phmm import InterpolativePHMM
 from paramove.robots.description import DescriptionError, RobotDescription
 
+_log = logging.getLogger(__name__)
+
 
 class MovementSource(BaseModel):
     """Where the reaching movement comes from: `file`, or else the synthetic demonstrator's demonstrations (`seed`)."""
@@ -32,7 +35,11 @@ class MovementSource(BaseModel):
         if self.file is not None:
             return load_reaching_model(self.file)
         cache = user_cache_path("paramove") / f"reaching_{self.seed}.npz"
-        cache.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            cache.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            _log.warning("training the movement, which cannot be kept in %s: %s", cache.parent, error.strerror)
+            return train_reaching_model(self.seed)
         return train_reaching_model(self.seed, cache=cache)
 
 

@@ -11,21 +11,24 @@ from pathlib import Path
 from typing import Any
 
 from paramove.supervision.domain import held_domain
+from paramove.supervision.environment import DEFAULT_DOMAIN
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
 
-DEFAULT_DOMAIN = "default"
+
+class NoWorkspaceError(FileNotFoundError):
+    """The working directory lies in no workspace."""
 
 
 def find_workspace(start: Path) -> Path:
-    """The nearest folder at or above `start` that holds `launch/` and `nodes/`; raises FileNotFoundError."""
+    """The nearest folder at or above `start` that holds `launch/` and `nodes/`; raises NoWorkspaceError."""
     for folder in (start, *start.parents):
         if (folder / "launch").is_dir() and (folder / "nodes").is_dir():
             return folder
-    raise FileNotFoundError(
+    raise NoWorkspaceError(
         f"{start} lies in no paramove workspace (a folder with launch/ and nodes/); change into your clone first"
     )
 
@@ -68,7 +71,12 @@ def run(
             "ended": ended.isoformat(timespec="seconds"),
             "duration_s": round((ended - begun).total_seconds(), 1),
             "nodes": {
-                node.name: {"state": node.state.value, "exit_code": node.exit_code, "restarts": node.restarts}
+                node.name: {
+                    "state": node.state.value,
+                    "exit_code": node.exit_code,
+                    "exit_reason": node.exit_reason or None,
+                    "restarts": node.restarts,
+                }
                 for node in supervisor.nodes.values()
             },
         }

@@ -23,6 +23,10 @@ class DomainError(RuntimeError):
     """The domain cannot be used: its name, its folder, or another run in it."""
 
 
+class DomainNameError(DomainError):
+    """No domain can be called so."""
+
+
 @dataclass(frozen=True)
 class Domain:
     """Folders of sockets.
@@ -47,6 +51,13 @@ def _made(folder: Path) -> Path:
     return folder
 
 
+def check_name(name: str) -> None:
+    """Raises DomainNameError if no domain can be called so."""
+    if not re.fullmatch(r"[a-z0-9_-]{1,40}", name):
+        remedy = "unset PARAMOVE_DOMAIN or set it to a name such as 'second'"
+        raise DomainNameError(f"domain {name!r}: expected up to 40 lower-case letters, digits, '_' or '-'; {remedy}")
+
+
 @contextlib.contextmanager
 def held_domain(name: str, holder: str) -> Iterator[Domain]:
     """Makes the folders of a domain and holds them until the block ends.
@@ -57,8 +68,7 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
 
     Raises DomainError if another run holds it.
     """
-    if not re.fullmatch(r"[a-z0-9_-]{1,40}", name):
-        raise DomainError(f"domain {name!r}: expected up to 40 lower-case letters, digits, '_' or '-'")
+    check_name(name)
     folder = default_folder(name)
     runtime = _made(folder.parent)
     if len(os.fsencode(folder)) > LONGEST_FOLDER:

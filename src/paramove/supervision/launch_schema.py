@@ -27,8 +27,8 @@ class BusSettings(_Checked):
 class RestartBudget(_Checked):
     """So many restarts within so many seconds; one more and the node is given up."""
 
-    restarts: int = Field(default=5, ge=0, le=1000)
-    window_s: Seconds = 300.0
+    restarts: int = Field(default=5, ge=0, le=1000, description="so many restarts")
+    window_s: Seconds = Field(default=300.0, description="within so many seconds")
 
 
 class NodeSettings(_Checked):
@@ -37,12 +37,18 @@ class NodeSettings(_Checked):
     module: Module = Field(description="Python module that is started, such as nodes.camera")
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
-    restart: Literal["never", "on-failure", "always"] = "never"
+    restart: Literal["never", "on-failure", "always"] = Field(
+        default="never", description="what follows its end: nothing; a restart after a failure; a restart in any case"
+    )
     backoff_s: Seconds = Field(default=0.5, description="wait before the first restart; doubles up to 30 s")
-    budget: RestartBudget = RestartBudget()
+    budget: RestartBudget = Field(
+        default=RestartBudget(), description="how often it is restarted before it is given up"
+    )
     required: bool = Field(default=True, description="the run fails when this node ends before the run does")
     after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
-    ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 30.0
+    ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
+        default=30.0, description="a node that is not ready so long after its start has failed"
+    )
     silent_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = Field(
         default=10.0,
         description="a node that was ready and says no status for so long hangs and is killed; null: never",
@@ -64,15 +70,17 @@ class NodeSettings(_Checked):
     truth: bool = Field(
         default=False, description="gets the folder of ground truth; for the simulator and the judge only"
     )
-    stop: Literal["first", "in-order", "last"] = Field(default="in-order", description="when it is stopped")
+    stop: Literal["first", "in-order", "last"] = Field(
+        default="in-order", description="when it is stopped as the run ends"
+    )
 
 
 class LaunchFile(_Checked):
     """One application: its nodes and how they are kept running."""
 
-    description: str = ""
-    bus: BusSettings = BusSettings()
-    nodes: dict[Name, NodeSettings] = Field(min_length=1)
+    description: str = Field(default="", description="what the application does, for people")
+    bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
+    nodes: dict[Name, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
     default_overlays: list[str] = Field(default_factory=list, description="laid over it where --with is not given")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")

@@ -1,0 +1,130 @@
+"""What the shell offers after <Tab>: names of launch files, overlays, parameters, topics, nodes and runs.
+
+Called at every <Tab>, so it imports nothing heavy, and where nothing can be offered it offers nothing: an error here
+would appear in the middle of a line that somebody types.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+_WITH_VALUE = ("--set", "--seed", "--runs")
+
+
+def launch_files(incomplete: str) -> list[str]:
+    """Launch files of the workspace."""
+    return _beginning(incomplete, _names(_workspace() / "launch"))
+
+
+def overlays(incomplete: str) -> list[str]:
+    """Overlays of the workspace."""
+    return _beginning(incomplete, _names(_workspace() / "launch" / "overlays"))
+
+
+def schemas(incomplete: str) -> list[str]:
+    """Kinds of files that have a schema."""
+    return _beginning(incomplete, ("launch", "overlay"))
+
+
+def parameters(incomplete: str) -> list[str]:
+    """`node.parameter=` of the launch file that was typed, with its overlays."""
+    name, chosen, before = "", [], ""
+    for word in typed_words(os.environ)[2:]:
+        if before == "--with":
+            chosen.append(word)
+        elif not name and before not in _WITH_VALUE and not word.startswith("-"):
+            name = word
+        before = word
+    return _beginning(incomplete, sorted(_parameters(_workspace(), name, chosen)))
+
+
+def typed_words(environment: Mapping[str, str]) -> list[str]:
+    """The words of the line that a shell asks about: bash says them in one variable, other shells in another."""
+    return (environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", "")).split()
+
+
+def nodes(incomplete: str) -> list[str]:
+    """Nodes that are, or were, on the bus."""
+    return _beginning(incomplete, (path.name.removeprefix("status.") for path in _sockets("status.*")))
+
+
+def topics(incomplete: str) -> list[str]:
+    """Topics of the table, and the status topics of the nodes on the bus."""
+    from paramove.bus.topics import TOPICS
+
+    statuses = (f"status/{node}" for node in nodes(""))
+    return _beginning(incomplete, [*(topic.name for topic in TOPICS if not topic.truth), *statuses])
+
+
+def domains(incomplete: str) -> list[str]:
+    """Domains that are, or were, in use."""
+    from paramove.bus.settings import default_folder
+
+    with contextlib.suppress(OSError):
+        found = [path.name for path in default_folder().parent.iterdir() if path.is_dir()]
+        return _beginning(incomplete, (name for name in found if not name.startswith("truth-")))
+    return []
+
+
+def run_folders(incomplete: str) -> list[str]:
+    """Folders of runs, the newest first."""
+    try:
+        found = sorted((path.name for path in Path("runs").iterdir() if path.is_dir()), reverse=True)
+    except OSError:
+        return []
+    return _beginning(incomplete, (f"runs/{name}" for name in found))
+
+
+def _beginning(incomplete: str, words: Iterable[str]) -> list[str]:
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def _workspace() -> Path:
+    """The nearest folder above that holds launch files; this one if there is none."""
+    here = Path.cwd()
+    return next((folder for folder in (here, *here.parents) if (folder / "launch").is_dir()), here)
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def _sockets(pattern: str) -> list[Path]:
+    from paramove.bus.settings import default_folder
+
+    with contextlib.suppress(OSError):
+        return sorted(path for path in default_folder().glob(pattern) if path.suffix != ".lock")
+    return []
+
+
+def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Iterator[str]:
+    for node, module in _modules(workspace / "launch", name, chosen).items():
+        with contextlib.suppress(OSError, SyntaxError, ValueError):
+            path = workspace / Path(*module.split(".")).with_suffix(".py")
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            configs = [line for line in tree.body if isinstance(line, ast.ClassDef) and line.name == "Config"]
+            for line in (line for config in configs for line in config.body):
+                if isinstance(line, ast.AnnAssign) and isinstance(line.target, ast.Name):
+                    yield f"{node}.{line.target.id}="
+
+
+def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
+    """Node -> module, of a launch file that may be half written."""
+    from paramove.supervision.positions import LaunchFileError, read_mapping
+
+    modules: dict[str, str] = {}
+    with contextlib.suppress(OSError, LaunchFileError, UnicodeDecodeError):
+        document = read_mapping((folder / f"{name}.yaml").read_text(encoding="utf-8-sig"), name)
+        names = chosen or document.data.get("default_overlays", [])
+        for overlay in names if isinstance(names, list | tuple) else []:
+            path = folder / "overlays" / f"{overlay}.yaml"
+            document = document.overlaid(read_mapping(path.read_text(encoding="utf-8-sig"), str(path)))
+        found = document.data.get("nodes")
+        for node, settings in found.items() if isinstance(found, dict) else ():
+            if isinstance(settings, dict) and isinstance(settings.get("module"), str):
+                modules[node] = settings["module"]
+    return modules

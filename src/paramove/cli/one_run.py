@@ -1,0 +1,113 @@
+"""One run for the terminal: checks, says what it found, runs, and turns every error into a line and an exit code."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from paramove.supervision import application, exit_codes
+from paramove.supervision.domain import DomainError, DomainNameError
+from paramove.supervision.environment import Environment, examined
+from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
+from paramove.supervision.positions import LaunchFileError
+from paramove.supervision.run_folder import RunFolder
+from paramove.supervision.supervisor import Outcome, View
+from paramove.supervision.view import LineView, TableView
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the command line asks for; see `paramove launch --help`."""
+
+    name: str
+    overlays: Sequence[str] | None
+    settings: Sequence[str]
+    seed: int | None
+    headless: bool
+    runs: Path | None
+
+
+def run(wanted: Wanted, check_only: bool) -> int:
+    """Runs an application, or only checks it; returns the exit code."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a sentence must not end a run where a letter is unknown
+    console = Console(highlight=False, markup=False, emoji=False)
+    errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    try:
+        workspace = application.find_workspace(Path.cwd())
+        environment = examined(os.environ, workspace)
+        for note in environment.notes:
+            errors.print(f"note: {note}")
+        launch = load(
+            workspace / "launch", wanted.name, wanted.overlays, wanted.settings, wanted.seed, wanted.headless
+        )
+        if check_only:
+            application.check(launch, workspace)
+            console.print("\n".join(_found(launch, environment)), soft_wrap=True)
+            return exit_codes.OK
+        outcome, folder = application.run(
+            launch, workspace, lambda folder: _view(console, folder, environment, wanted.headless), wanted.runs
+        )
+    except (LaunchFileMissingError, application.NoWorkspaceError) as error:
+        errors.print(str(error))
+        return exit_codes.INPUT_MISSING
+    except (LaunchFileError, DomainNameError) as error:
+        errors.print(str(error))
+        return exit_codes.CONFIGURATION
+    except DomainError as error:
+        errors.print(str(error))
+        return exit_codes.TEMPORARY
+    except OSError as error:
+        errors.print(_about_files(error, (wanted.runs or workspace / "runs").resolve(), environment))
+        return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
+    try:
+        console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
+    except OSError:  # the terminal was closed; flushing it again at exit would fail too
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return outcome.code
+
+
+def _found(launch: Launch, environment: Environment) -> list[str]:
+    """What a run would use, line by line."""
+    seeds = f", seed {launch.seed}" if launch.seed is not None else ""
+    clock = f"{launch.file.bus.clock}{', lockstep' if launch.file.bus.lockstep else ''}"
+    return [
+        f"{launch.name}: {len(launch.file.nodes)} nodes fit together",
+        f"  overlays  {', '.join(launch.overlays) or 'none'}{seeds}",
+        f"  clock     {clock}",
+        f"  domain    {environment.domain}, sockets in {environment.sockets}",
+        f"  python    {sys.executable}",
+    ]
+
+
+def _about_files(error: OSError, runs: Path, environment: Environment) -> str:
+    """The system's message with what to do: another place for runs, or for sockets."""
+    place = Path(os.fsdecode(error.filename)) if error.filename else Path()
+    message = f"{place}: {error.strerror or error}"
+    if place in (runs, *runs.parents) or place.is_relative_to(runs):
+        other = Path(tempfile.gettempdir()) / "paramove_runs"
+        return f"{message}; the folder of the run is made in {runs}. Name another place: --runs {other}"
+    if place in (environment.sockets, *environment.sockets.parents):
+        return f"{message}; sockets lie in {environment.sockets}. Set XDG_RUNTIME_DIR to a folder of yours"
+    return message
+
+
+def _verdict(outcome: Outcome) -> str:
+    """What the last line begins with; a run that a person ended did not fail."""
+    if outcome.code in map(exit_codes.by_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+        return ""
+    return "done: " if outcome.code == exit_codes.OK else "FAILED: "
+
+
+def _view(console: Console, folder: RunFolder, environment: Environment, headless: bool) -> View:
+    console.print(f"run folder {folder.path}", soft_wrap=True)
+    console.print(f"domain {environment.domain}, sockets in {environment.sockets}", soft_wrap=True)
+    return TableView(console) if console.is_terminal and not headless else LineView(console)

@@ -1,0 +1,123 @@
+"""What the environment of a run decides, and what of it is ignored or in the way."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+import zoneinfo
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from paramove.bus.settings import default_folder
+from paramove.supervision.domain import check_name
+
+DEFAULT_DOMAIN = "default"
+NEEDED = "paramove av cv2 dynamixel_sdk google matplotlib mcap mujoco numba numpy PIL platformdirs psutil pydantic rich"
+NEEDED += " ruamel scipy serial typer zmq zstandard"
+"""Modules that a run imports from its installation."""
+
+
+@dataclass(frozen=True)
+class Environment:
+    """The environment as a run takes it.
+
+    Attributes:
+        domain: Name of the bus domain.
+        sockets: Folder in which the sockets of the bus are made.
+        notes: What is ignored or in the way: variable, value, and remedy, each in a line.
+    """
+
+    domain: str
+    sockets: Path
+    notes: tuple[str, ...]
+
+
+def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
+    """Looks at the variables that decide something; raises DomainError for a name that no domain can have."""
+    domain = variables.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
+    check_name(domain)
+    sockets = default_folder(domain)
+    notes = [
+        *_runtime_folder(variables, sockets),
+        *_temporary_folder(variables),
+        *_cache_folder(variables),
+        *_time_zone(variables),
+        *_hidden_modules(variables, workspace),
+        *_owner(workspace),
+    ]
+    return Environment(domain, sockets, tuple(notes))
+
+
+def _unusable(folder: str) -> str:
+    """Why nothing can be written into a folder; "" if it can."""
+    if not os.path.isabs(folder):
+        return "it is no absolute path"
+    if not os.path.isdir(folder):
+        return "there is no such folder"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return "it cannot be written"
+    return ""
+
+
+def _runtime_folder(variables: Mapping[str, str], sockets: Path) -> Iterator[str]:
+    value = variables.get("XDG_RUNTIME_DIR", "")
+    reason = _unusable(value) if value else ""
+    if reason:
+        yield f"XDG_RUNTIME_DIR={value!r} is ignored: {reason}; sockets lie in {sockets}. Unset it or correct it"
+
+
+def _temporary_folder(variables: Mapping[str, str]) -> Iterator[str]:
+    value = variables.get("TMPDIR", "")
+    reason = _unusable(value) if value else ""
+    if reason:
+        yield f"TMPDIR={value!r} is ignored: {reason}; temporary files lie in {tempfile.gettempdir()}. Unset it"
+
+
+def _cache_folder(variables: Mapping[str, str]) -> Iterator[str]:
+    cache = user_cache_path("paramove")
+    there = next((folder for folder in (cache, *cache.parents) if folder.exists()), Path("/"))
+    reason = "its path is not absolute" if not cache.is_absolute() else _unusable(str(there))
+    if reason:
+        name = "XDG_CACHE_HOME" if variables.get("XDG_CACHE_HOME") else "HOME"
+        yield (
+            f"{name}={variables.get(name, '')!r}: nothing can be kept in {cache} ({reason}), so each run trains its "
+            "movement again; set XDG_CACHE_HOME to a folder of yours"
+        )
+
+
+def _time_zone(variables: Mapping[str, str]) -> Iterator[str]:
+    value = variables.get("TZ", "").removeprefix(":")
+    if not value or re.fullmatch(r"[A-Za-z<][^/]*\d.*", value) or os.path.isabs(value):
+        return
+    try:
+        zoneinfo.ZoneInfo(value)
+    except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
+        yield f"TZ={value!r} is no time zone that is known here; runs are named by UTC. Unset it or correct it"
+
+
+def _hidden_modules(variables: Mapping[str, str], workspace: Path) -> Iterator[str]:
+    """Files that Python finds before the modules that are meant: in the workspace's root, or on PYTHONPATH."""
+    names = {*NEEDED.split(), *sys.stdlib_module_names}
+    places = [(workspace, "the workspace's root", "rename it")]
+    for entry in variables.get("PYTHONPATH", "").split(os.pathsep):
+        if entry and Path(entry).resolve() not in (workspace, workspace / "src"):
+            places.append((Path(entry), "PYTHONPATH", "unset PYTHONPATH"))
+    for folder, where, remedy in places:
+        try:
+            found = sorted(path for path in folder.iterdir() if path.suffix in (".py", "") and path.stem in names)
+        except OSError:
+            continue
+        for path in found:
+            if path.suffix == ".py" or (path / "__init__.py").is_file():
+                yield f"{path} ({where}) hides the module {path.stem} that is meant; {remedy}"
+
+
+def _owner(workspace: Path) -> Iterator[str]:
+    owner = workspace.stat().st_uid
+    if os.geteuid() == 0 and owner != 0:
+        yield f"run as root in a clone of user {owner}: the folder of this run will belong to root"
