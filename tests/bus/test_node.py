@@ -77,7 +77,8 @@ def test_a_node_hears_says_and_ends_on_a_signal(start: Start, bus: Bus) -> None:
 def test_an_exception_is_said_logged_and_ends_with_70(start: Start, bus: Bus) -> None:
     process = start()
     _say(bus, "trouble")
-    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == "ValueError: found trouble"
+    said = _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence
+    assert said == "ValueError: found trouble (over gestures, sequence 1)"
     _, errors = process.communicate(timeout=10)
     assert process.returncode == 70
     assert "Traceback" in errors

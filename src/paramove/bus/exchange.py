@@ -118,18 +118,23 @@ class Exchange:
             for publisher in self.publishers.values():
                 if publisher.socket in ready:
                     publisher.serve()
-            self.drain(name for name, subscriber in self.subscribers.items() if subscriber.socket in ready)
+            self.drain([name for name, item in self.subscribers.items() if item.socket in ready], ready=True)
             for descriptor, call in self._callbacks.items():
                 if descriptor in ready:
                     call()
         return ready
 
-    def drain(self, topics: Iterable[str]) -> None:
-        """Takes what has arrived of these topics out of the sockets, without waiting."""
+    def drain(self, topics: Iterable[str], ready: bool = False) -> None:
+        """Takes what has arrived of these topics out of the sockets, without waiting.
+
+        Args:
+            topics: Names of heard topics.
+            ready: Something is known to wait on each of them.
+        """
         for name in topics:
             subscriber, pending = self.subscribers[name], self._pending[name]
-            for _ in range(DRAIN_LIMIT):
-                heard = subscriber.receive()
+            for number in range(DRAIN_LIMIT):
+                heard = subscriber.receive(ready and number == 0)
                 if heard is None:
                     break
                 pending.append((subscriber.counter.epoch or 0, heard))

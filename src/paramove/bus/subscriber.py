@@ -80,13 +80,17 @@ class Subscriber:
         """Whether the speaker has answered: nothing said from now on is missed without being counted."""
         return self.counter.epoch is not None
 
-    def receive(self) -> Heard | None:
+    def receive(self, ready: bool = False) -> Heard | None:
         """Next new message, or None if none is waiting.
 
         Repeated and refused ones are counted and passed over. After many of them it also returns None.
+
+        Args:
+            ready: A poll has just said that something is waiting, so that need not be asked again.
         """
         for _ in range(_PASSED_OVER_AT_ONCE):
-            raw = self.receive_raw()
+            raw = self.receive_raw(ready)
+            ready = False
             if raw is None:
                 return None
             envelope, payload = raw
@@ -101,16 +105,19 @@ class Subscriber:
             return Heard(self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload)
         return None
 
-    def receive_raw(self) -> tuple[Envelope, bytes] | None:
+    def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:
         """Like `receive`, with the payload left encoded and however fast they come."""
         for _ in range(_PASSED_OVER_AT_ONCE):
-            if not can_read(self.socket):
+            if not ready and not can_read(self.socket):
                 return None
+            ready = False
             try:
                 envelope, payload = self._read()
             except RefusedError as error:
                 self._refuse(error)
                 continue
+            except zmq.Again:
+                return None
             arrival = self.counter.accept(envelope)
             if arrival is Arrival.NEW:
                 return envelope, payload
