@@ -28,6 +28,7 @@ from ruamel.yaml.error import YAMLError
 
 from paramove.bus.bus import Bus
 from paramove.bus.endpoint import BusFolderError, TopicTakenError
+from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
@@ -107,7 +108,7 @@ def main(
     except ConfigurationError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(EXIT_CONFIGURATION)
-    logging.basicConfig(level=logging.INFO, format=f"%(levelname)s {file.node}: %(message)s", stream=sys.stderr)
+    log_to_stderr(file.node)
     try:
         bus = Bus(file.node, file.bus, hears, says, file.run_folder)
     except (TopicTakenError, BusFolderError) as error:
@@ -133,11 +134,13 @@ def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
         return error.exit_code
     except Exception as error:
         _log.exception("the node raised an exception")
-        bus.failed(f"{type(error).__name__}: {error}")
+        over = f" (over {bus.taken_up})" if bus.taken_up else ""
+        bus.failed(f"{type(error).__name__}: {error}{over}")
         return EXIT_FAILED
     if bus.has_failed:
         return EXIT_FAILED
-    bus.ended("stopped on request" if bus.stopped else "finished")
+    if not bus.has_ended:
+        bus.ended("stopped on request" if bus.stopped else "finished")
     return EXIT_OK
 
 
