@@ -75,6 +75,17 @@ class ArmPoseSolver:
         squared = self._upper_arm**2 + self._forearm**2 + 2 * self._upper_arm * self._forearm * np.cos(bend)
         return float(np.sqrt(squared[0])), float(np.sqrt(squared[1]))
 
+    def moved_outward(self, gripper: FloatArray, margin: float, width: float) -> FloatArray:
+        """A path [K, 3] with points nearer to the shoulder than the elbow can bend moved outward; the rest stays.
+
+        No point ends nearer than `margin` beyond the least reach; the change begins `width` before that, m.
+        """
+        least = self.reach[0] + margin
+        distance = np.linalg.norm(gripper, axis=1, keepdims=True)
+        beyond = distance - least
+        softened = np.where(beyond > width, beyond, np.clip(beyond + width, 0.0, None) ** 2 / (4.0 * width))
+        return np.asarray(gripper * (least + softened) / distance)
+
     def solve(
         self,
         elbow: ArrayLike,
@@ -109,6 +120,19 @@ class ArmPoseSolver:
         poses = _Poses(q if slope is None else self._sloped(q, r, slope, share), r, o, share)
         solution = self._one_sided(poses, self._nearest(poses, _TURNS_BOTH))
         return self._smoothed(poses, solution, smoothing) if smoothing else solution
+
+    def without_limits(self, elbow: ArrayLike, gripper: ArrayLike, finger_to_thumb: ArrayLike) -> JointSolution:
+        """The closed form of 5.2.4 as it is, whether or not the joints reach it; arguments as for `solve`.
+
+        The gripper's distance from the shoulder is taken to close the triangle of the arm.
+        """
+        q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
+        straight_on = np.zeros(len(r))
+        return JointSolution(*self._pose(_Poses(q, r, o, straight_on), straight_on), straight_on)
+
+    def outside_limits(self, angles: FloatArray) -> FloatArray:
+        """By how much each joint of angles [K, 5] lies outside the limits that `solve` keeps, rad; 0 inside."""
+        return np.asarray(np.clip(np.maximum(self._lower - angles, angles - self._upper), 0.0, None))
 
     def _smoothed(self, poses: _Poses, solution: JointSolution, smoothing: int) -> JointSolution:
         """The turn begun a little earlier and ended later, so that the elbow does not jerk; limits still hold."""

@@ -7,13 +7,16 @@ for a target in the robot's shoulder frame brings the gripper to that target.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.imitation.elbow_interpolation import interpolated_elbow
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 
 FloatArray = NDArray[np.float64]
+ElbowInterpolation = Literal["carried", "linear"]
 
 _POINTS = ("shoulder", "elbow", "knuckle", "index", "thumb")
 _NEWTON_STEPS = 3
@@ -70,6 +73,9 @@ class RobotMovement:
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
         release_state: Last state in which the object is held (T′).
         duration: Mean duration of the demonstrations, s.
+        shoulder: p̄, the demonstrator's mean shoulder, which is the origin here, [3], m, frame of the demonstrations.
+        elbow_interpolation: "carried" interpolates the elbow as part of an arm (`elbow_interpolation.py`), "linear" as
+            a point on its own, as the thesis does.
     """
 
     grid: ParameterGrid
@@ -80,41 +86,37 @@ class RobotMovement:
     reach_state: int
     release_state: int
     duration: float
+    shoulder: FloatArray
+    elbow_interpolation: ElbowInterpolation = "carried"
 
     @classmethod
-    def from_model(cls, model: InterpolativePHMM, arm_length: float) -> RobotMovement:
+    def from_model(
+        cls, model: InterpolativePHMM, arm_length: float, elbow_interpolation: ElbowInterpolation = "carried"
+    ) -> RobotMovement:
         """Convert a trained model of a reaching action.
 
         Args:
             model: Its description names the points shoulder, elbow, knuckle, index and thumb and the progress at which
                 the target is reached and the object is last held.
             arm_length: l = a + b of the robot, m.
+            elbow_interpolation: As the attribute.
 
         Raises:
             ValueError: The model lacks a point or does not say where in the movement the target is reached.
         """
         description = model.description or MovementDescription()
-        names = description.point_names
-        missing = [name for name in _POINTS if name not in names]
-        if missing:
-            raise ValueError(
-                f"the model has the points {', '.join(names) or 'none'}; needed also: {', '.join(missing)}"
-            )
+        person = _points(model.means_, description.point_names)
         if not 0.0 < description.arrival < description.grasp < 1.0:
             raise ValueError(
                 f"the model of {description.action!r} gives arrival {description.arrival} and grasp "
                 f"{description.grasp}; "
                 "a reaching action has 0 < arrival < grasp < 1"
             )
-        points = model.means_.reshape(*model.means_.shape[:2], -1, 3)  # [G, N, points, 3]
-        place = {name: names.index(name) for name in _POINTS}
-        shoulder = points[:, :, place["shoulder"]].mean(axis=(0, 1))  # p̄
-        elbow = points[:, :, place["elbow"]] - shoulder
-        gripper = points[:, :, [place["knuckle"], place["index"], place["thumb"]]].mean(axis=2) - shoulder  # r̃
-        opening = points[:, :, place["thumb"]] - points[:, :, place["index"]]  # õ
+        shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
+        elbow, gripper, _ = _arm(person, shoulder)
         lengths = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
         scale = arm_length / float(lengths.max())  # s = l / l′
-        means = np.concatenate([elbow, gripper, opening], axis=-1) * scale  # (5.7)
+        means = np.concatenate(_arm(person, shoulder), axis=-1) * scale  # (5.7)
         size = np.linalg.norm(means[..., 6:], axis=-1)
         grid = ParameterGrid((model.grid_.origin - shoulder) * scale, model.grid_.edges * scale, model.grid_.knots)
         last = model.n_states - 1
@@ -127,7 +129,21 @@ class RobotMovement:
             reach_state=round(description.arrival * last),
             release_state=round(description.grasp * last),
             duration=description.duration,
+            shoulder=shoulder,
+            elbow_interpolation=elbow_interpolation,
         )
+
+    def converted(self, means: FloatArray, point_names: tuple[str, ...]) -> ArmPoses:
+        """Other poses of the same person as this movement's are: scaled by s, seen from p̄ (5.7).
+
+        Args:
+            means: Body points, [K, 3 · points], m, frame of the demonstrations.
+            point_names: Their names, in order.
+
+        Raises:
+            ValueError: A needed point is missing.
+        """
+        return ArmPoses(*(self.scale * part for part in _arm(_points(means, point_names), self.shoulder)))
 
     @property
     def n_states(self) -> int:
@@ -151,8 +167,8 @@ class RobotMovement:
         parameter = wanted.copy()
         steps = 0.01 * np.eye(3)
         for _ in range(_NEWTON_STEPS):
-            reached = self.poses_of_state(state, parameter).gripper
-            columns = [(self.poses_of_state(state, parameter + step).gripper - reached) / 0.01 for step in steps]
+            reached = self._gripper(state, parameter)
+            columns = [(self._gripper(state, parameter + step) - reached) / 0.01 for step in steps]
             jacobian = np.stack(columns, axis=-1)
             parameter = parameter + np.linalg.solve(jacobian, (wanted - reached)[..., None])[..., 0]
         return parameter
@@ -163,7 +179,35 @@ class RobotMovement:
         return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
 
     def _means(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
+        """Means of all states, [K, N, 9], or of one, [K, 9], for K parameters."""
+        weights, corners = self._corners(parameters, state)
+        means: FloatArray = np.einsum("kc,kc...->k...", weights, corners)
+        if self.elbow_interpolation == "carried":
+            means[..., :3] = interpolated_elbow(weights, corners[..., :3], corners[..., 3:6])
+        return means
+
+    def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:
+        weights, corners = self._corners(parameters, state)
+        return np.asarray(np.einsum("kc,kcd->kd", weights, corners[..., 3:6]))
+
+    def _corners(self, parameters: FloatArray, state: int | None) -> tuple[FloatArray, FloatArray]:
+        """Weights [K, C] and means [K, C, N, 9] or [K, C, 9] of the grid points around each parameter."""
         indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
-        if state is None:
-            return np.asarray(np.einsum("mc,mcnd->mnd", weights, self.means[indices]))
-        return np.asarray(np.einsum("mc,mcd->md", weights, self.means[indices, state]))
+        means = self.means if state is None else self.means[:, state]
+        return weights, np.asarray(means[indices])
+
+
+def _points(means: FloatArray, point_names: tuple[str, ...]) -> dict[str, FloatArray]:
+    missing = [name for name in _POINTS if name not in point_names]
+    if missing:
+        raise ValueError(
+            f"the model has the points {', '.join(point_names) or 'none'}; needed also: {', '.join(missing)}"
+        )
+    points = means.reshape(*means.shape[:-1], -1, 3)
+    return {name: points[..., point_names.index(name), :] for name in _POINTS}
+
+
+def _arm(person: dict[str, FloatArray], shoulder: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Elbow q̃, gripper r̃ seen from the shoulder p̄, and finger to thumb õ; [..., 3] each (5.2.3)."""
+    gripper = np.mean([person["knuckle"], person["index"], person["thumb"]], axis=0)
+    return person["elbow"] - shoulder, gripper - shoulder, person["thumb"] - person["index"]
