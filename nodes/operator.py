@@ -30,8 +30,8 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
-    operator = Operator(config.arms_at_start)
-    bus.ready("arms once at the start" if config.arms_at_start else "does not arm")
+    operator = Operator(config.arms_at_start, bus.run_folder / "operator_has_armed")
+    bus.ready(operator.sentence)
     for heard in bus.latest(topics.ARM_SAFETY):
         request = operator.update(heard.message, bus.now_ns)
         if request is not None:

@@ -2,6 +2,7 @@
 
 Hears   gestures             Gesture            event    pixels, and metres once calibrated
         relocation/status    RelocationStatus   event
+        arm/safety           SafetyState        15 Hz, latched
 Says    relocation/goal      RelocationGoal     event    right_shoulder
         calibration/plane    PlaneCalibration   event    right_shoulder
         rules                Rules              event    right_shoulder
@@ -15,12 +16,12 @@ from paramove.rules.rule_learner import RuleLearner
 from paramove.rules.stage import RuleLearnerOptions
 from paramove.rules.table import Surface
 
-HEARS = (topics.GESTURES, topics.RELOCATION_STATUS)
+HEARS = (topics.GESTURES, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 SAYS = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH)
 
 
 class Config(NodeConfig):
-    """Places in the right shoulder's frame, m."""
+    """Places in the right shoulder's frame, m; `arm_patience_s`: how long the arm may wait to be armed again."""
 
     objects: tuple[str, ...] = ("yellow", "green", "blue")
     corners: tuple[tuple[float, float], ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
@@ -28,26 +29,27 @@ class Config(NodeConfig):
     grasp_z: float = -0.098
     surface_x: tuple[float, float] = (0.100, 0.240)
     surface_y: tuple[float, float] = (-0.170, 0.130)
+    arm_patience_s: float = 10.0
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until all objects are put away or the bus closes."""
-    surface = Surface(config.surface_x, config.surface_y)
-    options = RuleLearnerOptions(config.objects, config.corners, config.offer, config.grasp_z, surface)
+    """Loop until all objects are put away, the arm is not armed any more, or the bus closes."""
+    places = config.model_dump(exclude={"surface_x", "surface_y"})
+    options = RuleLearnerOptions(**places, surface=Surface(config.surface_x, config.surface_y))
     learner = RuleLearner(options, f"goal-{bus.now_ns}")
+    hear = dict(zip(HEARS, (learner.on_gesture, learner.on_goal_status, learner.on_safety), strict=True))
     bus.ready("waiting for the arm")
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
-            hear = learner.on_gesture if event.topic is topics.GESTURES else learner.on_goal_status
-            hear(event.message)
+            hear[event.topic](event.message)
             continue
         said = learner.tick(event.now_ns * 1e-9)
-        for topic, messages in zip(
-            SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech), strict=True
-        ):
-            for message in messages:
-                bus.publish(topic, message)
-        if learner.finished:
+        messages = (said.goals, said.calibrations, said.rules, said.stages, said.speech)
+        for topic, message in ((topic, one) for topic, some in zip(SAYS, messages, strict=True) for one in some):
+            bus.publish(topic, message)
+        if learner.failure:
+            bus.failed(learner.failure)
+        if learner.finished or learner.failure:
             return
         bus.ready(learner.sentence)
 

@@ -1,5 +1,7 @@
 """The operator's node arms once in simulation, replayed from recordings of the gate's state."""
 
+from pathlib import Path
+
 from nodes import operator
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
@@ -9,19 +11,22 @@ from paramove.msgs.safety_state_pb2 import SafetyState
 SECOND = 1_000_000_000
 
 
-def replayed(arms_at_start: bool, *states: SafetyState.State) -> RecordedBus:
+def replayed(folder: Path, arms_at_start: bool, *states: SafetyState.State) -> RecordedBus:
     """The gate says a state each second."""
-    bus = RecordedBus(
+    heard = [
         Heard(topics.ARM_SAFETY, SafetyState(state=state), number * SECOND, number * SECOND, number)
         for number, state in enumerate(states, start=1)
-    )
+    ]
+    bus = RecordedBus(heard, run_folder=folder)
     operator.run(bus, operator.Config(arms_at_start=arms_at_start))
     return bus
 
 
-def test_arms_once_and_never_again() -> None:
+def test_arms_once_and_never_again(tmp_path: Path) -> None:
     disarmed, armed = SafetyState.STATE_DISARMED, SafetyState.STATE_ARMED
-    bus = replayed(True, SafetyState.STATE_DISCONNECTED, disarmed, armed, armed, SafetyState.STATE_HOLD, disarmed)
+    bus = replayed(
+        tmp_path, True, SafetyState.STATE_DISCONNECTED, disarmed, armed, armed, SafetyState.STATE_HOLD, disarmed
+    )
     (word,) = bus.said
     assert word.topic is topics.OPERATOR_ARM
     assert word.message.armed
@@ -29,7 +34,17 @@ def test_arms_once_and_never_again() -> None:
     assert bus.states == [("ready", "arms once at the start")]
 
 
-def test_does_not_arm_unless_told() -> None:
-    bus = replayed(False, SafetyState.STATE_DISARMED, SafetyState.STATE_DISARMED)
+def test_does_not_arm_unless_told(tmp_path: Path) -> None:
+    bus = replayed(tmp_path, False, SafetyState.STATE_DISARMED, SafetyState.STATE_DISARMED)
     assert bus.said == []
     assert bus.states == [("ready", "does not arm")]
+
+
+def test_a_new_process_in_the_same_run_does_not_arm_again(tmp_path: Path) -> None:
+    disarmed = SafetyState.STATE_DISARMED
+    assert len(replayed(tmp_path, True, disarmed).said) == 1
+    bus = replayed(tmp_path, True, disarmed, disarmed, disarmed)
+    assert bus.said == []
+    (state,) = bus.states
+    assert state[0] == "ready"
+    assert "only a person arms it again" in state[1]

@@ -175,6 +175,9 @@ class Story:
         if self.deaf:
             self.deaf -= 1
             return
+        if goal.asked_again:
+            self._say(goal.id, FAILED, "the synthesizer was restarted")
+            return
         self._say(goal.id, RelocationStatus.STATE_ACCEPTED)
         state, reason, place = SUCCEEDED, "", None
         applying = self.stages[-1].stage == ApplicationStage.STAGE_APPLY
@@ -194,6 +197,12 @@ class Story:
             self.later(0.5 * MOTION_S, self.gesture, Gesture.KIND_MOVED, goal.object, target)
             self.later(0.8 * MOTION_S, self.vanish, goal.object, target)
         self.later(MOTION_S, self._say, goal.id, state, reason)
+
+    def forget_goals(self) -> None:
+        """The arm ends its motion and nothing is said of it any more, as after the synthesizer's restart."""
+        moves = (self._say, self.vanish, self.stand)
+        self._events = [event for event in self._events if event[2] not in moves]
+        heapq.heapify(self._events)
 
     def _say(self, name: str, state: RelocationStatus.State, reason: str = "", in_the_way: Sequence[int] = ()) -> None:
         status = RelocationStatus(goal_id=name, state=state, reason=reason, in_the_way=in_the_way)

@@ -10,6 +10,8 @@ import pytest
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
+from paramove.rules.conversation import SILENT_S
 from paramove.rules.rule_learner import RuleLearner
 from paramove.vision.homography import PlaneHomography
 from tests.rules.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REFUSED, SUCCEEDED, Story
@@ -376,3 +378,75 @@ def test_where_it_stands_is_said_every_second_and_at_every_change() -> None:
     story.run(10.0)
     assert 10 <= len(story.stages) <= 13
     assert story.stages[-1].step == "resting"
+
+
+def safety(state: SafetyState.State, *sentences: str) -> SafetyState:
+    return SafetyState(state=state, faults=[SafetyFault(code="x", sentence=sentence) for sentence in sentences])
+
+
+def test_a_goal_of_which_nothing_is_heard_is_asked_for_and_its_failure_recovered() -> None:
+    """As after the synthesizer's restart: it does not know the goal, and says so."""
+    story = Story()
+    story.run_to(ApplicationStage.STAGE_APPLY)
+    assert story.run(until=lambda: bool(story.relocations()))
+    lost = story.goals[-1]
+    story.forget_goals()
+    assert story.run(until=lambda: story.goals[-1].kind == RelocationGoal.KIND_REST)
+    asked = [goal for goal in story.goals if goal.id == lost.id]
+    assert [goal.asked_again for goal in asked] == [False, True]
+    assert story.run()
+    assert story.stages[-1].stage == ApplicationStage.STAGE_DONE
+
+
+def test_a_goal_that_nobody_answers_is_given_up_and_the_failure_told() -> None:
+    story = Story()
+    story.run_to(ApplicationStage.STAGE_APPLY)
+    story.deaf = 10**6
+    assert story.run(until=lambda: bool(story.relocations()))
+    assert story.run(SILENT_S + 5.0, until=lambda: story.goals[-1].kind == RelocationGoal.KIND_REST)
+    story.deaf = 0
+    assert story.run()
+    assert any("nobody has said for 30 s how goal" in speech.sentence for speech in story.speech)
+
+
+def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
+    story = Story()
+    learner = story.learner
+    learner.on_safety(safety(SafetyState.STATE_DISARMED))
+    story.run(1.0)
+    learner.on_safety(safety(SafetyState.STATE_ARMED))
+    story.run_to(ApplicationStage.STAGE_LEARN)
+    assert learner.failure == ""
+    goals = len(story.goals)
+    learner.on_safety(
+        safety(SafetyState.STATE_HOLD, "the robot ran out of rows after 7 of 9 rows and stops; arm again")
+    )
+    story.run(OPTIONS.arm_patience_s - 0.5)
+    assert learner.failure == ""
+    assert len(story.goals) == goals, "without an arm nothing is asked of it"
+    (told,) = [speech.sentence for speech in story.speech if "cannot go on" in speech.sentence]
+    story.run(1.0)
+    assert learner.failure == (
+        "the arm is no longer armed (hold): the robot ran out of rows after 7 of 9 rows and stops; arm again; "
+        "only a person arms it again"
+    )
+    assert learner.failure in told
+
+
+@pytest.mark.parametrize("state", [SafetyState.STATE_DISARMED, SafetyState.STATE_DISCONNECTED, SafetyState.STATE_HOLD])
+def test_an_arm_that_is_armed_again_in_time_goes_on(state: SafetyState.State) -> None:
+    story = Story()
+    story.learner.on_safety(safety(SafetyState.STATE_ARMED))
+    story.run_to(ApplicationStage.STAGE_LEARN)
+    story.learner.on_safety(safety(state, "stopped by a person"))
+    story.run(OPTIONS.arm_patience_s - 1.0)
+    story.learner.on_safety(safety(SafetyState.STATE_ARMED))
+    assert story.run()
+    assert story.learner.failure == ""
+
+
+def test_an_arm_that_was_never_armed_is_waited_for() -> None:
+    story = Story()
+    story.learner.on_safety(safety(SafetyState.STATE_DISARMED))
+    story.run(OPTIONS.arm_patience_s + 5.0)
+    assert story.learner.failure == ""

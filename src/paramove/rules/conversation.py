@@ -10,6 +10,8 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 
 RESEND_S = 0.5
+ASK_AGAIN_S = 5.0  # a goal under way of which nothing was heard for so long is asked for
+SILENT_S = 30.0  # and given up when nobody answers for so long
 _LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED}
 
 
@@ -37,7 +39,9 @@ class Goals:
 
 
 class Errand:
-    """One goal after the other, each sent again until it is acknowledged.
+    """One goal after the other, each sent again until it is acknowledged, and asked for when it is silent too long.
+
+    Whoever does the goals may have been restarted and know nothing of it: it then says so, and the goal has failed.
 
     Attributes:
         grasps: How many times an object was to be grasped.
@@ -50,6 +54,8 @@ class Errand:
         self._goal: RelocationGoal | None = None
         self._status: RelocationStatus | None = None
         self._sent_s = 0.0
+        self._heard_s = 0.0
+        self._now_s = 0.0
         self.started_s = 0.0
         self.grasps = 0
         self.retries = 0
@@ -75,6 +81,7 @@ class Errand:
             goal.to.CopyFrom(target)
         goal.avoid.extend(self._goals.position(place) for place in avoid)
         self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
+        self._heard_s = now_s
         if kind == RelocationGoal.KIND_RELOCATE:
             self.grasps += 1
             self.retries += attempt > 1
@@ -82,12 +89,22 @@ class Errand:
     def on_status(self, status: RelocationStatus) -> None:
         """Hear how a goal fares."""
         if self._goal is not None and status.goal_id == self._goal.id:
-            self._status = status
+            self._status, self._heard_s = status, self._now_s
 
     def step(self, now_s: float, outbox: Outbox) -> None:
-        """Send the goal, again if nobody acknowledged it."""
-        if self._goal is not None and self._status is None and now_s - self._sent_s >= RESEND_S:
-            outbox.goals.append(self._goal)
+        """Send the goal, again if nobody acknowledged it; ask for it or give it up if nothing is heard of it."""
+        self._now_s = now_s
+        if self._goal is None or self.outcome is not None:
+            return
+        acknowledged = self._status is not None
+        if now_s - self._heard_s >= SILENT_S:
+            reason = f"nobody has said for {SILENT_S:g} s how goal {self._goal.id} fares; is the synthesizer alive?"
+            self._status = RelocationStatus(goal_id=self._goal.id, state=RelocationStatus.STATE_FAILED, reason=reason)
+        elif now_s >= (max(self._sent_s, self._heard_s) + ASK_AGAIN_S if acknowledged else self._sent_s + RESEND_S):
+            self._goal.asked_again = acknowledged
+            sent = RelocationGoal()
+            sent.CopyFrom(self._goal)
+            outbox.goals.append(sent)
             self._sent_s = now_s
 
     @property

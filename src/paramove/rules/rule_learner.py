@@ -5,7 +5,9 @@ from __future__ import annotations
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage
+from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.rules.applying import Applying
+from paramove.rules.arm_watch import ArmWatch
 from paramove.rules.calibrating import Calibrating
 from paramove.rules.conversation import Errand, Goals, Outbox
 from paramove.rules.learning import Learning
@@ -25,10 +27,16 @@ class RuleLearner:
     def __init__(self, options: RuleLearnerOptions, run_name: str) -> None:
         goals = Goals(options.frame, options.grasp_z)
         self._mind = Mind(options, Errand(goals, run_name), goals)
+        self._watch = ArmWatch(options.arm_patience_s)
         self._stage: Stage | None = None
         self._finished = False
         self._said_s = float("-inf")
         self._said_state = ""
+
+    @property
+    def failure(self) -> str:
+        """Why the application cannot go on; empty while it can."""
+        return self._watch.sentence if self._watch.given_up(self._mind.now_s) else ""
 
     @property
     def finished(self) -> bool:
@@ -50,13 +58,20 @@ class RuleLearner:
         """The arm says how a goal fares."""
         self._mind.errand.on_status(status)
 
+    def on_safety(self, state: SafetyState) -> None:
+        """The safety gate says how it stands."""
+        armed = not self._watch.lost
+        self._watch.on_safety(state, self._mind.now_s)
+        if armed and self._watch.lost:
+            self._mind.tell(f"I cannot go on: {self._watch.sentence}.")
+
     def tick(self, now_s: float) -> Outbox:
         """One turn: what is to be said."""
         mind = self._mind
         mind.now_s = now_s
         if self._stage is None:
             self._enter(Calibrating(mind))
-        elif not self._finished:
+        elif not self._finished and not self._watch.lost:
             following = self._stage.step()
             if following is not None:
                 self._follow(following)

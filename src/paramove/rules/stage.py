@@ -29,6 +29,7 @@ class RuleLearnerOptions:
         attempts: How often an object is tried before the instructor is asked.
         settle_s: The view of an object is trusted so long after the arm has left.
         patience_s: A request to the instructor is repeated after so long without an answer.
+        arm_patience_s: The application ends when the arm is not armed again for so long.
     """
 
     objects: tuple[str, ...]
@@ -40,6 +41,7 @@ class RuleLearnerOptions:
     attempts: int = 3
     settle_s: float = 2.6
     patience_s: float = 25.0
+    arm_patience_s: float = 10.0
 
 
 @dataclass

@@ -1,0 +1,50 @@
+"""Whether the robot's arm is armed, as the application needs to know it: without, no goal can be done."""
+
+from __future__ import annotations
+
+from paramove.msgs.safety_state_pb2 import SafetyState
+
+_AT_WORK = (SafetyState.STATE_ARMED, SafetyState.STATE_STOPPING)
+
+
+class ArmWatch:
+    """Follows the safety gate's state. Before the arm was armed for the first time nothing is amiss.
+
+    Args:
+        patience_s: How long a person may take to arm again.
+    """
+
+    def __init__(self, patience_s: float) -> None:
+        self._patience_s = patience_s
+        self._was_armed = False
+        self._lost_s: float | None = None
+        self._state = SafetyState.STATE_UNSPECIFIED
+        self._why = ""
+
+    def on_safety(self, message: SafetyState, now_s: float) -> None:
+        """Hear the gate's state."""
+        self._state = message.state
+        self._was_armed |= message.state == SafetyState.STATE_ARMED
+        if not self._was_armed or message.state in _AT_WORK:
+            self._lost_s = None
+            return
+        self._why = "; ".join(fault.sentence for fault in message.faults) or self._why
+        if self._lost_s is None:
+            self._lost_s = now_s
+            self._why = "; ".join(fault.sentence for fault in message.faults)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the arm was armed and is not any more."""
+        return self._lost_s is not None
+
+    @property
+    def sentence(self) -> str:
+        """What is amiss, why, and what would help."""
+        state = SafetyState.State.Name(self._state).removeprefix("STATE_").lower()
+        why = f": {self._why}" if self._why else ""
+        return f"the arm is no longer armed ({state}){why}; only a person arms it again"
+
+    def given_up(self, now_s: float) -> bool:
+        """Whether nobody has armed it within the patience."""
+        return self._lost_s is not None and now_s - self._lost_s >= self._patience_s
