@@ -20,7 +20,7 @@ class Config(NodeConfig):
     width: int = Field(480, gt=0)
     height: int = Field(360, gt=0)
     jpeg_quality: int = Field(95, ge=1, le=100)
-    frozen_after: int = Field(15, ge=0)  # equal frames in a row; 0: equal frames are allowed
+    frozen_after: int = Field(5, ge=0)  # equal frames in a row; 0: equal frames are allowed
 
 
 def run(bus: Bus, config: Config) -> None:
@@ -30,18 +30,20 @@ def run(bus: Bus, config: Config) -> None:
     bus.ready(f"frames from {config.source}")
     fault = ""
     try:
-        for event in bus.latest(topics.CAMERA_LIGHT) if source.hears_light else bus.events(tick=True):
+        for event in bus.events(topics.CAMERA_LIGHT, tick=True) if source.hears_light else bus.events(tick=True):
             now_ns, light = (event.captured_ns, event.message) if isinstance(event, Heard) else (event.now_ns, None)
             try:
                 frame = source.frame(now_ns, light)
                 if frame is None:
                     continue
                 bus.publish(topics.CAMERA_IMAGE, encode(checks.passed(frame), config.jpeg_quality), frame.captured_ns)
-            except EndOfFrames:
+            except EndOfFrames as end:
+                bus.ready(str(end))
                 return
             except FrameError as error:
-                fault = str(error)
-                bus.degraded(fault)
+                if error.kind != fault:
+                    fault = error.kind
+                    bus.degraded(str(error))
                 continue
             if fault:
                 fault = ""

@@ -27,8 +27,9 @@ def run(bus: Bus, config: Config) -> None:
         try:
             image = decode(heard.message)
         except FrameError as error:
-            well = False
-            bus.degraded(str(error))
+            if well:
+                well = False
+                bus.degraded(str(error))
             continue
         bus.publish(topics.OBJECTS_TRACKED, tracker.update(image, heard.captured_ns), heard.captured_ns)
         if not well:

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,10 @@ from pydantic import ValidationError
 
 from nodes import camera
 from paramove.bus import topics
+from paramove.bus.recorded import RecordedBus
+from paramove.bus.subscriber import Heard
+from paramove.bus.turns import Tick
+from paramove.input_error import InputError
 from paramove.vision.frames import FrameError, decode
 from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard, bus_with_ticks
 
@@ -88,3 +93,59 @@ def test_a_source_that_is_not_there_is_named(source: str, words: str) -> None:
 def test_refuses_unknown_parameters() -> None:
     with pytest.raises(ValidationError):
         camera.Config.model_validate({"sauce": "file:x"})
+
+
+def _bus_of(*events: Any) -> RecordedBus:
+    return RecordedBus(events)
+
+
+def test_silence_of_the_light_is_told_after_a_second_and_once() -> None:
+    topic, light = _light(_picture(1))
+    events: list[Any] = [Heard(topic, light, PERIOD_NS, PERIOD_NS, 1)]
+    events += [Tick(n, n * PERIOD_NS) for n in range(1, 40)]
+    events.append(Heard(topic, _light(_picture(2))[1], 40 * PERIOD_NS, 40 * PERIOD_NS, 2))
+    bus = _bus_of(*events)
+    camera.run(bus, camera.Config())
+    assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
+    assert "no image on camera/light for more than 1 s" in bus.states[1][1]
+    assert len(bus.said) == 2
+
+
+def test_the_same_fault_is_told_once() -> None:
+    black = np.zeros((360, 480, 3), np.uint8)
+    bus = bus_that_heard([_light(image) for image in (_picture(1), *[black] * 4, _picture(2), black)])
+    camera.run(bus, camera.Config())
+    assert [state for state, _ in bus.states] == ["ready", "degraded", "ready", "degraded"]
+
+
+@pytest.mark.parametrize("message", [RawImage(), RawImage(encoding="bgr8", width=480, height=360, data=b"short")])
+def test_light_that_is_no_picture_is_left_out(message: RawImage) -> None:
+    bus = bus_that_heard([(topics.CAMERA_LIGHT, message), _light(_picture(1))])
+    camera.run(bus, camera.Config())
+    assert len(bus.said) == 1
+    assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
+
+
+def test_the_end_of_a_file_that_is_cut_off_is_told(tmp_path: Path) -> None:
+    path = _video(tmp_path, 40)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    bus = bus_with_ticks(60)
+    camera.run(bus, camera.Config(source=f"file:{path}"))
+    assert 0 < len(bus.said) < 40
+    assert bus.states[-1][0] == "ready"
+    assert re.search("has ended after [0-9]+ frames", bus.states[-1][1])
+
+
+def test_a_source_that_is_not_there_ends_the_node_without_restart() -> None:
+    with pytest.raises(InputError) as refusal:
+        camera.run(bus_with_ticks(1), camera.Config(source="device:/dev/no-such-camera"))
+    assert refusal.value.exit_code == 66
+
+
+def _video(folder: Path, frames: int) -> Path:
+    path = folder / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (480, 360))
+    for seed in range(frames):
+        writer.write(_picture(seed))
+    writer.release()
+    return path

@@ -1,13 +1,17 @@
+import os
+import subprocess
 import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.vision.frame_sources import DeviceFrames, FileFrames, TopicFrames, open_source
-from paramove.vision.frames import FrameError
+from paramove.vision.frame_sources import DeviceFrames, FileFrames, SourceError, TopicFrames, open_source
+from paramove.vision.frames import EndOfFrames, FrameError
 
 SECOND = 1_000_000_000
 
@@ -140,3 +144,103 @@ def test_a_topic_gives_frames_with_messages_only() -> None:
     assert source.hears_light
     assert source.frame(0) is None
     source.close()
+
+
+class BrokenCapture(FakeCapture):
+    """A device whose driver raises during a read."""
+
+    def grab(self) -> bool:
+        raise cv2.error("VIDIOC_DQBUF: No such device")
+
+
+def test_a_device_that_raises_is_a_silent_one() -> None:
+    opened: list[FakeCapture] = []
+
+    def open_capture(path: str) -> FakeCapture:
+        opened.append(BrokenCapture(path))
+        return opened[-1]
+
+    source = DeviceFrames("0", 6, 4, open_capture=open_capture)
+    assert opened[0].released.wait(timeout=5)
+    assert source.frame(0) is None
+    with pytest.raises(FrameError, match=r"no frame for 1\.0 s: replug") as fault:
+        source.frame(SECOND)
+    assert fault.value.kind == "silent"
+    source.close()
+
+
+def _video(path: Path, frames: int) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (64, 48))
+    for level in range(frames):
+        writer.write(np.full((48, 64, 3), 5 * level, np.uint8))
+    writer.release()
+    return path
+
+
+def test_a_video_without_frames_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="no video that OpenCV can read") as refusal:
+        FileFrames(_video(tmp_path / "clip.avi", 0))
+    assert refusal.value.exit_code == 78
+
+
+def test_a_video_cut_anywhere_is_refused_or_ends_early(tmp_path: Path) -> None:
+    whole = _video(tmp_path / "clip.avi", 30).read_bytes()
+    path = tmp_path / "cut.avi"
+    for cut in range(0, len(whole), len(whole) // 20):
+        path.write_bytes(whole[:cut])
+        try:
+            source = FileFrames(path)
+        except SourceError:
+            continue
+        with pytest.raises(EndOfFrames, match="has ended after"):
+            _play(source)
+        source.close()
+
+
+def _play(source: FileFrames) -> None:
+    for tick in range(60):
+        source.frame(tick * SECOND // 15)
+
+
+@pytest.mark.parametrize("name", ["none.avi", "."])
+def test_a_missing_video_says_what_is_there(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SourceError, match=r"no video file .* found") as refusal:
+        open_source(f"file:{tmp_path / name}", 480, 360)
+    assert refusal.value.exit_code == 66
+
+
+def test_a_device_without_rights_names_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+
+    def denied(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", denied)  # root may open everything
+    with pytest.raises(SourceError, match="sudo usermod -aG video"):
+        open_source(f"device:{path}", 480, 360)
+
+
+def test_a_busy_device_names_who_holds_it(tmp_path: Path) -> None:
+    path = tmp_path / "video0"
+    path.touch()
+    with subprocess.Popen(["tail", "-f", str(path)], stdout=subprocess.PIPE) as holder:
+        try:
+            holding = f"/proc/{holder.pid}/fd"
+            while not any(os.path.realpath(entry) == str(path) for entry in Path(holding).iterdir()):
+                assert holder.poll() is None
+            with pytest.raises(SourceError, match=rf"held by tail \(pid {holder.pid}\): end it first"):
+                open_source(f"device:{path}", 480, 360)
+        finally:
+            holder.kill()
+
+
+def test_a_topic_that_falls_silent_is_told_until_it_speaks_again() -> None:
+    source = TopicFrames()
+    raw = RawImage(encoding="bgr8", width=2, height=2, step=6, data=bytes(12))
+    assert source.frame(0, raw) is not None
+    assert source.frame(SECOND) is None
+    with pytest.raises(FrameError, match="no image on camera/light"):
+        source.frame(SECOND + 1)
+    assert source.frame(2 * SECOND, raw) is not None
+    assert source.frame(2 * SECOND + 1) is None

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
@@ -91,3 +92,36 @@ def test_corrupt_data_is_refused_or_decoded_but_never_worse(junk: bytes, cut: in
             continue
         assert image.dtype == np.uint8
         assert image.ndim == 3
+
+
+def test_a_cut_picture_is_refused_and_not_filled_with_grey() -> None:
+    draw = np.random.default_rng(0)
+    data = encode(Frame(draw.integers(0, 255, (120, 160, 3), dtype=np.uint8), 0, 0)).data
+    for cut in range(3, len(data) - 2, 97):
+        with pytest.raises(FrameError, match=r"is cut off|cannot be decoded") as fault:
+            decode(CompressedImage(format="jpeg", data=data[:cut]))
+        assert fault.value.kind == "corrupt"
+
+
+@pytest.mark.parametrize("form", ["jpeg", "png"])
+def test_a_size_that_no_camera_has_is_refused_before_memory_is_taken(form: str) -> None:
+    if form == "jpeg":
+        data = bytearray(encode(Frame(_grey(90), 0, 0)).data)
+        place = data.index(b"\xff\xc0") + 5
+        data[place : place + 4] = b"\xff\xff\xff\xff"
+    else:
+        data = bytearray(cv2.imencode(".png", _grey(90))[1].tobytes())
+        data[16:24] = (60_000).to_bytes(4, "big") * 2
+    with pytest.raises(FrameError, match=r"claims 6\d{4} x 6\d{4} px"):
+        decode(CompressedImage(format=form, data=bytes(data)))
+
+
+def test_png_is_read_too() -> None:
+    data = cv2.imencode(".png", _grey(90))[1].tobytes()
+    np.testing.assert_array_equal(decode(CompressedImage(format="png", data=data)), _grey(90))
+
+
+def test_a_dark_frame_names_the_remedy() -> None:
+    with pytest.raises(FrameError, match=r"too dark for colours .* switch on the light") as fault:
+        FrameChecks(48, 32).passed(Frame(_grey(12), 0, 0))
+    assert fault.value.kind == "dark"

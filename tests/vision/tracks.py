@@ -68,6 +68,11 @@ class Play:
             self.gestures += self.recognizer.update(image_of(self._tick * PERIOD_NS, *seen))
         return self
 
+    def blind(self, ticks: int) -> Play:
+        """So many camera periods without an image."""
+        self._tick += ticks
+        return self
+
     def kinds(self, name: str) -> list[str]:
         return [Gesture.Kind.Name(g.kind).removeprefix("KIND_") for g in self.gestures if g.object == name]
 

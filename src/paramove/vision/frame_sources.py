@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -10,9 +12,22 @@ from typing import Any, Protocol
 import cv2
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.input_error import InputError
 from paramove.vision.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
 
+_log = logging.getLogger(__name__)
+
 SOURCES = "topic:camera/light, file:PATH or device:PATH"
+PATIENCE_NS = 1_000_000_000
+"""A source that is silent for longer has a fault."""
+
+
+class SourceError(FrameError, InputError):
+    """A source that cannot be opened; the message says what was found and what helps."""
+
+    def __init__(self, sentence: str, missing: bool = False) -> None:
+        InputError.__init__(self, sentence, missing)
+        self.kind = "missing" if missing else "source"
 
 
 class Capture(Protocol):
@@ -45,11 +60,18 @@ class TopicFrames:
 
     def __init__(self) -> None:
         self._index = 0
+        self._newest_ns: int | None = None
 
     def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
-        """`now_ns` is the message's capture time."""
+        """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
         if light is None:
+            self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
+            if now_ns - self._newest_ns > PATIENCE_NS:
+                raise FrameError(
+                    "no image on camera/light for more than 1 s: see what says it (the simulator)", "silent"
+                )
             return None
+        self._newest_ns = now_ns
         self._index += 1
         return Frame(image_of_raw(light), now_ns, self._index - 1)
 
@@ -60,20 +82,27 @@ class TopicFrames:
 class FileFrames:
     """Frames of a video file, at the file's own rate; frames between two ticks are left out.
 
-    Raises FrameError if the file does not exist or is no video; EndOfFrames after the last frame.
+    Raises SourceError if the file does not exist or is no video; EndOfFrames after the last frame.
     """
 
     hears_light = False
 
     def __init__(self, path: Path) -> None:
         if not path.is_file():
-            raise FrameError(f"no video file {path}: an existing file (mp4, avi, ...) expected")
+            found = "a folder or device" if path.exists() else "nothing"
+            raise SourceError(f"no video file {path}: an existing file (mp4, avi, ...) expected, {found} found", True)
         self._path = path
         self._capture: Capture = cv2.VideoCapture(str(path))
         self._rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
-        if not self._capture.isOpened() or self._rate_hz <= 0:
+        self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        if not self._capture.isOpened() or not 0.1 <= self._rate_hz <= 1000.0 or not self._capture.grab():
             self._capture.release()
-            raise FrameError(f"{path} is no video that OpenCV can read: an mp4 or avi with frames expected")
+            raise SourceError(
+                f"{path} ({path.stat().st_size} bytes) is no video that OpenCV can read, or is cut off: an mp4 or avi "
+                "with frames expected"
+            )
+        self._capture.release()
+        self._capture = cv2.VideoCapture(str(path))  # from the first frame on
         self._start_ns: int | None = None
         self._grabbed = 0
 
@@ -85,15 +114,19 @@ class FileFrames:
             return None
         while self._grabbed < due:
             if not self._capture.grab():
-                raise EndOfFrames(f"{self._path} has ended after {self._grabbed} frames")
+                raise self._end()
             self._grabbed += 1
         done, image = self._capture.retrieve()
         if not done:
-            raise FrameError(f"frame {self._grabbed - 1} of {self._path} cannot be decoded")
+            raise FrameError(f"frame {self._grabbed - 1} of {self._path} cannot be decoded", "corrupt")
         return Frame(image, now_ns, self._grabbed - 1)
 
     def close(self) -> None:
         self._capture.release()
+
+    def _end(self) -> EndOfFrames:
+        early = f" of {self._count}: the file is cut off" if self._grabbed < self._count else ""
+        return EndOfFrames(f"{self._path} has ended after {self._grabbed} frames{early}")
 
 
 class DeviceFrames:
@@ -117,7 +150,7 @@ class DeviceFrames:
         width_px: int,
         height_px: int,
         rate_hz: float = 15.0,
-        patience_ns: int = 1_000_000_000,
+        patience_ns: int = PATIENCE_NS,
         open_capture: Callable[[str], Capture] | None = None,
     ) -> None:
         self._path = f"/dev/video{path}" if path.isdigit() else path
@@ -141,7 +174,7 @@ class DeviceFrames:
             if silent_ns < self._patience_ns:
                 return None
             self._reopen(now_ns)
-            raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it")
+            raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")
         self._newest_ns = now_ns
         self._index += 1
         return Frame(image, now_ns, self._index - 1)
@@ -184,17 +217,21 @@ class _Reader:
         self._thread.join(timeout=0.2)
 
     def _read(self) -> None:
-        while not self._stopping.is_set() and self._capture.grab():
-            done, image = self._capture.retrieve()
-            if not done:
-                break
-            with self._lock:
-                self._newest = image
-        self._capture.release()
+        try:
+            while not self._stopping.is_set() and self._capture.grab():
+                done, image = self._capture.retrieve()
+                if not done:
+                    break
+                with self._lock:
+                    self._newest = image
+        except cv2.error as error:  # unplugged during a read; the silence is told by the other side
+            _log.warning("reading the camera: %s", error.err)
+        finally:
+            self._capture.release()
 
 
 def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
-    """The source that the text names. Raises FrameError if there is none like it or it cannot be opened."""
+    """The source that the text names. Raises SourceError if there is none like it or it cannot be opened."""
     kind, _, rest = source.partition(":")
     if kind == "topic" and rest == "camera/light":
         return TopicFrames()
@@ -202,25 +239,25 @@ def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
         return FileFrames(Path(rest))
     if kind == "device" and rest:
         return DeviceFrames(rest, width_px, height_px)
-    raise FrameError(f"camera source {source!r}: {SOURCES} expected")
+    raise SourceError(f"camera source {source!r}: {SOURCES} expected")
 
 
 def _open_v4l2(path: str) -> Capture:
-    """Raises FrameError that names what is there, the remedy for missing rights, or who holds the device."""
+    """Raises SourceError that names what is there, the remedy for missing rights, or who holds the device."""
     device = Path(path)
     if not device.exists():
         found = sorted(str(p) for p in [*Path("/dev").glob("video*"), *Path("/dev/v4l/by-id").glob("*")])
-        raise FrameError(f"no camera {path}; found: {', '.join(found) or 'none at all: plug one in'}")
+        raise SourceError(f"no camera {path}; found: {', '.join(found) or 'none at all: plug one in'}", missing=True)
     try:
         device.open("rb").close()
     except PermissionError as denied:
-        raise FrameError(f"no right to read {path}: run 'sudo usermod -aG video $USER' and log in again") from denied
+        raise SourceError(f"no right to read {path}: run 'sudo usermod -aG video $USER' and log in again") from denied
     except OSError as error:
-        raise FrameError(f"{path} cannot be opened: {error.strerror}; a V4L2 camera expected") from error
+        raise SourceError(f"{path} cannot be opened: {error.strerror}; a V4L2 camera expected") from error
     capture: Capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
     if not capture.isOpened():
         capture.release()
-        raise FrameError(f"{path} gives no frames: {_holder(device) or 'it is no V4L2 camera that captures'}")
+        raise SourceError(f"{path} gives no frames: {_holder(device) or 'it is no V4L2 camera that captures'}")
     return capture
 
 
@@ -228,9 +265,9 @@ def _holder(device: Path) -> str:
     """'held by NAME (pid N)' for another process that has the device open, else ''."""
     real = device.resolve()
     for descriptor in Path("/proc").glob("[0-9]*/fd/*"):
+        process = descriptor.parents[1]
         try:
-            if descriptor.readlink() == real:
-                process = descriptor.parents[1]
+            if process.name != str(os.getpid()) and descriptor.readlink() == real:
                 return f"held by {(process / 'comm').read_text().strip()} (pid {process.name}): end it first"
         except OSError:
             continue  # ended meanwhile, or not ours to look into

@@ -18,14 +18,26 @@ from numpy.typing import NDArray
 Image = NDArray[Any]  # uint8 [H, W, 3], BGR
 
 CAMERA_FRAME = "camera_optical"
-BLACK_LEVEL = 3.0
-"""Mean of 255 below which a frame is black: a lens cap gives 0 to 2, the darkest lit scene of the demo about 25."""
+DARK_LEVEL = 16.0
+"""Mean of 255 below which noise hides the colours. A lens cap gives 0 to 5, the demo's darkest scene about 25."""
 SATURATED_SHARE = 0.95
 _TO_BGR = {"bgr8": None, "8UC3": None, "rgb8": cv2.COLOR_RGB2BGR}
 
 
+MOST_PIXELS = 50_000_000
+"""Of a compressed image, which may claim more than memory holds in a few bytes."""
+
+
 class FrameError(RuntimeError):
-    """A frame that cannot be used, or none; the message says what was expected, what was found and what helps."""
+    """A frame that cannot be used, or none; the message says what was expected, what was found and what helps.
+
+    Attributes:
+        kind: Of fault, the same for every frame that suffers from it.
+    """
+
+    def __init__(self, sentence: str, kind: str = "unusable") -> None:
+        super().__init__(sentence)
+        self.kind = kind
 
 
 class EndOfFrames(FrameError):  # noqa: N818 - an end is no error of the file
@@ -46,11 +58,11 @@ class FrameChecks:
 
     Args:
         width_px, height_px: Expected size.
-        frozen_after: So many equal frames in a row are a frozen camera: sensor noise makes real ones differ. 15 are one
-            second. 0 allows equal frames, for drawn videos.
+        frozen_after: So many equal frames in a row are a frozen camera: sensor noise makes real ones differ. 5 are a
+            third of a second, before what moves would seem to rest. 0 allows equal frames, for drawn videos.
     """
 
-    def __init__(self, width_px: int, height_px: int, frozen_after: int = 15) -> None:
+    def __init__(self, width_px: int, height_px: int, frozen_after: int = 5) -> None:
         self._size = (width_px, height_px)
         self._frozen_after = frozen_after
         self._last_hash = -1
@@ -63,7 +75,8 @@ class FrameChecks:
         if (width, height) != self._size:
             raise FrameError(
                 f"frame {frame.index} has {width} x {height} px, {self._size[0]} x {self._size[1]} expected; "
-                "set the camera's resolution or the node's width and height"
+                "set the camera's resolution or the node's width and height",
+                "size",
             )
         self._check_frozen(frame)
         self._check_exposure(frame)
@@ -75,20 +88,23 @@ class FrameChecks:
         self._last_hash = value
         if self._frozen_after and self._equal_frames >= self._frozen_after:
             raise FrameError(
-                f"the last {self._equal_frames} frames are identical: the camera is frozen or unplugged, replug it"
+                f"the last {self._equal_frames} frames are identical: the camera is frozen or unplugged, replug it",
+                "frozen",
             )
 
     def _check_exposure(self, frame: Frame) -> None:
         sparse = frame.image_bgr[::8, ::8]
-        if float(sparse.mean()) < BLACK_LEVEL:
+        if float(sparse.mean()) < DARK_LEVEL:
             raise FrameError(
-                f"frame {frame.index} is black (mean {float(sparse.mean()):.1f} of 255, {BLACK_LEVEL} needed): "
-                "take off the lens cap or switch on the light"
+                f"frame {frame.index} is black or too dark for colours (mean {float(sparse.mean()):.1f} of 255, "
+                f"{DARK_LEVEL:g} needed): take off the lens cap, switch on the light or lengthen the exposure",
+                "dark",
             )
         saturated = float((sparse.min(axis=2) >= 254).mean())
         if saturated > SATURATED_SHARE:
             raise FrameError(
-                f"frame {frame.index} is saturated ({saturated:.0%} of the pixels are white): shorten the exposure"
+                f"frame {frame.index} is saturated ({saturated:.0%} of the pixels are white): shorten the exposure",
+                "saturated",
             )
 
 
@@ -127,12 +143,41 @@ def encode(frame: Frame, jpeg_quality: int = 95) -> CompressedImage:
 
 
 def decode(message: CompressedImage) -> Image:
-    """BGR pixels of a compressed image. Raises FrameError for empty or corrupt data."""
-    image = None
-    if message.data:
-        image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+    """BGR pixels of a compressed image. Raises FrameError for empty, corrupt or cut data and for huge sizes."""
+    image, fault = None, "cannot be decoded"
+    width, height = _claimed_size(message.data)
+    if width * height > MOST_PIXELS:
+        fault = f"claims {width} x {height} px, {MOST_PIXELS} px together allowed"
+    elif width * height and message.data[:2] == _JPEG and b"\xff\xd9" not in message.data[-64:]:
+        fault = "is cut off"  # OpenCV would fill the missing part with grey
+    elif width * height:
+        try:
+            image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+        except cv2.error as error:
+            fault = f"cannot be decoded ({error.err})"
     if image is None:
         raise FrameError(
-            f"compressed image ({message.format!r}, {len(message.data)} bytes) cannot be decoded: JPEG or PNG expected"
+            f"compressed image ({message.format!r:.20}, {len(message.data)} bytes) {fault}: whole JPEG or PNG expected",
+            "corrupt",
         )
     return image
+
+
+_JPEG = b"\xff\xd8"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_NO_FRAME_HEADER = frozenset((0xC4, 0xC8, 0xCC))
+
+
+def _claimed_size(data: bytes) -> tuple[int, int]:
+    """Width and height in the header of a JPEG or PNG; 0, 0 if there is none."""
+    if data[:8] == _PNG:
+        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    place = 2 if data[:2] == _JPEG else len(data)
+    while place + 9 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in _NO_FRAME_HEADER:
+            return int.from_bytes(data[place + 7 : place + 9], "big"), int.from_bytes(
+                data[place + 5 : place + 7], "big"
+            )
+        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return 0, 0

@@ -1,6 +1,6 @@
 """What one object does: unseen, resting or moving, and the moments between (thesis 5.2.6, step 3).
 
-All thresholds are in px of a 480 x 360 image (about 1.4 mm each) and in s of capture time.
+All thresholds are in px of a 480 x 360 image (about 1.4 mm each) and in s of watching.
 """
 
 from __future__ import annotations
@@ -53,13 +53,17 @@ class State(enum.Enum):
 
 @dataclass(frozen=True)
 class Happening:
-    """A moment of one object; (u, v) px. `sunk`: seen to sink, (u, v) counted from the opening's near rim."""
+    """A moment of one object; (u, v) px.
+
+    `sunk`: seen to sink, (u, v) counted from the opening's near rim. `placed`: False if nobody saw where it happened.
+    """
 
     kind: Gesture.Kind
     u_px: float
     v_px: float
     confidence: float
     sunk: bool = False
+    placed: bool = True
 
 
 class ObjectMotion:
@@ -72,6 +76,8 @@ class ObjectMotion:
         self.state = State.UNSEEN
         self.place: Sample | None = None
         """Where the object rests, at its best view."""
+        self.blind = False
+        """There was a time without images after the object was last seen well."""
         self._full_size = full_size
         self._limits = thresholds
         self._history: deque[Sample] = deque()
@@ -91,7 +97,7 @@ class ObjectMotion:
             self._history.popleft()
         remnant = sample is not None and self.share(sample) < self._limits.remnant_share
         if sample is not None and not remnant:
-            self._well_seen_s = sample.time_s
+            self._well_seen_s, self.blind = sample.time_s, False
         if sample is None or (remnant and self.state is State.MOVING):
             return self._unseen(now_s, hand_near)
         if self.state is State.RESTING:
@@ -119,9 +125,12 @@ class ObjectMotion:
         else:
             last = last_place(self.name, list(self._history), self._full_size)
             u, v, sunk, confidence = last.u_px, last.v_px, last.sunk, last.confidence
+        unwatched = self.blind and self.state is State.MOVING  # it went on while nobody saw where to
         self.state, self.place = State.UNSEEN, None
         self._history.clear()
-        return Happening(Gesture.KIND_VANISHED, u, v, confidence, sunk)
+        return Happening(
+            Gesture.KIND_VANISHED, u, v, 0.3 * confidence if unwatched else confidence, sunk, not unwatched
+        )
 
     def _while_resting(self, sample: Sample) -> list[Happening]:
         assert self.place is not None

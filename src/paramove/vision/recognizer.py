@@ -15,6 +15,12 @@ from paramove.vision.sinking import Sample
 
 HAND_SEEN_S = 0.18
 HAND_GONE_S = 0.5
+BLIND_S = 0.35
+"""Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
+LONGEST_STEP_S = 0.2
+"""More time than this between two images is no time of watching."""
+CLOCK_BACK_S = 5.0
+"""An image older than this is no late one: the clock, or an image's time, was wrong."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,10 @@ class RecognizerOptions:
 
 
 class Recognizer:
-    """Keeps a small state per object and says what happens to it, in the order of names, objects before the hand."""
+    """Keeps a small state per object and says what happens to it, in the order of names, objects before the hand.
+
+    All durations are times of watching: while no image comes (the camera starts again, it is dark), they stand still.
+    """
 
     def __init__(self, options: RecognizerOptions | None = None) -> None:
         self._options = options or RecognizerOptions()
@@ -45,17 +54,22 @@ class Recognizer:
         self._pointing = Pointing(self._options.pointing)
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
-        self._newest_s = float("-inf")
+        self._newest_s: float | None = None
+        self._watched_s = 0.0
 
     def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
         """What happens in this image. An image not newer than the one before is ignored.
 
         Raises HomographyError if the calibration holds no homography.
         """
-        now_s = tracked.captured.ToNanoseconds() * 1e-9
-        if now_s <= self._newest_s:
+        step_s = self._step_s(tracked.captured.ToNanoseconds() * 1e-9)
+        if step_s <= 0.0:
             return []
-        self._newest_s = now_s
+        if step_s > BLIND_S:
+            for motion in self._objects.values():
+                motion.blind = True
+        self._watched_s += min(step_s, LONGEST_STEP_S)
+        now_s = self._watched_s
         homography = self._homography(calibration)
         hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
         said: list[Gesture] = []
@@ -66,6 +80,16 @@ class Recognizer:
         if pointed_at is not None:
             said.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
         return said
+
+    def _step_s(self, captured_s: float) -> float:
+        """Time since the image before; 0 for one that is not newer."""
+        newest_s, self._newest_s = self._newest_s, captured_s
+        if newest_s is None:
+            return LONGEST_STEP_S
+        if newest_s - CLOCK_BACK_S < captured_s <= newest_s:
+            self._newest_s = newest_s
+            return 0.0
+        return abs(captured_s - newest_s)
 
     def _follow_objects(
         self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float
@@ -113,7 +137,7 @@ class Recognizer:
             v_px=happening.v_px,
             confidence=happening.confidence,
         )
-        if homography is not None and name:
+        if homography is not None and name and happening.placed:
             clearance = self._options.rim_clearance if happening.sunk else 0.0
             gesture.located, gesture.frame = True, homography.plane_frame
             gesture.x, gesture.y = homography.away_from_camera(happening.u_px, happening.v_px, clearance)
