@@ -78,7 +78,7 @@ def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
         typer.echo(str(error), err=True)
         raise typer.Exit(REFUSED) from None
     if found is None:
-        typer.echo(f"{name} was stopped; the run has ended with it")
+        typer.echo(f"{name}: {action} is done, and the run has ended with it")
         return
     typer.echo(f"{name} is {found['state']}: {found['sentence']}")
     if found["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):

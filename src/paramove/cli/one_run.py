@@ -17,6 +17,7 @@ from paramove.supervision import application, exit_codes
 from paramove.supervision.domain import DomainError, DomainNameError
 from paramove.supervision.environment import Environment, examined
 from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
+from paramove.supervision.limits import LimitError
 from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, View
@@ -65,6 +66,9 @@ def run(wanted: Wanted, check_only: bool) -> int:
     except DomainError as error:
         errors.print(str(error))
         return exit_codes.TEMPORARY
+    except LimitError as error:
+        errors.print(str(error))
+        return exit_codes.PERMISSION
     except OSError as error:
         errors.print(_about_files(error, (wanted.runs or workspace / "runs").resolve(), environment))
         return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE

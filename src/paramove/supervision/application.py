@@ -14,6 +14,7 @@ from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
+from paramove.supervision.limits import allow_open_files
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
@@ -51,9 +52,10 @@ def run(
         make_view: Gets the run folder, so that it can be shown.
         runs: Where the run folder is made; default `runs` in the workspace.
 
-    Raises LaunchFileError, DomainError (another run holds the domain) or OSError (run folder).
+    Raises LaunchFileError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
     """
     interfaces = check(launch, workspace)
+    allow_open_files()
     name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     with held_domain(name, f"paramove launch {launch.name}") as domain:
         begun = datetime.datetime.now().astimezone()
@@ -76,6 +78,7 @@ def run(
                     "exit_code": node.exit_code,
                     "exit_reason": node.exit_reason or None,
                     "restarts": node.restarts,
+                    "longest_silence_s": round(node.longest_silence_s, 1),
                 }
                 for node in supervisor.nodes.values()
             },

@@ -65,6 +65,7 @@ class SupervisedNode:
         exit_reason: How it ended last and why, in words that follow its name; empty before.
         came_back: How it ended and what it says since it is up again, once it was restarted; empty before.
         status: Its last NodeStatus.
+        longest_silence_s: Between two of them while it was at work.
         process: None while it does not run.
         pid: Of its last process; 0 before the first.
     """
@@ -94,6 +95,7 @@ class SupervisedNode:
         self._deadline_s = 0.0  # of readiness while starting, of the next start while restarting
         self._measure_due_s = 0.0
         self._killed_for = ""
+        self.longest_silence_s = 0.0
         self._silent_s = 0.0
         self._looked_s = 0.0
         self._before = State.STARTING  # it was suspended
@@ -113,12 +115,17 @@ class SupervisedNode:
         return self.process is not None
 
     def start(self, now_s: float) -> None:
-        """Starts the process."""
+        """Starts the process. One that cannot be started has ended, and is tried again as any other."""
         self.status = NodeStatus()
         self._killed_for = ""
         self._silent_s, self._looked_s = 0.0, now_s
         self._deadline_s = now_s + self.settings.ready_timeout_s
-        self.process = self._spawn(self.name)
+        try:
+            self.process = self._spawn(self.name)
+        except OSError as error:  # no more processes or files are allowed
+            self._killed_for = f"cannot be started: {error.strerror}"
+            self.conclude(FAILURE, now_s)
+            return
         self.pid = self.process.pid
         self._become(State.STARTING, f"pid {self.process.pid}", "started")
 
@@ -127,6 +134,8 @@ class SupervisedNode:
         if self.process is None or status.pid != self.process.pid:
             return
         self.status = status
+        if self.state in _AT_WORK:
+            self.longest_silence_s = max(self.longest_silence_s, self._silent_s)
         self._silent_s = 0.0
         if self.state in (State.STOPPING, State.SUSPENDED):
             return
