@@ -1,0 +1,102 @@
+"""`paramove graph`: nodes and topics of a launch file, or of what is running."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from paramove.cli import completions
+
+if TYPE_CHECKING:
+    from paramove.supervision.graph import Graph
+
+app = typer.Typer(add_completion=False)
+
+MEASURED_S = 2.0
+
+
+class Format(enum.Enum):
+    """How the graph is written."""
+
+    TEXT = "text"
+    MERMAID = "mermaid"
+    SVG = "svg"
+
+
+@app.command()
+def graph(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help="launch file, such as rule_learning; without one: what is running",
+            autocompletion=completions.launch_files,
+        ),
+    ] = None,
+    overlays: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="OVERLAY", help="as in paramove launch", autocompletion=completions.overlays),
+    ] = None,
+    form: Annotated[Format, typer.Option("--format", help="for a terminal, a page or a picture")] = Format.TEXT,
+    output: Annotated[Path | None, typer.Option(help="file to write instead of the terminal")] = None,
+    live: Annotated[bool, typer.Option("--live", help="what is running in the domain, with measured rates")] = False,
+    domain: Annotated[
+        str | None, typer.Option("--domain", help="for --live", autocompletion=completions.domains)
+    ] = None,
+) -> None:
+    """Draw who says and hears what, with rates; what is heard and said by nobody is marked.
+
+    Exit codes: 0 done; 1 nothing is running; 66 no such launch file; 77 the output cannot be written; 78 the launch
+    file is wrong.
+    """
+    from paramove.supervision.graph_svg import as_svg
+    from paramove.supervision.graph_text import as_mermaid, as_text
+
+    found = _running(domain) if live or name is None else _launched(name, overlays)
+    text = {Format.TEXT: as_text, Format.MERMAID: as_mermaid, Format.SVG: as_svg}[form](found)
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        typer.echo(f"{output}: {error.strerror}; name another file with --output", err=True)
+        raise typer.Exit(77) from None
+    typer.echo(f"written to {output}")
+
+
+def _launched(name: str, overlays: list[str] | None) -> Graph:
+    from paramove.supervision import exit_codes
+    from paramove.supervision.application import NoWorkspaceError, check, find_workspace
+    from paramove.supervision.graph import graph_of
+    from paramove.supervision.launch_file import LaunchFileMissingError, load
+    from paramove.supervision.positions import LaunchFileError
+
+    try:
+        workspace = find_workspace(Path.cwd())
+        launch = load(workspace / "launch", name, overlays)
+        return graph_of(launch, check(launch, workspace))
+    except (LaunchFileMissingError, NoWorkspaceError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(exit_codes.INPUT_MISSING) from None
+    except LaunchFileError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(exit_codes.CONFIGURATION) from None
+
+
+def _running(domain: str | None) -> Graph:
+    from paramove.cli.bus_options import bus_folder
+    from paramove.supervision.graph import running_graph
+
+    folder = bus_folder(domain)
+    found = running_graph(folder, folder.name, MEASURED_S)
+    if not found.nodes:
+        typer.echo("no node is on the bus; name a launch file, such as `paramove graph rule_learning`", err=True)
+        raise typer.Exit(1)
+    return found
+
+
+if __name__ == "__main__":
+    app()

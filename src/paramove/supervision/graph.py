@@ -1,0 +1,153 @@
+"""Nodes and topics of an application as a graph: from a launch file, or from what runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from paramove.bus import inspection, topics
+from paramove.bus.topics import CLOCK, Topic
+from paramove.supervision.interfaces import Interface
+from paramove.supervision.launch_file import Launch
+from paramove.supervision.wiring import on_bus
+
+MANY = 10
+"""A node that hears so many topics is a collector, such as the recorder: what it hears is counted, not drawn."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A topic with all who say and hear it.
+
+    Attributes:
+        topic: Name on the bus.
+        rate_hz: Nominal or measured; None where messages come with events.
+        said_by: Nodes; none where nobody says what somebody hears.
+        heard_by: Nodes.
+    """
+
+    topic: str
+    rate_hz: float | None
+    said_by: tuple[str, ...]
+    heard_by: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """Name and rate."""
+        return self.topic if self.rate_hz is None else f"{self.topic} {self.rate_hz:.3g} Hz"
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes in the order in which data flows, as far as there is one, and the topics between them.
+
+    Attributes:
+        title: Name of the launch file, or of the domain.
+        nodes: Name -> what it is: its module, or its state.
+        edges: In the order of the topic table.
+        collectors: Nodes that hear nearly everything.
+        all_hear: Topics that go to every node, such as the clock.
+    """
+
+    title: str
+    nodes: Mapping[str, str]
+    edges: tuple[Edge, ...]
+    collectors: frozenset[str]
+    all_hear: frozenset[str] = frozenset()
+
+    def between(self, speaker: str, hearer: str) -> list[Edge]:
+        """What one node says and the other hears."""
+        return [edge for edge in self.edges if speaker in edge.said_by and hearer in edge.heard_by]
+
+    def only_collected(self, edge: Edge) -> bool:
+        """Whether nobody but collectors hears a topic."""
+        return self.collectors.issuperset(edge.heard_by)
+
+    @property
+    def unsaid(self) -> list[Edge]:
+        """Topics that are heard and that nobody says."""
+        return [edge for edge in self.edges if not edge.said_by]
+
+
+def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
+    """Graph of a checked launch file; remaps are followed."""
+    said: dict[str, list[str]] = {}
+    heard: dict[str, list[str]] = {}
+    table: dict[str, Topic] = {}
+    for name, interface in interfaces.items():
+        for there, side in ((said, interface.says), (heard, interface.hears)):
+            for topic in side:
+                there.setdefault(on_bus(launch, name, topic), []).append(name)
+                table[on_bus(launch, name, topic)] = topic
+    rates = {name: topic.rate_hz for name, topic in table.items()}
+    modules = {name: launch.file.nodes[name].module for name in interfaces}
+    title = " with ".join([launch.name, *([", ".join(launch.overlays)] if launch.overlays else [])])
+    all_hear = {CLOCK.name} if launch.file.bus.clock == "simulated" else set()
+    return _graph(title, modules, said, heard, rates, all_hear)
+
+
+def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
+    """Graph of the nodes on a bus, with rates measured for `seconds`; empty where nothing runs."""
+    said: dict[str, list[str]] = {}
+    heard: dict[str, list[str]] = {}
+    states: dict[str, str] = {}
+    for node, status in inspection.statuses(folder, 2.0).items():
+        states[node] = _state(status)
+        for there, counts in ((said, status.said if status else ()), (heard, status.heard if status else ())):
+            for count in counts:
+                if not count.topic.startswith("status/"):
+                    there.setdefault(count.topic, []).append(node)
+    known = {topic.name: topic for topic in topics.TOPICS}
+    measured = inspection.measure(
+        folder, [known[name] for name in said if name in known and not known[name].truth], seconds
+    )
+    rates = {item.topic.name: item.rate_hz if item.topic.rate_hz else None for item in measured}
+    all_hear = {CLOCK.name} if CLOCK.name in said else set()
+    return _graph(f"domain {domain}", states, said, heard, rates, all_hear)
+
+
+def _state(status: Any) -> str:
+    if status is None:
+        return "does not answer"
+    return str(type(status).State.Name(status.state)).removeprefix("STATE_").lower()
+
+
+def _graph(
+    title: str,
+    nodes: Mapping[str, str],
+    said: Mapping[str, list[str]],
+    heard: Mapping[str, list[str]],
+    rates: Mapping[str, float | None],
+    all_hear: Iterable[str],
+) -> Graph:
+    order = {topic.name: index for index, topic in enumerate(topics.TOPICS)}
+    names = sorted({*said, *heard}, key=lambda name: (order.get(name, len(order)), name))
+    edges = tuple(Edge(name, rates.get(name), tuple(said.get(name, ())), tuple(heard.get(name, ()))) for name in names)
+    collectors = frozenset(node for node in nodes if sum(node in edge.heard_by for edge in edges) >= MANY)
+    ordered = {node: nodes[node] for node in _flow(list(nodes), edges, collectors)}
+    return Graph(title, ordered, edges, collectors, frozenset(all_hear))
+
+
+def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -> list[str]:
+    """Nodes ordered so that few topics go backwards (Eades, Lin and Smyth 1993), collectors last."""
+    world = [node for edge in edges if edge.topic == CLOCK.name for node in edge.said_by]
+    left = [node for node in nodes if node not in (*collectors, *world)]
+    to = {(a, b) for edge in edges for a in edge.said_by for b in edge.heard_by if a != b}
+    begin = world[:1]  # what keeps the time is where data comes from
+    end: list[str] = []
+    while left:
+        inside = [(a, b) for a, b in to if a in left and b in left]
+        says = {node: sum(a == node for a, _ in inside) for node in left}
+        hears = {node: sum(b == node for _, b in inside) for node in left}
+        sink = next((node for node in left if says[node] == 0), None)
+        source = next((node for node in left if hears[node] == 0), None)
+        if sink is not None:
+            end.insert(0, sink)
+        elif source is not None:
+            begin.append(source)
+        else:
+            begin.append(max(left, key=lambda node: says[node] - hears[node]))
+        left.remove(end[0] if sink is not None else begin[-1])
+    return [*begin, *end, *(node for node in nodes if node in collectors)]

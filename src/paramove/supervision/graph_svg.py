@@ -1,0 +1,171 @@
+"""A graph of nodes and topics as SVG, drawn as an N2 chart.
+
+The nodes lie on the diagonal in the order in which data flows. What node i says to node j stands in row i and column
+j: it leaves the node to the side and arrives from above, or, where it goes back to an earlier node, from below. So no
+line crosses a text, whatever the graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.sax.saxutils import escape
+
+from paramove.supervision.graph import Edge, Graph
+
+LETTER_PX = 6.4
+"""Width of a letter of the sans-serif at 11 px, on the wide side."""
+LINE_PX, PAD_PX, BOX_PX, MARGIN_PX, TITLE_PX = 14.0, 9.0, 34.0, 16.0, 40.0
+NOBODY = "said by nobody"
+
+_STYLE = """
+    text { font: 11px "DejaVu Sans", Verdana, sans-serif; fill: #1f2933; }
+    .title { font-size: 15px; font-weight: bold; }
+    .node { font-size: 12px; font-weight: bold; text-anchor: middle; }
+    .about { font-size: 9px; fill: #52606d; text-anchor: middle; }
+    .topic { text-anchor: middle; }
+    .rate, .note { fill: #7b8794; }
+    .box { fill: #e3f0fb; stroke: #2b6cb0; stroke-width: 1.3; }
+    .collector { fill: #f5f7fa; stroke: #7b8794; stroke-dasharray: 4 3; }
+    .nobody { fill: #fdecea; stroke: #c0392b; stroke-dasharray: 4 3; }
+    .label { fill: #ffffff; fill-opacity: 0.94; }
+    .line { fill: none; stroke: #2b6cb0; stroke-width: 1.2; }
+    .back { stroke: #b7791f; }
+    .unsaid { stroke: #c0392b; stroke-dasharray: 4 3; }
+    .collected { stroke: #9aa5b1; stroke-dasharray: 4 3; }
+"""
+
+
+@dataclass
+class _Chart:
+    """Where everything stands: columns and rows of the chart, and what is written in each cell."""
+
+    graph: Graph
+    names: list[str]
+    cells: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    left: dict[str, float] = field(default_factory=dict)
+    width: dict[str, float] = field(default_factory=dict)
+    top: dict[str, float] = field(default_factory=dict)
+    height: dict[str, float] = field(default_factory=dict)
+
+    def middle(self, name: str) -> tuple[float, float]:
+        """Middle of a node's box, x and y."""
+        return self.left[name] + self.width[name] / 2, self.top[name] + self.height[name] / 2
+
+
+def as_svg(graph: Graph) -> str:
+    """The graph as an SVG document."""
+    chart = _laid_out(graph)
+    last = chart.names[-1] if chart.names else ""
+    width = chart.left.get(last, 300.0) + chart.width.get(last, 0.0) + MARGIN_PX
+    height = chart.top.get(last, TITLE_PX) + chart.height.get(last, 0.0) + MARGIN_PX + LINE_PX
+    body = [*_lines(chart), *_labels(chart), *_boxes(chart)]
+    remark = "right and down: onwards; left and up (brown): back; dashed: collected, or said by nobody (red)"
+    remark += "".join(f"; {escape(topic)}: to all nodes" for topic in sorted(graph.all_hear))
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
+            f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{_attribute(graph.title)}">',
+            f"<style>{_STYLE}</style>",
+            '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" '
+            'orient="auto"><path d="M0 0 L8 4 L0 8 z" fill="context-stroke"/></marker></defs>',
+            f'<rect width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
+            f'<text class="title" x="{MARGIN_PX}" y="26">{escape(graph.title)}</text>',
+            *body,
+            f'<text class="note" x="{MARGIN_PX}" y="{height - 8:.0f}">{remark}</text>',
+            "</svg>\n",
+        ]
+    )
+
+
+def _laid_out(graph: Graph) -> _Chart:
+    names = [*([NOBODY] if graph.unsaid else []), *graph.nodes]
+    chart = _Chart(graph, names)
+    for speaker in names:
+        for hearer in names:
+            found = _written(graph, speaker, hearer)
+            if found and speaker != hearer:
+                chart.cells[speaker, hearer] = found
+    x, y = MARGIN_PX, TITLE_PX
+    for name in names:
+        column = [line for (_, hearer), lines in chart.cells.items() if hearer == name for line in lines]
+        row = [len(lines) for (speaker, _), lines in chart.cells.items() if speaker == name]
+        chart.left[name], chart.top[name] = x, y
+        chart.width[name] = LETTER_PX * max(1.25 * len(name), *map(len, column), 8) + 2 * PAD_PX
+        chart.height[name] = max(BOX_PX, LINE_PX * max(row, default=0)) + 2 * PAD_PX
+        x += chart.width[name]
+        y += chart.height[name]
+    return chart
+
+
+def _written(graph: Graph, speaker: str, hearer: str) -> list[str]:
+    """What stands in a cell."""
+    if speaker == NOBODY:
+        return [edge.label for edge in graph.unsaid if hearer in edge.heard_by and hearer not in graph.collectors]
+    if hearer == NOBODY:
+        return []
+    edges = graph.between(speaker, hearer)
+    if hearer not in graph.collectors:
+        return [edge.label for edge in edges]
+    only: list[Edge] = [edge for edge in edges if graph.only_collected(edge)]
+    more = len(edges) - len(only)
+    rest = f"and {more} more" if only else f"{more} topic{'s' if more > 1 else ''}"
+    return [edge.label for edge in only] + ([rest] if more else [])
+
+
+def _kind(chart: _Chart, speaker: str, hearer: str) -> str:
+    if speaker == NOBODY:
+        return "line unsaid"
+    if hearer in chart.graph.collectors:
+        return "line collected"
+    return "line back" if chart.names.index(hearer) < chart.names.index(speaker) else "line"
+
+
+def _lines(chart: _Chart) -> Iterator[str]:
+    """From the side of one box along its row, then along the column of the other to its upper or lower edge."""
+    for speaker, hearer in sorted(chart.cells, key=lambda cell: cell[1] not in chart.graph.collectors):
+        from_x, from_y = chart.middle(speaker)
+        to_x, to_y = chart.middle(hearer)
+        onwards = to_x > from_x
+        start = from_x + (1 if onwards else -1) * (chart.width[speaker] / 2 - PAD_PX / 2)
+        end = to_y - (1 if onwards else -1) * (BOX_PX / 2 + 1)
+        yield (
+            f'<path class="{_kind(chart, speaker, hearer)}" marker-end="url(#tip)" '
+            f'd="M{start:.1f} {from_y:.1f} H{to_x:.1f} V{end:.1f}"/>'
+        )
+
+
+def _labels(chart: _Chart) -> Iterator[str]:
+    for (speaker, hearer), lines in chart.cells.items():
+        x, _ = chart.middle(hearer)
+        _, y = chart.middle(speaker)
+        wide = LETTER_PX * max(map(len, lines)) + 4
+        high = LINE_PX * len(lines)
+        yield (
+            f'<rect class="label" x="{x - wide / 2:.1f}" y="{y - high / 2:.1f}" width="{wide:.1f}" '
+            f'height="{high:.1f}"/>'
+        )
+        for number, line in enumerate(lines):
+            name, _, rate = line.partition(" ")
+            rest = f' <tspan class="rate">{escape(rate)}</tspan>' if rate else ""
+            baseline = y - high / 2 + LINE_PX * (number + 0.78)
+            yield f'<text class="topic" x="{x:.1f}" y="{baseline:.1f}">{escape(name)}{rest}</text>'
+
+
+def _boxes(chart: _Chart) -> Iterator[str]:
+    for name in chart.names:
+        x, y = chart.middle(name)
+        wide = chart.width[name] - PAD_PX
+        kind = "nobody" if name == NOBODY else "collector" if name in chart.graph.collectors else "box"
+        yield (
+            f'<rect class="{kind}" x="{x - wide / 2:.1f}" y="{y - BOX_PX / 2:.1f}" width="{wide:.1f}" '
+            f'height="{BOX_PX}" rx="6"/>'
+        )
+        about = chart.graph.nodes.get(name, "")
+        yield f'<text class="node" x="{x:.1f}" y="{y + (4 if not about else -1):.1f}">{escape(name)}</text>'
+        if about:
+            yield f'<text class="about" x="{x:.1f}" y="{y + 11:.1f}">{escape(about)}</text>'
+
+
+def _attribute(text: str) -> str:
+    return escape(text, {'"': "&quot;"})
