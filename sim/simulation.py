@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from typing import BinaryIO
 
+import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.bus import topics
@@ -34,12 +36,21 @@ class Simulation:
         description: Of the robot.
         camera: Whether the camera's images are rendered.
         video: Whether the view for people is rendered.
+        firmware_log: Gets every frame that the firmware plays, 28 little-endian int16 a millisecond.
 
     Attributes:
         physics_s, rendering_s: Wall time spent since the start.
     """
 
-    def __init__(self, seed: int, description: RobotDescription, camera: bool = True, video: bool = False) -> None:
+    def __init__(
+        self,
+        seed: int,
+        description: RobotDescription,
+        camera: bool = True,
+        video: bool = False,
+        firmware_log: BinaryIO | None = None,
+    ) -> None:
+        self._firmware_log = firmware_log
         draws = looks.streams(seed)
         self.looks = Looks.draw(seed)
         self.world = World(self.looks, description)
@@ -70,10 +81,15 @@ class Simulation:
         """Let the world run up to a tick; raises SimulationError."""
         started = time.perf_counter()
         world, firmware, stream, instructor = self.world, self.firmware, self.stream, self.instructor
+        played = []
         while world.steps < step_of_tick(tick):
-            torques = firmware.step(stream.play(), world.joint_positions(), world.joint_velocities())
+            frame = stream.play()
+            played.append(frame)
+            torques = firmware.step(frame, world.joint_positions(), world.joint_velocities())
             instructor.advance(0.001)
             world.step(torques)
+        if self._firmware_log is not None:
+            self._firmware_log.write(np.array(played, dtype="<i2").tobytes())
         self.physics_s += time.perf_counter() - started
 
     def light(self) -> RawImage | None:

@@ -12,6 +12,7 @@ Says    clock               Clock               15 Hz
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from pathlib import Path
@@ -37,6 +38,7 @@ SAYS = (
 )
 
 REPORT_S = 5
+FIRMWARE_LOG = "firmware_frames.int16"
 
 _log = logging.getLogger(__name__)
 
@@ -50,6 +52,8 @@ class Config(NodeConfig):
         camera: Whether the camera's images are rendered; without, no graphics library is needed.
         video: Whether a view for people is rendered too.
         max_duration_s: Simulated time after which the run ends.
+        firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
+            judge afterwards whether the arm ever jumped.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
     """
 
@@ -59,16 +63,20 @@ class Config(NodeConfig):
     video: bool = False
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
+    firmware_log: bool = False
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes or the simulated time is up."""
     log_warnings_of_mujoco()
-    simulation = Simulation(config.seed, RobotDescription.load(config.robot), config.camera, config.video)
-    try:
+    with contextlib.ExitStack() as open_files:
+        log = None
+        if config.firmware_log:  # without a buffer: nothing is lost when the process is killed
+            log = open_files.enter_context((bus.run_folder / FIRMWARE_LOG).open("xb", buffering=0))
+        description = RobotDescription.load(config.robot)
+        simulation = Simulation(config.seed, description, config.camera, config.video, log)
+        open_files.callback(simulation.close)
         _loop(bus, config, simulation)
-    finally:
-        simulation.close()
 
 
 def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:

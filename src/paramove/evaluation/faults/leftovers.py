@@ -1,0 +1,64 @@
+"""What a run must not leave behind: processes, sockets, held locks."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+
+import psutil
+
+from paramove.bus.endpoint import is_alive
+
+PAUSE_S = 0.05
+
+
+def processes_of(domain: str) -> list[psutil.Process]:
+    """Living processes whose environment names the domain; dead ones that nobody has waited for do not count."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):
+            named = process.environ().get("PARAMOVE_DOMAIN") == domain
+            if named and process.status() != psutil.STATUS_ZOMBIE and process.pid != os.getpid():
+                found.append(process)
+    return found
+
+
+def left_over(domain: str, runtime: Path) -> list[str]:
+    """In words, what is left of a run that has ended: processes, sockets that are listened at, locks that are held.
+
+    Args:
+        domain: Of the run.
+        runtime: Folder above the domain's.
+    """
+    words = [
+        f"process {process.pid} ({' '.join(process.cmdline()[1:4])})" for process in _still_alive(processes_of(domain))
+    ]
+    places = [runtime / domain, *runtime.glob(f"truth-{domain}-*")]
+    files = [path for place in places if place.is_dir() for path in place.rglob("*")]
+    files.append(runtime / f"{domain}.lock")
+    for path in files:
+        if path.is_socket() and is_alive(path):
+            words.append(f"socket {path.name} is listened at")
+        elif path.suffix == ".lock" and _held(path):
+            words.append(f"lock {path.name} is held")
+    return words
+
+
+def _still_alive(processes: list[psutil.Process]) -> list[psutil.Process]:
+    with contextlib.suppress(psutil.Error):
+        _, alive = psutil.wait_procs(processes, timeout=PAUSE_S)
+        return list(alive)
+    return []
+
+
+def _held(path: Path) -> bool:
+    try:
+        with path.open("r+b") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
