@@ -1,9 +1,15 @@
-"""Latency of the bus at 1 kHz with messages of 216 bytes, beside ZeroMQ alone on the same kind of socket.
+"""Latency and losses of the bus.
 
     python benchmarks/bus.py [--seconds 5] [--json FILE]
+    python benchmarks/bus.py --soak 600 [--variant healthy|sleeping|stopped|all] [--json FILE]
 
-A process says, another hears; both read the same monotonic clock. `raw` sends the same bytes with libzmq PUB and SUB
-and nothing else, so the difference is what the envelope, its checks and the protobuf decoding cost.
+The first measures the latency at 1 kHz with messages of 216 bytes. A process says, another hears; both read the same
+monotonic clock. `raw` sends the same bytes with libzmq PUB and SUB and nothing else, so the difference is what the
+envelope, its checks and the protobuf decoding cost. rospy (with a roscore running), zenoh and LCM follow where they are
+installed, each as it comes.
+
+The second says 1000 such messages and 30 images of 1 MB a second to two listeners, and to a third one that sleeps or is
+stopped, and compares what they have counted with what was said.
 """
 
 from __future__ import annotations
@@ -18,36 +24,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import zmq
+from bus_peers import PAYLOAD_BYTES, PEERS, describe, installed, paced
+from bus_soak import VARIANTS, batch, sentences, soak
 
 from paramove.bus import topics
 from paramove.bus.publisher import Publisher
 from paramove.bus.subscriber import Subscriber
-from paramove.msgs.hoap3_wire_pb2 import StreamBatch
-
-PAYLOAD_BYTES = 216
-PERIOD_NS = 1_000_000
-
-
-def _batch() -> StreamBatch:
-    batch = StreamBatch(epoch=1, first_index=1)
-    while batch.ByteSize() < PAYLOAD_BYTES:
-        batch.frames += b"\0"
-    return batch
-
-
-def _paced(messages: int) -> Iterator[int]:
-    """Counts up once a millisecond, by absolute times."""
-    start_ns = time.monotonic_ns()
-    for number in range(messages):
-        left_ns = start_ns + number * PERIOD_NS - time.monotonic_ns()
-        if left_ns > 0:
-            time.sleep(left_ns * 1e-9)
-        yield number
 
 
 def speak_bus(folder: Path, messages: int) -> None:
@@ -57,10 +44,10 @@ def speak_bus(folder: Path, messages: int) -> None:
     while publisher.subscriptions == 0:
         publisher.socket.poll()
         publisher.serve()
-    batch = _batch()
-    for _ in _paced(messages):
+    message = batch()
+    for _ in paced(messages):
         now_ns = time.monotonic_ns()
-        publisher.publish(batch, now_ns, now_ns)
+        publisher.publish(message, now_ns, now_ns)
     publisher.close()
     context.term()
 
@@ -72,7 +59,7 @@ def speak_raw(folder: Path, messages: int) -> None:
     socket.bind(f"ipc://{folder / 'raw'}")
     socket.recv()
     filler = b"\0" * (PAYLOAD_BYTES - 8)
-    for _ in _paced(messages):
+    for _ in paced(messages):
         socket.send(struct.pack("<q", time.monotonic_ns()) + filler)
     socket.close(linger=1000)
     context.term()
@@ -114,10 +101,40 @@ def measure(kind: str, hear: Callable[[Path, int], tuple[list[int], int]], messa
         command = [sys.executable, __file__, "--speak", kind, "--folder", folder, "--messages", str(messages)]
         with subprocess.Popen(command):
             latencies, lost = hear(Path(folder), messages)
+    return summary(kind, latencies, lost)
+
+
+def measure_peer(kind: str, messages: int) -> dict[str, Any]:
+    """The same for another bus; what it complains about instead of numbers if it does not work here."""
+    if not installed(kind):
+        return {"kind": kind, "note": "not installed"}
+    command = [sys.executable, __file__, "--speak", kind, "--folder", ".", "--messages", str(messages)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as speaker:
+        assert speaker.stdin is not None
+
+        def go() -> None:
+            assert speaker.stdin is not None
+            speaker.stdin.write(b"\n")
+            speaker.stdin.flush()
+
+        try:
+            latencies = PEERS[kind][1](messages, go)
+        except Exception as error:
+            return {"kind": kind, "note": describe(error)}
+        finally:
+            speaker.stdin.close()
+            speaker.terminate()
+    if not latencies:
+        return {"kind": kind, "note": "installed, but no message arrived"}
+    return summary(kind, latencies, messages - len(latencies))
+
+
+def summary(kind: str, latencies: list[int], lost: int) -> dict[str, Any]:
+    """The numbers of one measurement; latencies in ns."""
     latencies.sort()
     return {
         "kind": kind,
-        "messages": messages,
+        "messages": len(latencies) + lost,
         "payload_bytes": PAYLOAD_BYTES,
         "lost": lost,
         "p50_us": round(statistics.median(latencies) * 1e-3, 1),
@@ -126,23 +143,51 @@ def measure(kind: str, hear: Callable[[Path, int], tuple[list[int], int]], messa
     }
 
 
+def latency(seconds: float) -> list[dict[str, Any]]:
+    """Measures everything once and tells."""
+    messages = int(1000 * seconds)
+    results = []
+    for kind in ("raw", "bus", *PEERS):
+        if kind in PEERS:
+            result = measure_peer(kind, messages)
+        else:
+            result = measure(kind, {"raw": hear_raw, "bus": hear_bus}[kind], messages)
+        results.append(result)
+        if "note" in result:
+            sys.stdout.write(f"{kind:6} {result['note']}\n")
+        else:
+            ratio = result["p50_us"] / results[0]["p50_us"]
+            sys.stdout.write(
+                "{kind:6} p50 {p50_us} us, p99 {p99_us} us, max {max_us} us, {lost} of {messages} lost".format(**result)
+                + f", p50 {ratio:.2f} times raw\n"
+            )
+    return results
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=5.0, help="of each of the two measurements")
+    parser.add_argument("--seconds", type=float, default=5.0, help="of each measurement of latency")
+    parser.add_argument("--soak", type=float, metavar="SECONDS", help="measure losses instead, for so long")
+    parser.add_argument("--variant", choices=[*VARIANTS, "all"], default="healthy", help="of the soak")
     parser.add_argument("--json", type=Path, help="also write the results here")
-    parser.add_argument("--speak", choices=["bus", "raw"], help=argparse.SUPPRESS)
+    parser.add_argument("--speak", choices=["bus", "raw", *PEERS], help=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--messages", type=int, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    if arguments.speak in PEERS:
+        PEERS[arguments.speak][0](arguments.messages)
+        return
     if arguments.speak:
         {"bus": speak_bus, "raw": speak_raw}[arguments.speak](arguments.folder, arguments.messages)
         return
-    messages = int(1000 * arguments.seconds)
-    results = [measure("raw", hear_raw, messages), measure("bus", hear_bus, messages)]
-    for result in results:
-        sys.stdout.write(
-            "{kind}: p50 {p50_us} us, p99 {p99_us} us, max {max_us} us, {lost} of {messages} lost\n".format(**result)
-        )
+    if arguments.soak:
+        results = []
+        for variant in VARIANTS if arguments.variant == "all" else [arguments.variant]:
+            results.append(soak(arguments.soak, variant))
+            sys.stdout.write(sentences(results[-1]))
+            sys.stdout.flush()
+    else:
+        results = latency(arguments.seconds)
     if arguments.json:
         content = {"cpus": os.cpu_count(), "libzmq": zmq.zmq_version(), "results": results}
         arguments.json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

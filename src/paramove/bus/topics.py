@@ -89,7 +89,7 @@ class Topic:
     @property
     def speaker_high_water_mark(self) -> int:
         """How many may wait at the speaker, for each listener. Few images: their memory is the speaker's."""
-        return 4 if self.is_image else 1000
+        return 6 if self.is_image else 1000
 
 
 _LATEST, _QUEUE, _LATCHED = Profile.LATEST, Profile.QUEUE, Profile.LATCHED

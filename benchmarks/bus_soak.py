@@ -1,0 +1,194 @@
+"""The loss soak of `benchmarks/bus.py --soak`: a speaker and its listeners, each a process with a bus of its own."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from array import array
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import psutil
+import zmq
+from bus_peers import PAYLOAD_BYTES, paced
+
+from paramove.bus import topics
+from paramove.bus.bus import Bus
+from paramove.bus.settings import BusSettings
+from paramove.bus.subscriber import Heard, Subscriber
+from paramove.msgs.hoap3_wire_pb2 import StreamBatch
+
+SMALL = topics.WIRE_HOAP3_STREAM
+IMAGES = replace(topics.CAMERA_LIGHT, rate_hz=30)
+IMAGE_BYTES = 1_000_000
+IMAGE_EVERY = 33
+"""Messages at 1 kHz per image: 30 images a second."""
+VARIANTS = ("healthy", "sleeping", "stopped")
+
+
+def batch() -> StreamBatch:
+    """A message of 216 bytes."""
+    found = StreamBatch(epoch=1, first_index=1)
+    while found.ByteSize() < PAYLOAD_BYTES:
+        found.frames += b"\0"
+    return found
+
+
+def tell(what: Any) -> None:
+    sys.stdout.write(json.dumps(what) + "\n")
+    sys.stdout.flush()
+
+
+def speak(folder: Path, seconds: float, listeners: int) -> None:
+    """Says both topics once all listeners are there; stays until a line on standard input."""
+    with Bus("speaker", BusSettings(folder=folder), (), (SMALL, IMAGES)) as bus:
+        said = [bus.exchange.publishers[topic.name] for topic in (SMALL, IMAGES)]
+        while min(publisher.subscriptions for publisher in said) < listeners:
+            bus.exchange.wait(0.1)
+        small, image = batch(), IMAGES.type(data=b"\1" * IMAGE_BYTES)
+        gc.collect()
+        gc.freeze()
+        process, memory, longest_ns = psutil.Process(), 0, 0
+        for number in paced(int(1000 * seconds)):
+            before_ns = time.perf_counter_ns()
+            bus.publish(SMALL, small)
+            if number % IMAGE_EVERY == 0:
+                bus.publish(IMAGES, image)
+            longest_ns = max(longest_ns, time.perf_counter_ns() - before_ns)
+            if number == 1000:  # after the first images, whose memory stays
+                memory = process.memory_info().rss
+        grown = process.memory_info().rss - memory
+        tell({"said": [item.sequence for item in said], "grown_mb": grown / 1e6, "longest_ms": longest_ns * 1e-6})
+        while not zmq.select([sys.stdin], [], [], 0.01)[0]:
+            bus.exchange.wait(0.01)
+
+
+def hear(folder: Path, sleeping: bool) -> None:
+    """Hears both topics until it knows of as many messages as a line on standard input says, then tells its counts."""
+    latencies = {SMALL.name: array("q"), IMAGES.name: array("q")}
+    with Bus("sleeper" if sleeping else f"listener_{os.getpid()}", BusSettings(folder=folder), (SMALL, IMAGES)) as bus:
+        said: list[int] | None = None
+        for heard in bus.events(tick=True):
+            if isinstance(heard, Heard):
+                if not any(latencies.values()):
+                    tell("hearing")
+                latencies[heard.topic.name].append(time.monotonic_ns() - heard.published_ns)
+                if sleeping and said is None and len(latencies[SMALL.name]) % 5000 == 1:
+                    time.sleep(5)
+            elif said is None and zmq.select([sys.stdin], [], [], 0)[0]:
+                said = json.loads(sys.stdin.readline())
+            known = [bus.exchange.subscribers[topic.name].counter.sequence for topic in (SMALL, IMAGES)]
+            if known == said and not isinstance(heard, Heard):
+                bus.stop()
+        result = {}
+        for topic in (SMALL, IMAGES):
+            counter = bus.exchange.subscribers[topic.name].counter
+            sorted_ns = sorted(latencies[topic.name]) or [0]
+            result[topic.name] = {
+                "received": counter.messages,
+                "lost": counter.lost,
+                "duplicated": counter.repeated,
+                "refused": counter.refused.total(),
+                "p50_us": sorted_ns[len(sorted_ns) // 2] * 1e-3,
+                "p99_us": sorted_ns[int(0.99 * len(sorted_ns))] * 1e-3,
+                "max_ms": sorted_ns[-1] * 1e-6,
+            }
+        tell(result)
+
+
+def _start(*arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, __file__, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def _show_the_end(folder: Path, said: list[int]) -> None:
+    """A further subscription brings a welcome for everybody, which shows what was lost last."""
+    with zmq.Context() as context:
+        others = [Subscriber(context, folder, topic) for topic in (SMALL, IMAGES)]
+        while [other.counter.sequence for other in others] != said:
+            for other in others:
+                other.receive_raw()
+            time.sleep(0.01)
+        time.sleep(0.5)
+        for other in others:
+            other.close()
+
+
+def soak(seconds: float, variant: str) -> dict[str, Any]:
+    """Runs one soak.
+
+    Args:
+        seconds: How long the speaker says.
+        variant: `healthy`, or with one more listener that is `sleeping` five seconds at a time or `stopped` by SIGSTOP.
+    """
+    begun = os.getloadavg()[0]
+    listeners = {"healthy": [], "sleeping": ["sleeping"], "stopped": ["stopped"]}[variant]
+    with tempfile.TemporaryDirectory(prefix="bus-") as name:
+        folder = Path(name)
+        speaker = _start("speak", name, "--seconds", str(seconds), "--listeners", str(2 + len(listeners)))
+        hearing = {
+            way: _start("hear", name, *(["--sleeping"] if way == "sleeping" else []))
+            for way in ("healthy", "healthy too", *listeners)
+        }
+        for way, process in hearing.items():
+            assert process.stdout is not None
+            process.stdout.readline()  # it hears
+            if way == "stopped":
+                process.send_signal(signal.SIGSTOP)
+        assert speaker.stdout is not None
+        told = json.loads(speaker.stdout.readline())
+        if variant == "stopped":
+            hearing["stopped"].send_signal(signal.SIGCONT)
+        for process in hearing.values():
+            assert process.stdin is not None
+            process.stdin.write(json.dumps(told["said"]) + "\n")
+            process.stdin.flush()
+        while any(process.poll() is None for process in hearing.values()):
+            _show_the_end(folder, told["said"])
+        heard = {way: json.loads(process.communicate()[0]) for way, process in hearing.items()}
+        speaker.communicate("\n")
+    load = f"{begun:.1f} to {os.getloadavg()[0]:.1f}"
+    return {"variant": variant, "seconds": seconds, "load": load, "cpus": os.cpu_count(), **told, "heard": heard}
+
+
+def sentences(result: dict[str, Any]) -> str:
+    """The result for people."""
+    lines = [
+        f"soak {result['variant']}, {result['seconds']:g} s, load {result['load']} on {result['cpus']} cpus: "
+        f"speaker grew by {result['grown_mb']:.1f} MB, longest publish {result['longest_ms']:.1f} ms"
+    ]
+    for way, topics_heard in result["heard"].items():
+        for (topic, counts), said in zip(topics_heard.items(), result["said"], strict=True):
+            exact = "exact" if counts["received"] + counts["lost"] + counts["refused"] == said else "NOT EXACT"
+            lines.append(
+                f"  {way:12} {topic:18} said {said}, received {counts['received']}, lost {counts['lost']}, duplicated "
+                f"{counts['duplicated']}, refused {counts['refused']} ({exact}); p50 {counts['p50_us']:.0f} us, "
+                f"p99 {counts['p99_us']:.0f} us, max {counts['max_ms']:.1f} ms"
+            )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("role", choices=["speak", "hear"])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--listeners", type=int)
+    parser.add_argument("--sleeping", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.role == "speak":
+        speak(arguments.folder, arguments.seconds, arguments.listeners)
+    else:
+        hear(arguments.folder, arguments.sleeping)
+
+
+if __name__ == "__main__":
+    main()
