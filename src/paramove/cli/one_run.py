@@ -47,9 +47,7 @@ def run(wanted: Wanted, check_only: bool) -> int:
         environment = examined(os.environ, workspace)
         for note in environment.notes:
             errors.print(f"note: {note}")
-        launch = load(
-            workspace / "launch", wanted.name, wanted.overlays, wanted.settings, wanted.seed, wanted.headless
-        )
+        launch = load(workspace / "launch", wanted.name, wanted.overlays, wanted.settings, wanted.seed, wanted.headless)
         if check_only:
             application.check(launch, workspace)
             console.print("\n".join(_found(launch, environment)), soft_wrap=True)
@@ -96,11 +94,11 @@ def _about_files(error: OSError, runs: Path, environment: Environment) -> str:
     """The system's message with what to do: another place for runs, or for sockets."""
     place = Path(os.fsdecode(error.filename)) if error.filename else Path()
     message = f"{place}: {error.strerror or error}"
+    if place in (environment.sockets, *environment.sockets.parents[:2]):
+        return f"{message}; sockets lie in {environment.sockets}. Set XDG_RUNTIME_DIR to a folder of yours"
     if place in (runs, *runs.parents) or place.is_relative_to(runs):
         other = Path(tempfile.gettempdir()) / "paramove_runs"
         return f"{message}; the folder of the run is made in {runs}. Name another place: --runs {other}"
-    if place in (environment.sockets, *environment.sockets.parents):
-        return f"{message}; sockets lie in {environment.sockets}. Set XDG_RUNTIME_DIR to a folder of yours"
     return message
 
 

@@ -81,7 +81,10 @@ def _temporary_folder(variables: Mapping[str, str]) -> Iterator[str]:
 def _cache_folder(variables: Mapping[str, str]) -> Iterator[str]:
     cache = user_cache_path("paramove")
     there = next((folder for folder in (cache, *cache.parents) if folder.exists()), Path("/"))
-    reason = "its path is not absolute" if not cache.is_absolute() else _unusable(str(there))
+    home = variables.get("HOME", "")
+    if home and not os.path.isabs(home):
+        yield f"HOME={home!r} is ignored: it is no absolute path; what is kept lies in {cache}. Correct it"
+    reason = _unusable(str(there))
     if reason:
         name = "XDG_CACHE_HOME" if variables.get("XDG_CACHE_HOME") else "HOME"
         yield (
