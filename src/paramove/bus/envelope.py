@@ -44,7 +44,7 @@ FLAG_LAST_VALUE = 2
 
 
 class Reason(enum.Enum):
-    """Why a message was refused."""
+    """Why a message was refused. NUMBER: it holds NaN, infinity, a number beyond all size, or a time that is none."""
 
     CONNECTION = "connection"
     FRAMES = "frames"
@@ -57,6 +57,7 @@ class Reason(enum.Enum):
     EPOCH = "epoch"
     BUDGET = "budget"
     DECODE = "decode"
+    NUMBER = "number"
 
 
 class RefusedError(Exception):

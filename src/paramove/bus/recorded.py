@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from paramove.bus.settings import BusSettings
+from paramove.bus.soundness import unsound
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import TICK_PERIOD_NS, Tick
@@ -53,23 +54,31 @@ class RecordedBus:
         recorded: Messages and ticks, in the order in which the node gets them.
         node: Name of the node.
         run_folder: Where the node may write files.
+        protected: Leave out messages with unsound numbers, as the bus does; they are kept in `refused`.
 
     Attributes:
         said: Everything the node said, in order.
         states: States and sentences in order, such as ("ready", "tracking 4 colours").
+        refused: Topic and what is unsound, of each message that was left out.
         now_ns: Publish time of the newest message or time of the newest tick.
     """
 
     def __init__(
-        self, recorded: Iterable[Heard | Tick] = (), node: str = "node", run_folder: Path | None = None
+        self,
+        recorded: Iterable[Heard | Tick] = (),
+        node: str = "node",
+        run_folder: Path | None = None,
+        protected: bool = True,
     ) -> None:
         self.node = node
         self.run_folder = run_folder or Path()
         self.settings = BusSettings(folder=self.run_folder, clock="simulated")
         self.said: list[Said] = []
         self.states: list[tuple[str, str]] = []
+        self.refused: list[tuple[str, str]] = []
         self.now_ns = 0
         self.stopped = False
+        self._protected = protected
         self._waiting = list(recorded)
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
@@ -125,6 +134,10 @@ class RecordedBus:
         """Keeps the state."""
         self.states.append(("failed", sentence))
 
+    def ended(self, sentence: str) -> None:
+        """Keeps the state."""
+        self.states.append(("stopped", sentence))
+
     def stop(self) -> None:
         """Ends every loop over events."""
         self.stopped = True
@@ -132,6 +145,13 @@ class RecordedBus:
     def close(self) -> None:
         """Ends every loop over events."""
         self.stopped = True
+
+    def hands_out(self, heard: Heard) -> bool:
+        """Whether the node gets a message."""
+        found = unsound(heard.message) if self._protected else ""
+        if found:
+            self.refused.append((heard.topic.name, found))
+        return not found
 
     def _events(self, names: set[str], tick: bool) -> Iterator[Heard | Tick]:
         index = 0
@@ -141,6 +161,8 @@ class RecordedBus:
                 index += 1
                 continue
             del self._waiting[index]
+            if isinstance(event, Heard) and not self.hands_out(event):
+                continue
             self.now_ns = event.now_ns if isinstance(event, Tick) else event.published_ns
             if tick or isinstance(event, Heard):
                 yield event

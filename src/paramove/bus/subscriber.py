@@ -17,6 +17,7 @@ from paramove.bus.envelope import SIZE, Envelope, Reason, RefusedError, unpack
 from paramove.bus.monitor import Monitor
 from paramove.bus.schema_hash import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
+from paramove.bus.soundness import unsound
 from paramove.bus.topics import Topic
 
 _log = logging.getLogger(__name__)
@@ -199,9 +200,13 @@ class Subscriber:
 
     def _decode(self, payload: bytes) -> Any:
         try:
-            return self.topic.type.FromString(payload)
+            message = self.topic.type.FromString(payload)
         except (DecodeError, ValueError) as error:
             raise RefusedError(Reason.DECODE, f"payload is no {self.topic.type_name}: {error}") from error
+        found = unsound(message)
+        if found:
+            raise RefusedError(Reason.NUMBER, f"{found}; finite numbers expected, correct the speaker")
+        return message
 
     def _refuse(self, error: RefusedError) -> None:
         self.counter.refused[error.reason] += 1

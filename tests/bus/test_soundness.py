@@ -1,0 +1,80 @@
+"""Numbers that are none, found wherever they are in a message."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zmq
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paramove.bus import topics
+from paramove.bus.envelope import Reason
+from paramove.bus.publisher import Publisher
+from paramove.bus.soundness import LARGEST, unsound
+from paramove.bus.subscriber import Subscriber
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal
+from tests.bus.conftest import Wait
+
+
+def _goal(**to: float) -> RelocationGoal:
+    return RelocationGoal(id="g", to=Position(**to))
+
+
+@pytest.mark.parametrize("topic", topics.TOPICS, ids=lambda topic: topic.name)
+def test_a_message_without_content_is_sound(topic: topics.Topic) -> None:
+    assert unsound(topic.type()) == ""
+
+
+@pytest.mark.parametrize(
+    ("message", "found"),
+    [
+        (Gesture(x=math.nan), "x is nan"),
+        (Gesture(u_px=-math.inf), "u_px is -inf"),
+        (_goal(y=1e300), "to.y is 1e+300"),
+        (RelocationGoal(avoid=[Position(), Position(z=math.inf)]), "avoid[1].z is inf"),
+        (JointTrajectory(points=[TrajectoryPoint(position_rad=[0.0, math.nan])]), "points[0].position_rad[1] is nan"),
+        (
+            JointTrajectory(points=[TrajectoryPoint(position_rad=[1e300, 0])]),
+            "points[0].position_rad[0] is 1e+300",
+        ),
+        (JointStates(joints=[JointState(velocity=math.nan)]), "joints[0].velocity is nan"),
+    ],
+)
+def test_the_first_bad_number_is_named(message: object, found: str) -> None:
+    assert unsound(message) == found
+
+
+@pytest.mark.parametrize(("seconds", "nanos"), [(-1, 0), (2**62, 0), (-(2**63), 0), (0, -1), (0, 10**9)])
+def test_times_that_no_clock_has_are_found(seconds: int, nanos: int) -> None:
+    gesture = Gesture()
+    gesture.captured.seconds, gesture.captured.nanos = seconds, nanos
+    assert unsound(gesture) == f"captured.seconds is {seconds} with {nanos} ns"
+
+
+@settings(deadline=None, max_examples=100, derandomize=True)
+@given(st.lists(st.floats(), max_size=5), st.floats())
+def test_sound_is_what_is_finite_and_not_huge(angles: list[float], time_s: float) -> None:
+    message = JointTrajectory(points=[TrajectoryPoint(time_s=time_s, position_rad=angles)])
+    assert (unsound(message) == "") == all(abs(value) <= LARGEST for value in [*angles, time_s])
+
+
+def test_what_is_unsound_is_refused_counted_and_told(
+    context: zmq.Context[Any], folder: Path, wait: Wait, caplog: pytest.LogCaptureFixture
+) -> None:
+    publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
+    subscriber = Subscriber(context, folder, topics.GESTURES)
+    wait(lambda: subscriber.receive() or subscriber.welcomed, publisher.serve)
+    for x in (math.nan, 1e300, 0.5):
+        publisher.publish(Gesture(object="red", x=x), captured_ns=1, now_ns=2)
+    assert wait(subscriber.receive).message.x == 0.5
+    assert subscriber.counter.refused[Reason.NUMBER] == 2
+    assert subscriber.counter.lost == 0
+    assert "topic gestures: message refused (number, number 1): x is nan; finite numbers expected" in caplog.text
