@@ -12,9 +12,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from paramove.cli.evaluate_faults import faults, kills
+from paramove.cli.evaluate_imitation import imitation
 from paramove.supervision import application, exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
+app.command("kills")(kills)
+app.command("faults")(faults)
+app.command("imitation")(imitation)
 
 JUDGED_A_FAILURE = 3
 RUNS = Path("runs/evaluation")

@@ -26,7 +26,15 @@ def main() -> None:
             groups.add(int(line[1:]))
         elif line.startswith("-"):
             groups.discard(int(line[1:]))
+    if groups:
+        _tell(f"paramove: the launcher was killed; its {len(groups)} processes are ended")
     end_groups(groups, GRACE_S)
+
+
+def _tell(sentence: str) -> None:
+    """On standard error, which is the launcher's; nobody may listen any more."""
+    with contextlib.suppress(OSError):
+        os.write(2, f"{sentence}\n".encode())
 
 
 def end_groups(groups: set[int], grace_s: float) -> None:

@@ -26,7 +26,6 @@ class Guard:
             [sys.executable, *_NO_SITE, str(_HERE / "guard.py")],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
             text=True,
             start_new_session=True,
         )

@@ -1,0 +1,32 @@
+"""A pytest plugin (`-p paramove.evaluation.faults.pytest_results`) that tells each test's result as a line of JSON.
+
+The lines go to the file that the environment variable PARAMOVE_FAULT_RESULTS names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+FILE_VARIABLE = "PARAMOVE_FAULT_RESULTS"
+
+
+def pytest_collection_finish(session: Any) -> None:
+    """All tests are known: how many."""
+    _say({"collected": len(session.items)})
+
+
+def pytest_runtest_logreport(report: Any) -> None:
+    """A phase of a test has ended: a failure in any phase counts, success only of the test itself."""
+    if report.when == "call" or report.outcome != "passed":
+        message = getattr(getattr(report.longrepr, "reprcrash", None), "message", "") or ""
+        if report.outcome == "skipped" and isinstance(report.longrepr, tuple):
+            message = str(report.longrepr[2])
+        _say({"test": report.nodeid, "outcome": report.outcome, "message": message.splitlines()[:1]})
+
+
+def _say(facts: dict[str, Any]) -> None:
+    with Path(os.environ[FILE_VARIABLE]).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(facts) + "\n")
