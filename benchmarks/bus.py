@@ -71,8 +71,10 @@ def hear_bus(folder: Path, messages: int) -> tuple[list[int], int]:
     subscriber = Subscriber(context, folder, topics.WIRE_HOAP3_STREAM)
     latencies = []
     while subscriber.counter.messages + subscriber.counter.lost < messages and subscriber.socket.poll(5000):
-        while (heard := subscriber.receive()) is not None:
+        heard = subscriber.receive(ready=True)  # as the bus does it
+        while heard is not None:
             latencies.append(time.monotonic_ns() - heard.published_ns)
+            heard = subscriber.receive()
     lost = messages - len(latencies)
     subscriber.close()
     context.term()

@@ -98,17 +98,9 @@ def publisher_id(node: str) -> int:
 
 def pack(envelope: Envelope, payload: bytes) -> bytes:
     """Header bytes for `payload`; the envelope's own `length` is not looked at."""
+    schema, publisher, epoch, sequence, published_ns, captured_ns, flags, _ = envelope
     head = _LAYOUT.pack(
-        MAGIC,
-        VERSION,
-        envelope.flags,
-        envelope.schema,
-        envelope.publisher,
-        envelope.epoch,
-        envelope.sequence,
-        envelope.published_ns,
-        envelope.captured_ns,
-        len(payload),
+        MAGIC, VERSION, flags, schema, publisher, epoch, sequence, published_ns, captured_ns, len(payload)
     )
     return head + _CRC.pack(zlib.crc32(payload, zlib.crc32(head)))
 
