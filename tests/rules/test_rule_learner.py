@@ -450,3 +450,28 @@ def test_an_arm_that_was_never_armed_is_waited_for() -> None:
     story.learner.on_safety(safety(SafetyState.STATE_DISARMED))
     story.run(OPTIONS.arm_patience_s + 5.0)
     assert story.learner.failure == ""
+
+
+@pytest.mark.parametrize(
+    ("refused", "words"),
+    [("OFFER_HAND", "I cannot hold my hand out: too far"), ("PLACE_HELD", "I cannot put yellow at (13.5, −10.0) cm")],
+)
+def test_a_refusal_while_calibrating_is_no_loop(refused: str, words: str) -> None:
+    """A person is asked for help, and the same is tried again only after a while."""
+    story = Story()
+    hear = story._hear
+
+    def refusing(goal: RelocationGoal) -> None:
+        if goal.kind == RelocationGoal.Kind.Value(f"KIND_{refused}"):
+            story._say(goal.id, REFUSED, "too far")
+        else:
+            hear(goal)
+
+    story._hear = refusing
+    story.answers[Speech.REQUEST_HELP] = lambda _: None
+    story.run(60.0)
+    assert words in story.sentences()
+    assert 1 <= story.requests().count("HELP") <= 3
+    assert kinds(story).count(refused) <= 3
+    story._hear = hear
+    assert story.run(), story.learner.sentence

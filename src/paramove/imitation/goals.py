@@ -10,6 +10,9 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal
 FloatArray = NDArray[np.float64]
 
 FRAME = "right_shoulder"
+FARTHEST = 2.0
+"""m; beyond it not even the way to an answer of the inverse kinematics can be computed."""
+LARGEST = 1e6
 
 
 class GoalRefusedError(ValueError):
@@ -24,15 +27,19 @@ def point_of(goal: RelocationGoal, name: str) -> FloatArray:
     point = np.array([position.x, position.y, position.z])
     if not np.isfinite(point).all():
         raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
+    if np.abs(point).max() > FARTHEST:
+        raise GoalRefusedError(
+            f"position {name!r} is {point.tolist()} m; an arm reaches no farther than {FARTHEST:g} m"
+        )
     return point
 
 
 def standing_of(goal: RelocationGoal) -> FloatArray:
     """Places of the objects to keep clear of, [M, 2], m; raises GoalRefusedError if one is not finite."""
-    places = np.array([[place.x, place.y] for place in goal.avoid]).reshape(-1, 2)
-    if not np.isfinite(places).all():
+    places = np.array([[place.x, place.y, place.z] for place in goal.avoid]).reshape(-1, 3)
+    if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > LARGEST:
         raise GoalRefusedError(f"the places to avoid are {places.tolist()}; finite numbers in m are needed")
-    return places
+    return places[:, :2]
 
 
 def centimetres(point: FloatArray) -> str:

@@ -7,7 +7,7 @@ and its own targets give the homography.
 from __future__ import annotations
 
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.msgs.relocation_pb2 import Position, RelocationGoal
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.rules.stage import Mind, Place, Stage, cm
 from paramove.rules.table import Sighting
@@ -18,7 +18,7 @@ HAND_AWAY_S = 0.5
 
 
 class Calibrating(Stage):
-    """States: resting, offering, asking, taking, letting_go, placing, looking."""
+    """States: resting, offering, asking, taking, letting_go, placing, looking, helped (waiting for help)."""
 
     stage = ApplicationStage.STAGE_CALIBRATE
 
@@ -47,6 +47,7 @@ class Calibrating(Stage):
             "letting_go": self._letting_go,
             "placing": self._placing,
             "looking": self._looking,
+            "helped": self._helped,
         }
         return steps[self.state]()
 
@@ -64,9 +65,22 @@ class Calibrating(Stage):
         self.go("offering")
 
     def _offering(self) -> None:
+        outcome = self.mind.errand.outcome
         if self.mind.errand.succeeded:
             self._ask()
-        elif self.mind.errand.outcome is not None:
+        elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
+            self._ask_for_help(f"I cannot hold my hand out: {outcome.reason}")
+        elif outcome is not None:
+            self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+            self.go("resting")
+
+    def _ask_for_help(self, sentence: str) -> None:
+        """The same goal would be refused again: only a person can change that."""
+        self.mind.tell(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
+        self.go("helped")
+
+    def _helped(self) -> None:
+        if self.for_s > self.mind.options.patience_s:
             self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
             self.go("resting")
 
@@ -102,10 +116,13 @@ class Calibrating(Stage):
             self.go("placing")
 
     def _placing(self) -> None:
+        outcome = self.mind.errand.outcome
         if self.mind.errand.succeeded:
             self.go("looking")
-        elif self.mind.errand.outcome is not None:
-            self._start_again(self.mind.errand.outcome.reason)
+        elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
+            self._ask_for_help(f"I cannot put {self._held} at {cm(self._corner)}: {outcome.reason}")
+        elif outcome is not None:
+            self._start_again(outcome.reason)
 
     def _start_again(self, reason: str) -> None:
         self._missed += 1
