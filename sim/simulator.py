@@ -95,9 +95,8 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
         simulation.run_to_tick(barrier.tick)
         wall_s = time.perf_counter() - started_s
         if not bus.settings.lockstep:
-            ahead_s = simulation.world.time_s / config.pace - wall_s
-            if ahead_s > 0:
-                bus.exchange.wait(ahead_s)
+            # Also one that lags behind looks at its sockets: subscriptions are answered and the status is said there.
+            bus.exchange.wait(max(0.0, simulation.world.time_s / config.pace - wall_s))
         if barrier.tick % (REPORT_S * CAMERA_HZ) == 0:
             bus.ready(_sentence(simulation, wall_s))
     wall_s = time.perf_counter() - started_s

@@ -34,6 +34,9 @@ def kills(
         Path | None, typer.Option(help="where runs and results are kept (default: runs/kills); finished ones are used")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="world of all runs")] = 0,
+    pace: Annotated[
+        float, typer.Option(min=0.1, max=1.0, help="simulated seconds per second; less for a machine that is too slow")
+    ] = 1.0,
     again: Annotated[bool, typer.Option("--again", help="every case again, also those with a result")] = False,
 ) -> None:
     """Kill (KILL) and stop (STOP) every process of the running demo, the launcher too, at three moments each.
@@ -55,7 +58,7 @@ def kills(
         cases = cases_of(file, _names(nodes), _names(signals), _names(moments))
     except CaseError as error:
         raise typer.BadParameter(str(error)) from error
-    options = KillOptions(workspace, (runs or workspace / RUNS).resolve(), jobs, seed)
+    options = KillOptions(workspace, (runs or workspace / RUNS).resolve(), jobs, seed, pace)
     results = {} if again else finished(options.folder, cases)
     if results:
         console.print(f"results of {len(results)} cases are taken from {options.folder} (--again makes them anew)")
@@ -124,7 +127,9 @@ def _perform(missing: list[Any], options: Any, results: dict[str, dict[str, Any]
 
         def ended(result: Any) -> None:
             results[result.case.name] = json.loads(json.dumps(result.as_json()))
-            verdict = "[green]passed[/]" if result.passed else f"[red]failed[/] {'; '.join(result.problems)}"
+            verdict = (
+                "[green]passed[/]" if result.passed else f"[red]failed[/] {'; '.join((*result.problems, *result.late))}"
+            )
             progress.console.print(f"{result.case.name}: {verdict}", soft_wrap=True)
             progress.advance(task)
 

@@ -23,13 +23,14 @@ class KillOptions:
         workspace: Root of the workspace.
         folder: Where runs and results are kept.
         jobs: Runs at the same time; each uses about two cores, and times are only those of an idle machine with one.
-        seed: Of the world.
+        seed, pace: Of the world, see `LiveRun`.
     """
 
     workspace: Path
     folder: Path
     jobs: int = 1
     seed: int = 0
+    pace: float = 1.0
 
 
 def result_file(folder: Path, case: KillCase) -> Path:
@@ -79,7 +80,7 @@ def _perform(
     folder = options.folder / "runs" / group[0].name
     domain = f"kills-{os.getpid()}-{number}"
     try:
-        return KillRun(options.workspace, folder, domain, options.seed, interrupted.is_set).perform(group)
+        return KillRun(options.workspace, folder, domain, options.seed, options.pace, interrupted.is_set).perform(group)
     except InterruptedRunError:
         return []
 

@@ -47,10 +47,10 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
 
 
 def problems_of(results: Sequence[dict[str, Any]]) -> list[str]:
-    """One line per problem of the failed cases."""
+    """One line per problem and per lateness."""
     return [
         f"{result['case']['node']} {result['case']['signal']} {result['case']['moment']}: {problem} "
         f"({result['run_folder']})"
         for result in results
-        for problem in result["problems"]
+        for problem in (*result["problems"], *result["late"])
     ]

@@ -11,17 +11,18 @@ import psutil
 
 from paramove.bus.endpoint import is_alive
 
-PAUSE_S = 0.05
 
+def processes_of(domain: str) -> list[tuple[int, str]]:
+    """Id and command of living processes whose environment names the domain.
 
-def processes_of(domain: str) -> list[psutil.Process]:
-    """Living processes whose environment names the domain; dead ones that nobody has waited for do not count."""
+    Dead ones that nobody has waited for do not count.
+    """
     found = []
     for process in psutil.process_iter():
-        with contextlib.suppress(psutil.Error, OSError):
-            named = process.environ().get("PARAMOVE_DOMAIN") == domain
-            if named and process.status() != psutil.STATUS_ZOMBIE and process.pid != os.getpid():
-                found.append(process)
+        with contextlib.suppress(psutil.Error, OSError):  # it has just ended
+            named = process.environ().get("PARAMOVE_DOMAIN") == domain and process.pid != os.getpid()
+            if named and process.status() not in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
+                found.append((process.pid, " ".join(process.cmdline()[1:4])))
     return found
 
 
@@ -32,9 +33,7 @@ def left_over(domain: str, runtime: Path) -> list[str]:
         domain: Of the run.
         runtime: Folder above the domain's.
     """
-    words = [
-        f"process {process.pid} ({' '.join(process.cmdline()[1:4])})" for process in _still_alive(processes_of(domain))
-    ]
+    words = [f"process {pid} ({command})" for pid, command in processes_of(domain)]
     places = [runtime / domain, *runtime.glob(f"truth-{domain}-*")]
     files = [path for place in places if place.is_dir() for path in place.rglob("*")]
     files.append(runtime / f"{domain}.lock")
@@ -44,13 +43,6 @@ def left_over(domain: str, runtime: Path) -> list[str]:
         elif path.suffix == ".lock" and _held(path):
             words.append(f"lock {path.name} is held")
     return words
-
-
-def _still_alive(processes: list[psutil.Process]) -> list[psutil.Process]:
-    with contextlib.suppress(psutil.Error):
-        _, alive = psutil.wait_procs(processes, timeout=PAUSE_S)
-        return list(alive)
-    return []
 
 
 def _held(path: Path) -> bool:

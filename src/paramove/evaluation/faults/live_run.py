@@ -32,7 +32,7 @@ OVERLAY = """\
 after_run: null
 nodes:
   simulator:
-    parameters: {firmware_log: true}
+    parameters: {{firmware_log: true, pace: {pace}}}
 """
 
 
@@ -44,6 +44,7 @@ class LiveRun:
         folder: Where run folder and output are kept; made if need be.
         domain: Of the bus, not used by anything else.
         seed: Of the world.
+        pace: Simulated seconds per second, less than 1 for a machine that is too slow or too busy.
 
     Attributes:
         events: Of the launcher's log so far, oldest first.
@@ -51,10 +52,10 @@ class LiveRun:
         safety: Newest state of the safety gate.
     """
 
-    def __init__(self, workspace: Path, folder: Path, domain: str, seed: int) -> None:
+    def __init__(self, workspace: Path, folder: Path, domain: str, seed: int, pace: float = 1.0) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         overlay = folder / "kills_overlay.yaml"
-        overlay.write_text(OVERLAY, encoding="utf-8")
+        overlay.write_text(OVERLAY.format(pace=pace), encoding="utf-8")
         self.domain = domain
         self.bus_folder = default_folder(domain)
         self.output = folder / "output.log"

@@ -1,0 +1,59 @@
+"""Processes of the real demo, killed while it runs in real time at half the pace: what follows, but not how soon.
+
+`paramove evaluate kills` does all cases and measures the times.
+"""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from paramove.evaluation.faults.kill_cases import cases_of
+from paramove.evaluation.faults.kill_run import KillResult, KillRun
+from paramove.supervision.launch_file import load
+
+ROOT = Path(__file__).parents[2]
+FILE = load(ROOT / "launch", "rule_learning", ["sim", "real_time"]).file
+
+
+@pytest.fixture
+def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    with tempfile.TemporaryDirectory(prefix="pm-", dir="/tmp") as folder:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        yield
+
+
+def killed(node: str, moment: str, folder: Path) -> KillResult:
+    cases = cases_of(FILE, [node], ["KILL"], [moment])
+    (result,) = KillRun(ROOT, folder, f"kill-{os.getpid()}", seed=0, pace=0.5).perform(cases)
+    assert result.problems == [], (folder / "output.log").read_text(errors="replace")[-3000:]
+    assert result.step is not None
+    assert result.step.within_limits
+    return result
+
+
+@pytest.mark.usefixtures("runtime")
+def test_arm_driver_killed_in_motion_comes_back_disarmed_and_the_run_ends_so(tmp_path: Path) -> None:
+    result = killed("arm_driver", "moving", tmp_path)
+    assert "arm_driver was killed (SIGKILL) and is back: disarmed" in result.sentence
+    assert result.exit_code == 1
+
+
+@pytest.mark.usefixtures("runtime")
+def test_camera_killed_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
+    assert killed("camera", "rest", tmp_path).ready_s is not None
+
+
+@pytest.mark.usefixtures("runtime")
+def test_simulator_killed_ends_the_run_and_is_named(tmp_path: Path) -> None:
+    result = killed("simulator", "moving", tmp_path)
+    assert "simulator was killed (SIGKILL)" in result.sentence
+    assert result.exit_code == 1
+
+
+@pytest.mark.usefixtures("runtime")
+def test_nothing_outlives_a_killed_launcher(tmp_path: Path) -> None:
+    result = killed("launcher", "moving", tmp_path)
+    assert "the launcher was killed" in result.sentence
