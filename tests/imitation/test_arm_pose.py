@@ -230,3 +230,33 @@ def test_a_gripper_outside_the_plane_of_the_hand_needs_another_solver() -> None:
     kinematics = replace(ARM.kinematics, gripper_from_elbow=(0.133, 0.006, 0.002))
     with pytest.raises(ValueError, match=r"0\.002 m above the hand's plane"):
         ArmPoseSolver(HOAP3, replace(ARM, kinematics=kinematics))
+
+
+@EASY
+@given(seeds)
+def test_the_closed_form_says_by_how_much_it_breaks_limits(seed: int) -> None:
+    """It is what `solve` gives where no limit is broken, and outside the limits exactly where `solve` turns."""
+    elbow, gripper, fingers = random_pose(seed)
+    plain = solver().without_limits(elbow, gripper, fingers)
+    outside = solver().outside_limits(plain.angles)[0]
+    np.testing.assert_allclose(ARM.kinematics.forward(plain.angles[0]).gripper, gripper, rtol=0, atol=1e-9)
+    try:
+        kept = solver().solve(elbow, gripper, fingers)
+    except UnreachablePoseError:
+        assert outside.max() > 0.0
+        return
+    assert (outside.max() > 0.0) == (kept.elbow_turn[0] != 0.0)
+    np.testing.assert_array_equal(solver().outside_limits(kept.angles), np.zeros((1, 5)))
+
+
+def test_points_too_near_are_moved_straight_outward_and_others_stay() -> None:
+    least, margin, width = solver().reach[0], 0.002, 0.012
+    line = np.array([0.6, -0.48, -0.64])
+    distances = np.linspace(0.08, 0.24, 60)
+    moved = solver().moved_outward(distances[:, None] * line, margin, width)
+    found = np.linalg.norm(moved, axis=1)
+    np.testing.assert_allclose(moved, found[:, None] * line, rtol=0, atol=1e-12)
+    assert found.min() >= least + margin - 1e-12
+    assert (np.diff(found) >= -1e-12).all()
+    far = distances >= least + margin + width
+    np.testing.assert_allclose(found[far], distances[far], rtol=0, atol=1e-12)

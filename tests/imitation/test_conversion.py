@@ -81,6 +81,29 @@ def test_states_of_arrival_and_grasp_are_about_those_of_the_thesis() -> None:
     assert movement().reach_state < movement().release_state
 
 
+def test_elbows_between_the_demonstrated_ones_belong_to_an_arm() -> None:
+    """With elbows interpolated as points the upper arm shrinks in between."""
+    converted, as_points = movement(), RobotMovement.from_model(reaching_model(), solver().length, "linear")
+    corners = converted.grid.points()
+    np.testing.assert_allclose(
+        converted.poses(corners[5]).stacked(), as_points.poses(corners[5]).stacked(), rtol=0, atol=1e-9
+    )
+    centre = corners.mean(axis=0)
+    state = converted.reach_state
+    demonstrated = np.linalg.norm(converted.means[:, state, :3], axis=1)
+    length = np.linalg.norm(converted.poses(centre).elbow[state])
+    assert demonstrated.min() <= length <= demonstrated.max()
+    assert np.linalg.norm(as_points.poses(centre).elbow[state]) < 0.95 * demonstrated.min()
+    np.testing.assert_array_equal(converted.poses(centre).gripper, as_points.poses(centre).gripper)
+
+
+def test_other_poses_of_the_person_are_converted_alike() -> None:
+    converted, model = movement(), reaching_model()
+    assert model.description is not None
+    poses = converted.converted(model.means_[3], model.description.point_names)
+    np.testing.assert_allclose(poses.stacked(), converted.means[3], rtol=0, atol=1e-12)
+
+
 def test_opening_goes_from_one_to_nought() -> None:
     converted = movement()
     sizes = np.linspace(0.5 * converted.o_min, 1.5 * converted.o_max, 40)
