@@ -19,7 +19,7 @@ Image = NDArray[Any]  # uint8 [H, W, 3], BGR
 
 CAMERA_FRAME = "camera_optical"
 DARK_LEVEL = 16.0
-"""Mean of 255 below which noise hides the colours. A lens cap gives 0 to 5, the demo's darkest scene about 25."""
+"""Mean of 255 below which noise hides the colours. A lens cap gives 0 to 5, the demo's darkest scene 50."""
 SATURATED_SHARE = 0.95
 _TO_BGR = {"bgr8": None, "8UC3": None, "rgb8": cv2.COLOR_RGB2BGR}
 
