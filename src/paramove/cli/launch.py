@@ -52,6 +52,9 @@ def launch(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="seed of the world", min=0)] = None,
     headless: Annotated[bool, typer.Option("--headless", help="lines instead of the live table, and no video")] = False,
+    page: Annotated[
+        bool, typer.Option("--view", help="show the run on a page in the browser, on this machine, with a stop button")
+    ] = False,
     runs: Annotated[Path | None, typer.Option(help="where the run folder is made (default: runs/)")] = None,
     check: Annotated[bool, typer.Option("--check", help="check the launch file and its nodes, start nothing")] = False,
     schema: Annotated[
@@ -73,7 +76,7 @@ def launch(
     """
     from paramove.cli.one_run import Wanted, run  # heavy, and not needed to complete a line or to print help
 
-    raise typer.Exit(run(Wanted(name, overlays, settings or [], seed, headless, runs), check))
+    raise typer.Exit(run(Wanted(name, overlays, settings or [], seed, headless, runs, page), check))
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from paramove.cli.live_view import AnnouncingView, with_page
 from paramove.supervision import application, exit_codes
 from paramove.supervision.domain import DomainError, DomainNameError
 from paramove.supervision.environment import Environment, examined
@@ -34,6 +35,7 @@ class Wanted:
     seed: int | None
     headless: bool
     runs: Path | None
+    page: bool = False
 
 
 def run(wanted: Wanted, check_only: bool) -> int:
@@ -47,7 +49,11 @@ def run(wanted: Wanted, check_only: bool) -> int:
         environment = examined(os.environ, workspace)
         for note in environment.notes:
             errors.print(f"note: {note}")
-        launch = load(workspace / "launch", wanted.name, wanted.overlays, wanted.settings, wanted.seed, wanted.headless)
+        overlays, settings = wanted.overlays, list(wanted.settings)
+        if wanted.page:
+            overlays, title = with_page(workspace / "launch", wanted.name, overlays)
+            settings.insert(0, title)
+        launch = load(workspace / "launch", wanted.name, overlays, settings, wanted.seed, wanted.headless)
         if check_only:
             application.check(launch, workspace)
             console.print("\n".join(_found(launch, environment)), soft_wrap=True)
@@ -112,4 +118,5 @@ def _verdict(outcome: Outcome) -> str:
 def _view(console: Console, folder: RunFolder, environment: Environment, headless: bool) -> View:
     console.print(f"run folder {folder.path}", soft_wrap=True)
     console.print(f"domain {environment.domain}, sockets in {environment.sockets}", soft_wrap=True)
-    return TableView(console) if console.is_terminal and not headless else LineView(console)
+    view = TableView(console) if console.is_terminal and not headless else LineView(console)
+    return AnnouncingView(view, folder.path)

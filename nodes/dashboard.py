@@ -1,0 +1,57 @@
+"""Dashboard: shows the running application on a page in the browser, on this machine only, with a stop button.
+
+Hears   camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech, relocation/goal,
+        relocation/status, arm/joint_states, arm/safety, and the status of every node
+Says    operator/stop   StopRequest   when a person presses stop
+"""
+
+from pathlib import Path
+
+from pydantic import Field
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.dashboard.live_picture import LivePicture, Surface
+from paramove.dashboard.node_table import hear_nodes
+from paramove.dashboard.server import PageServer
+from paramove.dashboard.stop_button import StopButton
+from paramove.robots.description import RobotDescription
+
+PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
+DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
+HEARS = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY)
+SAYS = (topics.OPERATOR_STOP,)
+
+
+class Config(NodeConfig):
+    """`port`: 0 takes a free one. `robot`: folder of its description."""
+
+    title: str = Field("paramove", max_length=80)
+    port: int = Field(0, ge=0, le=65535)
+    robot: Path = Path("robot_description/hoap3")
+    surface: Surface = Surface()
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes, or a person's stop has brought the arm to rest."""
+    picture = LivePicture(RobotDescription.load(config.robot), config.title, config.surface)
+    with PageServer(bus.run_folder, config.port) as page:
+        button = StopButton(page.was_pressed, lambda request: bus.publish(topics.OPERATOR_STOP, request))
+        bus.when_readable(page.pressed, lambda: button.look(bus.now_ns))
+        bus.ready(f"page on port {page.port} of this machine")
+        for event in bus.events(tick=True):
+            if isinstance(event, Heard):
+                picture.hear(event)
+                button.hear(event)
+                continue
+            hear_nodes(bus)
+            button.look(event.now_ns)
+            page.show(picture.changes(event.now_ns, button.section()), picture.image())
+            if button.is_over(event.now_ns):
+                page.say_farewell(button.sentence)
+                bus.ended(button.sentence)
+                return
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

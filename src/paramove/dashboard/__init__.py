@@ -1,0 +1,1 @@
+"""The live page: what a running application sees, believes and does, in a browser, and a stop button."""

@@ -1,0 +1,139 @@
+"""Who may see the page: rules for one HTTP request, without sockets.
+
+The page listens on loopback, which other users of the machine and every web site open in a browser can reach, too. So a
+request must
+
+1. be a GET for a host name of ours (against DNS rebinding: a foreign name that was made to point here),
+2. carry the link's token, good for one use, or the session cookie that it was exchanged for,
+3. name a route exactly; nothing is looked up in the file system, so there is no path to climb,
+4. for the socket, come from the page itself (`Origin` exactly ours) and carry the key that only the page was given:
+   cookies are shared by all ports of a host, the key is not.
+"""
+
+from __future__ import annotations
+
+import enum
+import hmac
+import http
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+SOCKET = "/live"
+PAGE = "/"
+
+
+class Kind(enum.Enum):
+    """What to answer a request with."""
+
+    REFUSED = "refused"
+    PAGE = "page"
+    FILE = "file"
+    SOCKET = "socket"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What follows from a request.
+
+    Attributes:
+        status: HTTP status of a refusal.
+        sentence: Why it is refused, for a person; holds nothing of the request.
+        file: Name of the file asked for.
+        by_token: The page was asked for with the token, which is spent now.
+    """
+
+    kind: Kind
+    status: http.HTTPStatus = http.HTTPStatus.OK
+    sentence: str = ""
+    file: str = ""
+    by_token: bool = False
+
+
+@dataclass(frozen=True)
+class Secrets:
+    """Random words: the link's token, the session (cookie) and the key (for the socket)."""
+
+    token: str = field(repr=False)
+    session: str = field(repr=False)
+    key: str = field(repr=False)
+
+
+def _refused(status: http.HTTPStatus, sentence: str) -> Verdict:
+    return Verdict(Kind.REFUSED, status, sentence)
+
+
+FORBIDDEN, NOT_FOUND = http.HTTPStatus.FORBIDDEN, http.HTTPStatus.NOT_FOUND
+WITHOUT_LINK = (
+    "This page opens by the link that `paramove launch --view` prints. A link works once; "
+    "a fresh one stands in live_page.json in the folder of the run."
+)
+
+
+@dataclass
+class Access:
+    """Judges requests.
+
+    Args:
+        port: Where the page listens.
+        files: Names of the files that belong to the page.
+        secrets: The present ones.
+    """
+
+    port: int
+    files: frozenset[str]
+    secrets: Secrets
+
+    @property
+    def hosts(self) -> tuple[str, ...]:
+        """Values of `Host` that mean this page."""
+        return (f"127.0.0.1:{self.port}", f"localhost:{self.port}")
+
+    @property
+    def cookie(self) -> str:
+        """Name of the session cookie; with the port, since cookies are shared by all ports of a host."""
+        return f"paramove_{self.port}"
+
+    def judge(self, method: str, target: str, headers: Iterable[tuple[str, str]]) -> Verdict:
+        """What to answer; `target` is the request line's path with its query, as it was sent."""
+        found: dict[str, list[str]] = {}
+        for name, value in headers:
+            found.setdefault(name.lower(), []).append(value)
+        if method != "GET":
+            return _refused(http.HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is answered here.")
+        if len(found.get("host", ())) != 1 or found["host"][0] not in self.hosts:
+            return _refused(FORBIDDEN, f"Only {' and '.join(self.hosts)} are answered here.")
+        path, _, query = target.partition("?")
+        parameters = parse_qs(query, max_num_fields=4) if query.count("&") < 4 else {}
+        if path == PAGE and _same(parameters.get("token", [""])[0], self.secrets.token):
+            return Verdict(Kind.PAGE, by_token=True)
+        if not self._has_session(found):
+            return _refused(FORBIDDEN, WITHOUT_LINK)
+        if path == SOCKET:
+            return self._socket(found, parameters.get("key", [""])[0])
+        if path == PAGE:
+            return Verdict(Kind.PAGE)
+        name = path.removeprefix("/")
+        return Verdict(Kind.FILE, file=name) if name in self.files else _refused(NOT_FOUND, "There is nothing here.")
+
+    def _has_session(self, headers: dict[str, list[str]]) -> bool:
+        cookies: SimpleCookie = SimpleCookie()
+        try:
+            cookies.load("; ".join(headers.get("cookie", ())))
+        except CookieError:
+            return False
+        return self.cookie in cookies and _same(cookies[self.cookie].value, self.secrets.session)
+
+    def _socket(self, headers: dict[str, list[str]], key: str) -> Verdict:
+        origins = headers.get("origin", [])
+        if origins != [f"http://{headers['host'][0]}"]:
+            return _refused(FORBIDDEN, "Only the page itself may open the socket.")
+        if not _same(key, self.secrets.key):
+            return _refused(FORBIDDEN, WITHOUT_LINK)
+        return Verdict(Kind.SOCKET)
+
+
+def _same(given: str, secret: str) -> bool:
+    """Compares in constant time."""
+    return hmac.compare_digest(given.encode("utf-8", "replace"), secret.encode())

@@ -1,0 +1,87 @@
+"""`live_page.json` in the run's folder: the link for a person, and what a page needs to come back after a failure.
+
+Only its owner may read it (mode 0600). With the same port, session and key a restarted page answers the browsers that
+were connected before. The secrets are worth nothing once the page has ended; the file then goes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from paramove.dashboard.access import Secrets
+
+NAME = "live_page.json"
+
+
+def _word() -> str:
+    return secrets.token_urlsafe(24)
+
+
+@dataclass(frozen=True)
+class LinkFile:
+    """Content of the file.
+
+    Attributes:
+        path: Of the file.
+        port: Where the page listens.
+        secrets: Of the page.
+    """
+
+    path: Path
+    port: int
+    secrets: Secrets
+
+    @property
+    def link(self) -> str:
+        """What a person opens; works once."""
+        return f"http://127.0.0.1:{self.port}/?token={self.secrets.token}"
+
+    @classmethod
+    def kept_or_new(cls, folder: Path, port: int) -> LinkFile:
+        """The file of a page that ran before in this run, else a new one that is not written yet."""
+        path = folder / NAME
+        try:
+            kept = json.loads(path.read_text(encoding="utf-8"))
+            return cls(path, int(kept["port"]), Secrets(str(kept["token"]), str(kept["session"]), str(kept["key"])))
+        except (OSError, ValueError, KeyError, TypeError):
+            return cls(path, port, Secrets(_word(), _word(), _word()))
+
+    def at(self, port: int) -> LinkFile:
+        """The same at another port."""
+        return replace(self, port=port)
+
+    def with_fresh_token(self) -> LinkFile:
+        """The same with a token that was never used."""
+        return replace(self, secrets=replace(self.secrets, token=_word()))
+
+    def write(self) -> None:
+        """Writes the file at once and whole."""
+        content = {
+            "link": self.link,
+            "port": self.port,
+            "token": self.secrets.token,
+            "session": self.secrets.session,
+            "key": self.secrets.key,
+        }
+        beside = self.path.with_name(f".{NAME}-{os.getpid()}")
+        beside.unlink(missing_ok=True)
+        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            json.dump(content, file, indent=1)
+        beside.replace(self.path)
+
+    def remove(self) -> None:
+        """Removes the file."""
+        self.path.unlink(missing_ok=True)
+
+
+def link_in(folder: Path) -> str:
+    """The link of the page of a run; "" while there is none."""
+    try:
+        return str(json.loads((folder / NAME).read_text(encoding="utf-8"))["link"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""

@@ -1,0 +1,147 @@
+"""All that the page shows of a running application: hears messages, gives what has changed."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from paramove.bus import topics
+from paramove.bus.subscriber import Heard
+from paramove.dashboard.beliefs import Beliefs
+from paramove.dashboard.node_table import NodeTable
+from paramove.dashboard.robot_shape import RobotShape
+from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.msgs.safety_state_pb2 import SafetyState
+from paramove.robots.description import RobotDescription
+
+
+class Surface(BaseModel):
+    """The working surface in the shoulder's frame, m, and the upright objects on it.
+
+    The synthesizer has the same parameters; its module is not imported because that takes seconds.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    x: tuple[float, float] = (0.100, 0.240)
+    y: tuple[float, float] = (-0.170, 0.130)
+    z: float = -0.134
+    object_radius: float = 0.010
+    object_height: float = 0.050
+
+
+class LivePicture:
+    """Sections of the page by name, as JSON values.
+
+    Args:
+        robot: Its shape, joints and base pose.
+        title: Of the page.
+        surface: The working surface and the objects on it.
+        side: Arm in whose shoulder's frame the nodes speak of places.
+        wall_s: Monotonic clock on the wall; the nodes say their status by it.
+    """
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        title: str,
+        surface: Surface,
+        side: str = "right",
+        wall_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._sites = robot.arms[side].sites
+        self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
+        self._beliefs = Beliefs((surface.x, surface.y))
+        self._nodes = NodeTable()
+        self._wall_s = wall_s
+        self._given: dict[str, Any] = {}
+        self._joints: Any = None
+        self._safety: dict[str, Any] = {}
+        self._image: bytes | None = None
+        self._world = {
+            "title": title,
+            "parts": self._shape.parts(),
+            "shoulder": [round(float(value), 5) for value in self._shape.site(self._sites.shoulder)],
+            "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
+            "object": {"radius": surface.object_radius, "height": surface.object_height},
+        }
+        beliefs = self._beliefs
+        self._hear: dict[str, Callable[[Any, float], None]] = {
+            topics.APPLICATION_STAGE.name: beliefs.on_stage,
+            topics.SPEECH.name: beliefs.on_speech,
+            topics.RULES.name: beliefs.on_rules,
+            topics.CALIBRATION_PLANE.name: beliefs.on_plane,
+            topics.OBJECTS_TRACKED.name: beliefs.on_tracked,
+            topics.GESTURES.name: beliefs.on_gesture,
+            topics.RELOCATION_GOAL.name: beliefs.on_goal,
+            topics.RELOCATION_STATUS.name: beliefs.on_goal_status,
+        }
+
+    def hear(self, heard: Heard) -> None:
+        """Take in one message of any topic that the page knows."""
+        if heard.topic.name in self._hear:
+            self._hear[heard.topic.name](heard.message, heard.captured_ns * 1e-9)
+        elif heard.topic.name == topics.CAMERA_IMAGE.name:
+            self._image = bytes(heard.message.data)
+        elif heard.topic.name == topics.ARM_JOINT_STATES.name:
+            self._joints = heard.message
+        elif heard.topic.name == topics.ARM_SAFETY.name:
+            self._safety = _safety(heard.message)
+        elif heard.topic.type is NodeStatus:
+            self._nodes.hear(heard.message, self._wall_s())
+
+    def changes(self, now_ns: int, stop: dict[str, Any]) -> dict[str, Any]:
+        """Sections that are not what they were at the last call.
+
+        Args:
+            now_ns: Time of the bus clock.
+            stop: What has become of a person's stop.
+        """
+        if self._joints is not None:
+            self._shape.move({joint.name: joint.position for joint in self._joints.joints})
+            self._joints = None
+        sections = {
+            "world": self._world,
+            "clock": round(now_ns * 1e-9, 1),
+            **self._beliefs.sections(now_ns * 1e-9),
+            "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._sites.gripper))},
+            "safety": self._safety,
+            "stop": stop,
+            "nodes": self._nodes.section(self._wall_s()),
+        }
+        sections = {name: _finite(content) for name, content in sections.items()}
+        changed = {name: content for name, content in sections.items() if self._given.get(name) != content}
+        self._given = sections
+        return changed
+
+    def image(self) -> bytes | None:
+        """The newest image if there is one that was not given yet, JPEG."""
+        image, self._image = self._image, None
+        return image
+
+
+def _safety(message: SafetyState) -> dict[str, Any]:
+    return {
+        "state": SafetyState.State.Name(message.state).removeprefix("STATE_").lower(),
+        "faults": [{"joint": fault.joint, "sentence": fault.sentence} for fault in message.faults],
+        "refused": message.refused_trajectories,
+    }
+
+
+def _rounded(values: Any) -> list[float]:
+    return [round(float(value), 5) for value in values]
+
+
+def _finite(content: Any) -> Any:
+    """The same with None for numbers that JSON does not know."""
+    if isinstance(content, float):
+        return content if math.isfinite(content) else None
+    if isinstance(content, dict):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    return content

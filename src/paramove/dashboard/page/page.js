@@ -1,0 +1,177 @@
+// The live page: one socket, and what comes through it put into the page as text, never as markup.
+import { CameraView } from "./camera.js";
+import { colourOf, css } from "./colours.js";
+import { WorldView } from "./world.js";
+
+const $ = (id) => document.getElementById(id);
+const STAGES = ["calibrate", "learn", "apply", "done"];
+const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, SILENT_S = 3;
+
+const given = document.querySelector("meta[name=paramove-key]").content;
+if (given) localStorage.setItem("paramove-key", given);
+const key = given || localStorage.getItem("paramove-key") || "";
+history.replaceState(null, "", "/"); // the token is spent
+
+const state = {};
+const camera = new CameraView($("camera"));
+const world = new WorldView($("world"), $("labels"));
+let socket = null, connected = false, ended = "", quietS = 0, pressedAt = null, everConnected = false;
+
+function text(element, value) {
+  if (element.textContent !== value) element.textContent = value;
+}
+
+function cell(row, value, name = "") {
+  const made = row.insertCell();
+  made.textContent = value;
+  if (name) made.className = name;
+  return made;
+}
+
+const cm = (place) => place.slice(0, 2).map((value) => (100 * value).toFixed(1).replace("-", "−")).join(", ") + " cm";
+
+const SHOW = {
+  world(content) { text($("title"), content.title); document.title = `${content.title} – paramove`; },
+  stage(content) {
+    const now = STAGES.indexOf(content.stage);
+    $("stages").querySelectorAll("li").forEach((item, index) => {
+      const done = content.stage === "done";
+      item.className = index < now || (done && index === now) ? "past" : index === now ? "now" : "";
+      if (index === now) item.setAttribute("aria-current", "step"); else item.removeAttribute("aria-current");
+    });
+    text($("step"), content.step ?? "");
+    text($("counts"), content.grasps === undefined ? "" : `${content.grasps} ${content.grasps === 1 ? "grasp" : "grasps"}, ${content.retries} repeated`);
+  },
+  clock(content) {
+    text($("clock"), `${Math.floor(content / 60)}:${String(Math.floor(content % 60)).padStart(2, "0")}`);
+  },
+  words(content) { if (content.length) text($("sentence"), content.at(-1).sentence); },
+  objects(content) { showRules(content); },
+  pointed() { showRules(state.objects ?? {}); },
+  goal(content) {
+    const { kind, object, to, from } = content;
+    text($("goal"), kind ? [kind, object].filter(Boolean).join(" ") : "nothing yet");
+    const way = from && to ? `${cm(from)} → ${cm(to)}` : to ? `→ ${cm(to)}` : "";
+    const progress = content.ended ? content.state : [content.phase || content.state, content.attempt > 1 ? `attempt ${content.attempt}` : ""].filter(Boolean).join(", ");
+    text($("phase"), [progress, way].filter(Boolean).join("  ·  "));
+  },
+  results(content) {
+    $("results").replaceChildren(...content.toReversed().map((result) => {
+      const item = document.createElement("li"), more = document.createElement("small");
+      if (result.result === "succeeded") item.className = "succeeded";
+      item.textContent = [result.kind, result.object].filter(Boolean).join(" ");
+      more.textContent = ` ${[`${result.took_s} s`, result.attempt > 1 ? `attempt ${result.attempt}` : "", result.reason].filter(Boolean).join(" · ")}`;
+      item.append(more);
+      return item;
+    }));
+  },
+  safety(content) {
+    const name = content.state ?? "unknown";
+    $("gate").dataset.state = name;
+    text($("gate-state"), content.state ?? "–");
+    $("gate").title = (content.faults ?? []).map((fault) => fault.sentence).join("; ");
+  },
+  stop(content) {
+    $("stop").dataset.progress = content.progress;
+    text($("stop-word"), { "not asked": "STOP", asked: "STOP …", stopping: "STOPPING", stopped: "STOPPED" }[content.progress] ?? "STOP");
+    if (content.progress !== "not asked" && content.progress !== "asked") pressedAt = null;
+  },
+  nodes(content) {
+    const body = $("nodes"), ok = content.filter((node) => node.state === "ready" && node.silent_s <= SILENT_S).length;
+    text($("nodes-note"), `${ok} of ${content.length} ready`);
+    body.replaceChildren(...content.map((node) => {
+      const row = document.createElement("tr"), silent = node.silent_s > SILENT_S && node.state !== "stopped";
+      cell(row, node.name).title = node.name;
+      cell(row, silent ? `${node.silent_s} s silent` : node.state, "state").classList.add(silent ? "silent" : ["ready", "starting", "degraded", "failed", "stopped"].includes(node.state) ? node.state : "stopped");
+      cell(row, node.ms === null ? "" : node.ms.toFixed(1), "num");
+      cell(row, node.lost ? String(node.lost) : "", "num");
+      cell(row, node.restarts ? String(node.restarts) : "", "num");
+      cell(row, node.sentence).title = node.sentence;
+      return row;
+    }));
+  },
+};
+
+function showRules(objects) {
+  const names = Object.keys(objects);
+  $("rules").replaceChildren(...names.map((name) => {
+    const row = document.createElement("tr"), object = objects[name], swatch = document.createElement("span"), first = row.insertCell();
+    if (name === state.pointed) row.className = "pointed";
+    swatch.className = "swatch";
+    swatch.style.background = css(colourOf(name));
+    first.append(swatch, name);
+    cell(row, object.rule ? cm(object.rule.place) : "not learned yet", object.rule ? "" : "unknown");
+    const stands = object.state === "stands" || object.state === "moves";
+    cell(row, name === state.pointed ? "pointed at" : stands && object.place ? `${object.state} at ${cm(object.place)}` : object.state);
+    return row;
+  }));
+  const learned = names.filter((name) => objects[name].rule).length;
+  text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Places are x, y from the right shoulder, as the robot believes them.` : "No object was seen yet.");
+}
+
+let wanted = false;
+function drawSoon() {
+  if (wanted) return;
+  wanted = true;
+  requestAnimationFrame(() => {
+    wanted = false;
+    const { tracked = {}, plane = {}, objects = {}, pointed = "", robot = {}, goal = {} } = state;
+    camera.update({ tracked, plane, objects, pointed });
+    world.update({ world: state.world ?? null, robot, objects, goal, plane });
+    world.draw();
+    if (performance.now() - camera.arrivedAt > 500) camera.draw();
+  });
+}
+
+function heard(message) {
+  const { beat, ended: farewell, ...sections } = message;
+  if (beat) quietS = beat.quiet_s;
+  if (farewell) ended = farewell;
+  Object.assign(state, sections);
+  for (const [name, content] of Object.entries(sections)) SHOW[name]?.(content);
+  drawSoon();
+  judge();
+}
+
+function judge() {
+  const alert = $("alert"), stopped = (state.safety?.faults ?? []).map((fault) => fault.sentence).join("; ");
+  const waited = pressedAt !== null && performance.now() - pressedAt > CONFIRM_MS;
+  let words = "", calm = false;
+  if (waited || (pressedAt !== null && !connected)) words = "The stop is NOT confirmed. Use the robot's power switch.";
+  else if (ended) [words, calm] = [`The run has ended${/^The run has ended/.test(ended) ? "" : `: ${ended}`}. The page shows its last state.`, true];
+  else if (!connected && everConnected) words = "Connection lost: what you see is old, and STOP does not reach the robot. Trying again …";
+  else if (!connected) words = "Not connected. Open the link that paramove launch --view printed; it works once.";
+  else if (stopped) words = `The arm is stopped and holds its pose: ${stopped}.`;
+  else if (quietS > QUIET_S) words = `No news from the run for ${Math.round(quietS)} s.`;
+  text(alert, words);
+  alert.className = calm ? "calm" : "";
+  alert.hidden = !words;
+  const age = performance.now() - camera.arrivedAt;
+  text($("camera-note"), camera.arrived === 0 ? "no picture yet" : age > OLD_IMAGE_MS && !ended ? `picture is ${Math.round(age / 1000)} s old` : "");
+}
+
+function stop() {
+  $("stop").dataset.progress = "asked";
+  if (ended) return;
+  pressedAt ??= performance.now();
+  if (connected) socket.send("stop");
+  judge();
+}
+
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/live?key=${encodeURIComponent(key)}`);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => { connected = everConnected = true; ended = ""; judge(); };
+  socket.onmessage = ({ data }) => (typeof data === "string" ? heard(JSON.parse(data)) : camera.image(data));
+  socket.onclose = () => { connected = false; judge(); if (!ended) setTimeout(connect, RETRY_MS); };
+}
+
+$("stop").addEventListener("click", stop);
+addEventListener("keydown", (event) => {
+  if (event.key !== " " && event.key !== "Escape") return;
+  event.preventDefault();
+  if (!event.repeat) stop();
+});
+new ResizeObserver(() => camera.draw()).observe($("camera"));
+setInterval(judge, 250);
+connect();

@@ -1,0 +1,310 @@
+"""The page's server: a few files and one socket for each browser, on loopback, in a thread of its own.
+
+The bus's thread leaves the newest content with `show` and never waits. Each browser is sent what has changed since it
+was last sent something, so a slow one gets fewer pictures, and nothing piles up. The only word that a browser may say
+is "stop"; it makes `pressed` readable, which the bus's thread watches.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import http
+import importlib.resources
+import json
+import logging
+import os
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from paramove.dashboard.access import Access, Kind, Verdict
+from paramove.dashboard.link_file import LinkFile
+
+_log = logging.getLogger(__name__)
+
+ADDRESS = "127.0.0.1"
+MAX_BROWSERS = 16
+MAX_CONNECTIONS = 64
+"""Open connections, those included that have not asked for anything yet."""
+OPENING_S = 5.0
+"""Time to ask for something, and to read the answer."""
+SEND_PERIOD_S = 0.05
+BEAT_PERIOD_S = 1.0
+LOGGED_REFUSALS = 20
+STOP = "stop"
+
+MEDIA_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+KEY_MARK = b"{{key}}"
+START = "index.html"
+
+
+class PageServer:
+    """Answers browsers until it is left as a context.
+
+    Args:
+        folder: Of the run; the link is written there.
+        port: 0: a free one. A page that was restarted in the same run takes the port it had.
+
+    Attributes:
+        pressed: An eventfd that can be read once somebody has pressed the stop button.
+        link: What a person opens.
+    """
+
+    def __init__(self, folder: Path, port: int = 0) -> None:
+        self._files = _read_files()
+        self._link_file = LinkFile.kept_or_new(folder, port)
+        self._access = Access(0, frozenset(self._files) - {START}, self._link_file.secrets)
+        self._sections: dict[str, tuple[int, str]] = {}
+        self._image: tuple[int, bytes] = (0, b"")
+        self._version = 0
+        self._shown_s = time.monotonic()
+        self._browsers = 0
+        self._connections = 0
+        self._refusals = 0
+        self._farewell = "The run has ended."
+        self._leaving = asyncio.Event()
+        self._loop = asyncio.new_event_loop()
+        self._started = threading.Event()
+        self._failure: OSError | None = None
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+        self.pressed = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+
+    @property
+    def link(self) -> str:
+        """What a person opens; works once, and then there is a fresh one."""
+        return self._link_file.link
+
+    @property
+    def port(self) -> int:
+        """Where the page listens."""
+        return self._access.port
+
+    @property
+    def watched(self) -> bool:
+        """Whether any browser looks."""
+        return self._browsers > 0
+
+    def was_pressed(self) -> bool:
+        """Whether the stop button was pressed since this was last asked."""
+        try:
+            return os.eventfd_read(self.pressed) > 0
+        except BlockingIOError:
+            return False
+
+    def show(self, sections: Mapping[str, Any], image: bytes | None = None) -> None:
+        """Replaces sections of the page, JSON values, and the camera's image, a JPEG. Never waits."""
+        self._shown_s = time.monotonic()
+        for name, content in sections.items():
+            self._version += 1
+            self._sections[name] = (self._version, json.dumps(content, separators=(",", ":"), allow_nan=False))
+        if image is not None:
+            self._image = (self._image[0] + 1, image)
+
+    def say_farewell(self, sentence: str) -> None:
+        """What browsers are told when the server ends."""
+        self._farewell = sentence
+
+    def __enter__(self) -> PageServer:
+        self._thread.start()
+        self._started.wait()
+        if self._failure is not None:
+            self._thread.join()
+            raise self._failure
+        self._link_file.write()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is not None:  # the page will be started again: browsers had better wait for it
+            self._farewell = ""
+        self._loop.call_soon_threadsafe(self._leaving.set)
+        self._thread.join()
+        os.close(self.pressed)
+        if kind is None:  # after a failure the page comes back with the same secrets
+            self._link_file.remove()
+
+    def _run(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            try:
+                runner.run(self._serve())
+            except OSError as error:
+                self._failure = error
+            finally:
+                self._started.set()
+
+    async def _serve(self) -> None:
+        server = await self._listening()
+        self._access.port = server.sockets[0].getsockname()[1]
+        self._link_file = self._link_file.at(self._access.port)
+        self._started.set()
+        await self._leaving.wait()
+        await asyncio.sleep(2 * SEND_PERIOD_S)  # the farewell goes out
+        server.close()
+        await server.wait_closed()
+
+    async def _listening(self) -> Server:
+        options: dict[str, Any] = {
+            "host": ADDRESS,
+            "process_request": self._answer,
+            "create_connection": functools.partial(_Connection, self),
+            "compression": None,
+            "open_timeout": OPENING_S,
+            "close_timeout": 1.0,
+            "ping_interval": 10.0,
+            "ping_timeout": 30.0,
+            "max_size": 64,
+            "max_queue": 4,
+            "server_header": None,
+            "logger": _silent(),
+        }
+        try:
+            return await serve(self._attend, port=self._link_file.port, **options)
+        except OSError:
+            if not self._link_file.path.exists():  # the port was asked for
+                raise
+            _log.warning("port %d of the page before is taken; another one is used", self._link_file.port)
+            return await serve(self._attend, port=0, **options)
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Files and refusals; None lets the socket be opened."""
+        verdict = self._access.judge(request.method, request.path, request.headers.raw_items())
+        if verdict.kind is Kind.SOCKET:
+            if self._browsers < MAX_BROWSERS:
+                return None
+            sentence = f"{MAX_BROWSERS} browsers look already; close one of them."
+            verdict = Verdict(Kind.REFUSED, http.HTTPStatus.SERVICE_UNAVAILABLE, sentence)
+        if verdict.kind is Kind.REFUSED:
+            self._note(request, verdict)
+            return self._response(verdict.status, "text/plain", verdict.sentence.encode() + b"\n")
+        if verdict.kind is Kind.FILE:
+            return self._response(http.HTTPStatus.OK, MEDIA_TYPES[Path(verdict.file).suffix], self._files[verdict.file])
+        return self._page(verdict.by_token)
+
+    def _page(self, by_token: bool) -> Response:
+        """The page. Who came by the token gets the session and the key, and the token is spent."""
+        secrets = self._access.secrets
+        key = secrets.key.encode() if by_token else b""
+        response = self._response(http.HTTPStatus.OK, "text/html", self._files[START].replace(KEY_MARK, key))
+        if by_token:
+            cookie = f"{self._access.cookie}={secrets.session}; Path=/; HttpOnly; SameSite=Strict"
+            response.headers["Set-Cookie"] = cookie
+            self._link_file = self._link_file.with_fresh_token()
+            self._link_file.write()
+            self._access.secrets = self._link_file.secrets
+        return response
+
+    def _response(self, status: http.HTTPStatus, media_type: str, body: bytes) -> Response:
+        sockets = " ".join(f"ws://{host}" for host in self._access.hosts)
+        headers = Headers(
+            {
+                "Content-Type": f"{media_type}; charset=utf-8",
+                "Content-Length": str(len(body)),
+                "Connection": "close",
+                "Cache-Control": "no-store",
+                "Content-Security-Policy": (
+                    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+                    f"connect-src 'self' {sockets}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+                ),
+                "X-Content-Type-Options": "nosniff",
+                "X-Frame-Options": "DENY",
+                "Referrer-Policy": "no-referrer",
+                "Cross-Origin-Opener-Policy": "same-origin",
+                "Cross-Origin-Resource-Policy": "same-origin",
+            }
+        )
+        return Response(status.value, status.phrase, headers, body)
+
+    def _note(self, request: Request, verdict: Verdict) -> None:
+        self._refusals += 1
+        if self._refusals <= LOGGED_REFUSALS:
+            path = request.path.partition("?")[0]
+            _log.warning("refused with %d: %.20r %.80r: %s", verdict.status, request.method, path, verdict.sentence)
+
+    async def _attend(self, connection: ServerConnection) -> None:
+        """Serves one browser until it goes."""
+        self._browsers += 1
+        listening = asyncio.create_task(self._listen(connection))
+        try:
+            await self._tell(connection)
+        except ConnectionClosed:
+            pass
+        finally:
+            self._browsers -= 1
+            listening.cancel()
+
+    async def _listen(self, connection: ServerConnection) -> None:
+        try:
+            async for word in connection:
+                if word != STOP:
+                    await connection.close(1008, f"only {STOP!r} is understood")
+                    return
+                os.eventfd_write(self.pressed, 1)
+        except ConnectionClosed:
+            return
+
+    async def _tell(self, connection: ServerConnection) -> None:
+        """Sends what is new, again and again; waits where the browser does not read."""
+        told: dict[str, int] = {}
+        image_told = 0
+        said_s = 0.0
+        while True:
+            new = {name: item for name, item in dict(self._sections).items() if told.get(name) != item[0]}
+            now_s = time.monotonic()
+            leaving = self._leaving.is_set()
+            if new or leaving or now_s - said_s >= BEAT_PERIOD_S:
+                said_s = now_s
+                parts = [f"{json.dumps(name)}:{text}" for name, (_, text) in new.items()]
+                parts.append(f'"beat":{{"quiet_s":{now_s - self._shown_s:.1f}}}')
+                if leaving and self._farewell:
+                    parts.append(f'"ended":{json.dumps(self._farewell)}')
+                await connection.send("{" + ",".join(parts) + "}")
+                told.update((name, version) for name, (version, _) in new.items())
+            if self._image[0] != image_told:
+                image_told, image = self._image
+                await connection.send(image)
+            if leaving:
+                await connection.close(1001)
+                return
+            await asyncio.sleep(SEND_PERIOD_S)
+
+
+class _Connection(ServerConnection):
+    """A connection that is dropped at once where too many are open."""
+
+    def __init__(self, page: PageServer, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._page = page
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._page._connections += 1
+        super().connection_made(transport)
+        if self._page._connections > MAX_CONNECTIONS:
+            assert isinstance(transport, asyncio.Transport)
+            transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._page._connections -= 1
+        super().connection_lost(exc)
+
+
+def _read_files() -> dict[str, bytes]:
+    folder = importlib.resources.files("paramove.dashboard") / "page"
+    return {item.name: item.read_bytes() for item in folder.iterdir() if Path(item.name).suffix in MEDIA_TYPES}
+
+
+def _silent() -> logging.Logger:
+    """For the library, which would write a traceback for every broken request."""
+    logger = _log.getChild("websockets")
+    logger.setLevel(logging.CRITICAL)
+    logger.propagate = False
+    return logger

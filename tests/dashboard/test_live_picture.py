@@ -1,0 +1,172 @@
+"""What the page shows, put together from the nodes' messages."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from paramove.bus import topics
+from paramove.bus.topics import Topic
+from paramove.dashboard.live_picture import LivePicture, Surface
+from paramove.dashboard.node_table import NodeTable
+from paramove.dashboard.robot_shape import RobotShape
+from paramove.imitation.setup import SurfaceParameters
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.node_status_pb2 import NodeStatus
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
+from paramove.msgs.relocation_pb2 import RelocationStatus
+from tests.dashboard import scene
+from tests.robots.hoap3.movements import HOAP3
+
+STOP = {"progress": "not asked", "sentence": ""}
+NOW_NS = 2_000_000_000
+
+
+def picture(*said: tuple[Topic, Any]) -> LivePicture:
+    made = LivePicture(HOAP3, "a title", Surface(), wall_s=lambda: 10.0)
+    for message in scene.heard(list(said)):
+        made.hear(message)
+    return made
+
+
+def sections(*said: tuple[Topic, Any]) -> dict[str, Any]:
+    return picture(*said).changes(NOW_NS, STOP)
+
+
+def test_the_middle_of_a_run_is_shown() -> None:
+    shown = sections(*scene.messages())
+    assert shown["world"]["title"] == "a title"
+    assert shown["stage"] == {"stage": "apply", "step": "relocating", "grasps": 5, "retries": 0}
+    assert shown["words"][-1]["sentence"] == scene.SENTENCE
+    assert shown["safety"] == {"state": "armed", "faults": [], "refused": 0}
+    assert shown["pointed"] == "green"
+    assert [item["name"] for item in shown["tracked"]["items"]] == ["yellow", "green", "blue", "hand"]
+    assert len(shown["tracked"]["items"][-1]["outline"]) == 4
+    goal = shown["goal"]
+    assert (goal["kind"], goal["object"], goal["phase"], goal["ended"]) == ("relocate", "green", "carry", False)
+    assert goal["from"] == [0.171, -0.078, -0.098]
+
+
+def test_objects_are_where_the_robot_believes_them() -> None:
+    objects = sections(*scene.messages())["objects"]
+    assert objects["green"]["state"] == "in the robot's hand"
+    assert objects["green"]["place"] is None
+    assert objects["green"]["rule"]["place"] == [0.131, 0.018]
+    assert objects["blue"]["state"] == "in an opening"
+    assert objects["blue"]["place"] == [0.13, 0.072]
+    assert objects["yellow"]["rule"] is None
+    u, v = scene.PLACES["yellow"]
+    plane = scene.PlaneHomography.fit(scene.IMAGE_POINTS, scene.CORNERS, -0.109)
+    assert_allclose(objects["yellow"]["place"], plane.plane_from_image(u, v), rtol=0, atol=1e-4)
+
+
+def test_what_vanishes_beside_the_surface_is_not_in_an_opening() -> None:
+    gone = Gesture(kind=Gesture.KIND_VANISHED, object="blue", located=True, x=0.5, y=0.0)
+    found = sections((topics.GESTURES, gone))["objects"]["blue"]
+    assert (found["state"], found["place"]) == ("not in view", None)
+
+
+def test_before_the_calibration_an_object_is_where_the_robot_put_it() -> None:
+    done = RelocationStatus(goal_id="goal-9", state=RelocationStatus.STATE_SUCCEEDED)
+    shown = sections((topics.RELOCATION_GOAL, scene.goal()), (topics.RELOCATION_STATUS, done))
+    assert shown["objects"]["green"]["place"] == [0.131, 0.018]
+    assert [(item["object"], item["result"], item["attempt"]) for item in shown["results"]] == [
+        ("green", "succeeded", 2)
+    ]
+
+
+def test_a_goal_ends_once_however_often_it_is_said() -> None:
+    done = RelocationStatus(goal_id="goal-9", state=RelocationStatus.STATE_FAILED, reason="nothing was felt")
+    other = RelocationStatus(goal_id="goal-8", state=RelocationStatus.STATE_SUCCEEDED)
+    said = [
+        (topics.RELOCATION_GOAL, scene.goal()),
+        *[(topics.RELOCATION_STATUS, done)] * 3,
+        (topics.RELOCATION_STATUS, other),
+    ]
+    (result,) = sections(*said)["results"]
+    assert (result["result"], result["reason"]) == ("failed", "nothing was felt")
+
+
+def test_only_changes_are_given() -> None:
+    made = picture(*scene.messages())
+    made.changes(NOW_NS, STOP)
+    assert made.changes(NOW_NS, STOP) == {}
+    assert made.changes(NOW_NS + 1_000_000_000, STOP) == {"clock": 3.0}
+    assert made.changes(NOW_NS + 1_000_000_000, {"progress": "asked", "sentence": ""}).keys() == {"stop"}
+
+
+def test_an_image_is_given_once() -> None:
+    made = picture((topics.CAMERA_IMAGE, scene.image()))
+    assert made.image() == scene.image().data
+    assert made.image() is None
+
+
+def test_pointing_is_shown_for_a_while() -> None:
+    made = picture((topics.GESTURES, Gesture(kind=Gesture.KIND_POINTED_AT, object="green")))
+    assert made.changes(NOW_NS, STOP)["pointed"] == "green"
+    assert made.changes(10 * NOW_NS, STOP)["pointed"] == ""
+
+
+BROKEN = [
+    PlaneCalibration(),
+    PlaneCalibration(plane_from_image=[float("nan")] * 9),
+    PlaneCalibration(plane_from_image=[0.0] * 9),
+    PlaneCalibration(plane_from_image=[1.0, 0, 0, 0, 1, 0, 0, 0, 1]),
+]
+
+
+@pytest.mark.parametrize("plane", BROKEN)
+def test_a_calibration_that_cannot_be_used_breaks_nothing(plane: PlaneCalibration) -> None:
+    json.dumps(sections((topics.CALIBRATION_PLANE, plane), (topics.OBJECTS_TRACKED, scene.tracked())), allow_nan=False)
+
+
+def test_numbers_that_are_not_finite_become_nothing() -> None:
+    tracked = scene.tracked()
+    for item in tracked.objects:
+        item.left_px = item.u_px = float("nan")
+    joints = scene.messages()[-4][1]
+    for joint in joints.joints:
+        joint.position = float("inf")
+    said = [*scene.messages(), (topics.OBJECTS_TRACKED, tracked), (topics.ARM_JOINT_STATES, joints)]
+    json.dumps(sections(*said), allow_nan=False)
+
+
+def test_the_surface_is_the_synthesizers() -> None:
+    assert Surface().model_dump() == SurfaceParameters().model_dump()
+
+
+def test_the_robots_gripper_is_where_its_kinematics_say() -> None:
+    shape = RobotShape(HOAP3.model_path, dict(zip(HOAP3.joint_names, HOAP3.base_pose, strict=True)))
+    arm = HOAP3.arms["right"]
+    expected = arm.kinematics.forward(HOAP3.base_pose[arm.indices]).gripper
+    found = shape.site("right_gripper") - shape.site("right_shoulder")
+    assert_allclose(found, expected, rtol=0, atol=1e-9)
+    before = shape.poses()
+    shape.move({"right_elbow": -1.5, "nothing": 1.0, "right_wrist": float("nan")})
+    moved = [old != new for old, new in zip(before, shape.poses(), strict=True)]
+    assert 0 < sum(moved) < len(moved) / 2
+    assert {part["type"] for part in shape.parts()} == {"box", "capsule", "cylinder", "ellipsoid"}
+    assert max(part["body"] for part in shape.parts()) == len(before) - 1
+    assert_allclose(np.linalg.norm([pose[3:] for pose in before], axis=1), 1.0, rtol=0, atol=1e-4)
+
+
+def test_nodes_and_their_restarts() -> None:
+    table = NodeTable()
+    table.hear(scene.status("camera", processed=10, processing_seconds=0.1), 1.0)
+    table.hear(scene.status("camera", processed=30, processing_seconds=0.3), 2.0)
+    table.hear(scene.status("arm_driver", NodeStatus.STATE_FAILED, "it broke"), 2.0)
+    driver, camera = table.section(5.2)
+    assert (camera["ms"], camera["restarts"], camera["silent_s"]) == (10.0, 0, 3)
+    assert (driver["name"], driver["state"], driver["sentence"], driver["ms"]) == (
+        "arm_driver",
+        "failed",
+        "it broke",
+        None,
+    )
+    table.hear(scene.status("camera", processed=2, pid=8), 6.0)
+    assert table.section(6.0)[1]["restarts"] == 1
+    assert table.section(6.0)[1]["ms"] == 10.0
