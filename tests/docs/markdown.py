@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
-MARKERS = ("check only", "needs a running demo")
+MARKERS = ("check only", "needs a running demo", "in the example")
 
 
 @dataclass(frozen=True)
@@ -18,6 +18,7 @@ class Block:
     line: int
     marker: str
     commands: tuple[str, ...]
+    remark: str = ""
 
     def __str__(self):
         return f"{self.path.relative_to(ROOT)}:{self.line}"
@@ -35,15 +36,22 @@ def blocks(path):
         end = next(at for at in range(number + 1, len(lines)) if lines[at].strip() == "```")
         if fence[1] in ("bash", "console", "sh", "shell"):
             inside = [line.strip() for line in lines[number + 1 : end]]
-            found.append(Block(path, number + 1, _marker(lines[number - 1]), _commands(inside, fence[1] == "console")))
+            marker, remark = _marker(lines[number - 1])
+            found.append(Block(path, number + 1, marker, _commands(inside, fence[1] == "console"), remark))
         number = end + 1
     return found
 
 
 def _marker(line):
-    """`<!-- check only: why -->` -> `check only`."""
-    comment = re.fullmatch(r"\s*<!-- ([a-z ]+?)(: .*)? -->\s*", line)
-    return comment[1] if comment else ""
+    """`<!-- check only: why -->` -> `check only`, `why`."""
+    comment = re.fullmatch(r"\s*<!-- ([a-z ]+?)(?:: (.*))? -->\s*", line)
+    return (comment[1], comment[2] or "") if comment else ("", "")
+
+
+def files(path):
+    """Files that a page shows in full, after a comment `<!-- file: PATH -->`: path in the workspace -> content."""
+    shown = re.findall(r"^<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", path.read_text(encoding="utf-8"), re.M | re.S)
+    return dict(shown)
 
 
 def _commands(lines, console):

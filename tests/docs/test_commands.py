@@ -5,6 +5,8 @@ the line before the block, change that:
 
     <!-- check only: why -->       the targets, sub-commands and options exist, but nothing is started
     <!-- needs a running demo -->  run while the demo runs in the same domain
+    <!-- in the example: 78 -->    run by `test_examples.py` in a workspace with the files that the page shows; 78 is
+                                   the exit code that is expected, 0 if it is left out
 """
 
 import atexit
@@ -123,6 +125,9 @@ def check_paramove(words):
     if words[1] == "launch":
         answer = run(["paramove", *words[1:], "--check"])
         assert answer.returncode == 0, answer.stderr
+        return
+    if words[1].startswith("-"):
+        check_options(("paramove",), words)
         return
     path = []
     for word in words[1:]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from paramove.imitation import setup
 from paramove.imitation.setup import MovementSource, SurfaceParameters, synthesizer_for
 from paramove.robots.description import DescriptionError
 from tests.imitation.reaching import ROBOT_FOLDER, reaching_model
@@ -42,3 +43,16 @@ def test_a_model_file_without_what_the_description_names(
     model.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(DescriptionError, match=f"hoap3.xml does not fit the robot's description: .*({words})"):
         synthesizer_for(folder, "right", movement, SurfaceParameters())
+
+
+def test_movement_is_trained_where_nothing_can_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The cache folder cannot be made because a file is in its place."""
+    (tmp_path / "taken").touch()
+    asked: list[object] = []
+    monkeypatch.setattr(setup, "user_cache_path", lambda name: tmp_path / "taken" / name)
+    monkeypatch.setattr(setup, "train_reaching_model", lambda seed, cache=None: asked.append((seed, cache)))
+    MovementSource(seed=3).model()
+    assert asked == [(3, None)]
+    assert "cannot be kept in" in caplog.text

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ruamel.yaml import YAML
 
 from paramove.supervision import application, wiring
 from paramove.supervision.launch_file import load
@@ -84,6 +85,19 @@ def test_a_folder_is_no_launch_file(tmp_path):
     (tmp_path / "bad.yaml").mkdir()
     with pytest.raises(LaunchFileError, match="there is no such launch file"):
         load(tmp_path, "bad")
+
+
+def test_no_value_reaches_a_shell(workspace):
+    """Parameters with a shell's letters come to the node as they are, and nothing is run."""
+    marker = workspace.root / "marker"
+    words = f"$(touch {marker}); touch {marker} & `touch {marker}` | touch {marker} > {marker}"
+    workspace.write(
+        f"nodes: {{a: {{module: nodes.actor, ends_run: true, parameters: {{lasts_s: 0, say: '{words}'}}}}}}"
+    )
+    outcome, folder, _ = workspace.run()
+    assert outcome.code == 0
+    assert YAML(typ="safe").load(folder.config("a"))["parameters"]["say"] == words
+    assert not marker.exists()
 
 
 REAL = {path: path.read_text(encoding="utf-8") for path in [*LAUNCH.glob("*.yaml"), *LAUNCH.glob("overlays/*.yaml")]}
