@@ -24,7 +24,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
     "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
-    "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import and split demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "record": ("paramove.cli.record", "Record, inspect and replay what is said on the bus."),
