@@ -21,6 +21,8 @@ LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing obj
 _HIGHER_ENTRY = 0.065
 _HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
 _BEHIND_ROW = 0.004
+_LEAST_TO_STANDING = 0.003  # m, where no way keeps more: places of standing objects are known to about 2 mm
+_HALF_OPEN = 0.45  # ξ; an object of 20 mm is let go at less than half of it
 _HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 
 
@@ -63,11 +65,15 @@ class ClearPlans:
         return self._first(ways, standing)
 
     def deliver(self, start: FloatArray, target: FloatArray, standing: FloatArray) -> PlannedMotion:
-        """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up."""
+        """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
+
+        Where the open fingers would touch a neighbour, the hand is opened less.
+        """
         back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
         detours: list[list[FloatArray]] = [[], [back], [back + _HIGHER_CARRY]]
         ways = [
-            partial(self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detour], upward)
+            partial(self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detour], upward, opened)
+            for opened in (None, _HALF_OPEN)
             for upward in (False, True)
             for detour in detours
         ]
@@ -133,6 +139,7 @@ class ClearPlans:
         middles = np.column_stack([standing, np.full(len(standing), middle)])
         reasons = []
         in_the_way = set()
+        next_best: tuple[float, PlannedMotion | None] = (0.0, None)
         for way in ways:
             try:
                 motion = way()
@@ -144,9 +151,13 @@ class ClearPlans:
                 return motion
             if closest.standing is not None:
                 in_the_way.add(closest.standing)
+                if closest.distance >= max(_LEAST_TO_STANDING, next_best[0]):
+                    next_best = closest.distance, motion
             phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
             reasons.append(
                 f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
                 f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
             )
+        if next_best[1] is not None:
+            return next_best[1]
         raise NoClearPlanError("; ".join(dict.fromkeys(reasons)), frozenset(in_the_way))

@@ -79,11 +79,17 @@ class RelocationPlanner:
         return self._finish(path)
 
     def deliver(
-        self, start: ArrayLike, target: ArrayLike, via: Sequence[ArrayLike] = (), upward: bool = False
+        self,
+        start: ArrayLike,
+        target: ArrayLike,
+        via: Sequence[ArrayLike] = (),
+        upward: bool = False,
+        opened: float | None = None,
     ) -> PlannedMotion:
         """Carry a held object from gripper position `start` over `via` to `target`, let go, back to the base pose.
 
-        `upward` raises the open hand straight up afterwards instead of drawing it back.
+        `upward` raises the open hand straight up afterwards instead of drawing it back; `opened` is its ξ then, None
+        for the options' one.
         """
         o = self.options
         t = np.asarray(target, dtype=np.float64)
@@ -100,7 +106,7 @@ class RelocationPlanner:
             holding=True,
         )
         self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
-        self._leave(path, t, o.closed_opening, upward)
+        self._leave(path, t, o.closed_opening, upward, o.work_opening if opened is None else opened)
         return self._finish(path)
 
     def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
@@ -108,7 +114,7 @@ class RelocationPlanner:
         path = self._new_path()
         here = np.asarray(start, dtype=np.float64)
         self._stay(path, "release", here, opening)
-        self._leave(path, here, opening, upward)
+        self._leave(path, here, opening, upward, self.options.work_opening)
         return self._finish(path)
 
     def offer(self, target: ArrayLike) -> PlannedMotion:
@@ -140,20 +146,20 @@ class RelocationPlanner:
         states = self._blended(states, o.blend_share)
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
-    def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool) -> None:
+    def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool, opened: float) -> None:
         o, m = self.options, self.movement
-        self._fingers(path, "release", opening, o.work_opening)
+        self._fingers(path, "release", opening, opened)
         aside = target + o.release_aside * self._right(target)
         before = aside if upward else self._before(target)
         high = self.far_enough(before + o.entry_height * _UP)
-        self._move(path, "withdraw", [aside], o.careful_speed, o.work_opening)
+        self._move(path, "withdraw", [aside], o.careful_speed, opened)
         if not upward:
-            self._move(path, "withdraw", [before], o.speed, o.work_opening)
-        self._move(path, "withdraw", [high], o.speed, o.work_opening)
+            self._move(path, "withdraw", [before], o.speed, opened)
+        self._move(path, "withdraw", [high], o.speed, opened)
         states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
         opening_path = m.opening(states.finger_to_thumb)
         n = len(states)
-        opening_path = _crossfaded(np.full(n, o.work_opening), opening_path, n)
+        opening_path = _crossfaded(np.full(n, opened), opening_path, n)
         opening_path = _crossfaded(opening_path, np.full(n, self._base_opening), n)
         level = fade_in(n, o.level_states)[::-1]
         backwards = self._blended(ArmPoses.from_stacked(states.stacked()[::-1]), o.blend_share)
