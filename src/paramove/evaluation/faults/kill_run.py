@@ -107,7 +107,8 @@ class KillRun:
             folder = run.folder
             if run.alive and run.end() is None:
                 results[-1].problems.append("the launcher did not end within 30 s of Ctrl-C")
-        left = self._left(runtime)
+        _wait(lambda: not left_over(self._domain, runtime))
+        left = left_over(self._domain, runtime)
         for result in results:
             result.run_folder = str(folder)
             self._judge_whole(result, folder, left, _real_s(run.events))
@@ -196,11 +197,11 @@ class KillRun:
         if result.case.signal == "KILL":
             self._until(run, lambda: not run.alive, END_S)
             result.exit_code = run.process.returncode
-            self._until(run, lambda: "launcher" in run.last_sentence, GONE_S)
+            _wait(lambda: "launcher" in run.last_sentence)
             result.sentence = run.last_sentence
             if "launcher" not in result.sentence:
                 result.problems.append(f"nobody says that the launcher was killed; last: {result.sentence}")
-            if not self._until(run, lambda: not left_over(run.domain, run.bus_folder.parent), GONE_S):
+            if not _wait(lambda: not left_over(run.domain, run.bus_folder.parent)):
                 result.problems.append("nodes outlive the launcher by more than 3 s")
             result.end_s = (time.monotonic_ns() - struck_ns) * 1e-9
             return
@@ -240,12 +241,6 @@ class KillRun:
                 return happened()
         return False
 
-    def _left(self, runtime: Path) -> list[str]:
-        end_s = time.monotonic() + GONE_S
-        while (left := left_over(self._domain, runtime)) and time.monotonic() < end_s:
-            pass
-        return left
-
     def _judge_whole(self, result: KillResult, folder: Path, left: list[str], real_s: float) -> None:
         result.problems += [f"left over: {what}" for what in left]
         robot = RobotDescription.load(self._workspace / "robot_description" / "hoap3")
@@ -260,6 +255,14 @@ class KillRun:
                 f"joint {result.step.joint} stepped {result.step.counts} counts in 1 ms at {result.step.at_ms} ms: "
                 f"{result.step.share:.2f} of what is allowed (change of speed {result.step.bend_share:.2f})"
             )
+
+
+def _wait(happened: Callable[[], bool]) -> bool:
+    """Up to 3 s, whether or not the run is still alive."""
+    end_s = time.monotonic() + GONE_S
+    while not (done := happened()) and time.monotonic() < end_s:
+        time.sleep(0.02)
+    return done
 
 
 def _real_s(events: Sequence[dict[str, Any]]) -> float:
