@@ -92,6 +92,12 @@ def test_half_written_files_offer_nothing_and_say_nothing(tmp_path, text):
     assert offered("paramove launch ha", cwd=tmp_path) == ["half"]
 
 
+def test_folders_of_runs_are_offered(tmp_path):
+    (tmp_path / "runs" / "2026-11-21_10-00-00").mkdir(parents=True)
+    assert offered("paramove logs --run runs/", cwd=tmp_path) == ["runs/2026-11-21_10-00-00"]
+    assert offered("paramove logs --run runs/", cwd=tmp_path / "runs") == []
+
+
 def test_outside_of_a_workspace_nothing_is_offered(tmp_path):
     assert offered("paramove launch ", cwd=tmp_path) == []
 

@@ -72,11 +72,10 @@ def domains(incomplete: str) -> list[str]:
 
 def run_folders(incomplete: str) -> list[str]:
     """Folders of runs, the newest first."""
-    try:
+    with contextlib.suppress(OSError):
         found = sorted((path.name for path in Path("runs").iterdir() if path.is_dir()), reverse=True)
-    except OSError:
-        return []
-    return _beginning(incomplete, (f"runs/{name}" for name in found))
+        return _beginning(incomplete, (f"runs/{name}" for name in found))
+    return []
 
 
 def _beginning(incomplete: str, words: Iterable[str]) -> list[str]:

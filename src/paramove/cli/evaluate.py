@@ -14,6 +14,7 @@ from rich.table import Table
 
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
+from paramove.cli import completions
 from paramove.supervision import application, exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
@@ -76,7 +77,9 @@ def rule_learning(
 
 @app.command("homography")
 def homography(
-    run_folder: Annotated[Path | None, typer.Argument(help="folder of a run; or give --seeds")] = None,
+    run_folder: Annotated[
+        Path | None, typer.Argument(help="folder of a run; or give --seeds", autocompletion=completions.run_folders)
+    ] = None,
     seeds: Annotated[str | None, typer.Option(help="worlds to run, or to take from --runs: 0-9")] = None,
     jobs: JobsOption = 1,
     json_file: JsonFileOption = None,

@@ -15,6 +15,7 @@ from typing import Annotated
 
 import typer
 
+from paramove.cli import completions
 from paramove.supervision.application import find_workspace
 from paramove.supervision.processes import printable
 from paramove.supervision.run_logs import LEVELS, SUPERVISOR, LogLine, RunLogs
@@ -41,7 +42,12 @@ def logs(
     follow: Annotated[bool, typer.Option("--follow", "-f", help="go on as the logs grow, until the run ends")] = False,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
     level: Annotated[Level, typer.Option(help="this level and above")] = Level.INFO,
-    run: Annotated[Path | None, typer.Option(metavar="FOLDER", help="folder of the run; default: the newest")] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="folder of the run; default: the newest", autocompletion=completions.run_folders
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print a JSON object per line")] = False,
 ) -> None:
     """Show what the nodes of a run logged and what was done to them, in the order of time.
