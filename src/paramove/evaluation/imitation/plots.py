@@ -121,26 +121,28 @@ def over_the_table(experiment: Experiment, figure: Figure) -> None:
     """Held-out targets on the lower face of the cuboid: largest errors, median over the demonstrators."""
     quantities = (
         ("gripper_at_target", "gripper at the target"),
-        ("gripper", "gripper, states 20-60"),
+        ("gripper", "gripper"),
+        ("gripper_aligned", "gripper, after time warping"),
+        ("imitation_excess", "imitation error above the reference's"),
         ("effective", "effective elbow error"),
-        ("imitation_excess", "imitation error, more than the reference's"),
+        ("effective_aligned", "effective, after time warping"),
     )
-    all_axes = figure.subplots(2, 2, sharex=True, sharey=True)
+    all_axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for axes, (name, words) in zip(all_axes.flat, quantities, strict=True):
         _map(axes, experiment, name, words)
 
 
 def _map(axes: Axes, experiment: Experiment, name: str, words: str) -> None:
     found: list[tuple[float, float, float]] = []
-    for place in (*raster(), *THESIS_PLACES):
+    for place in raster():
         comparisons = experiment.of(_known(place))
         if comparisons:
             value = float(np.median([maxima(comparison)[name] for comparison in comparisons]))
             found.append((place.coordinates[1], place.coordinates[0], value))
     across, forward, values = np.array(found).T
-    axes.scatter(across, forward, c=values, cmap="YlOrRd", vmin=0, vmax=max(8.0, values.max()), s=900, marker="s")
+    axes.scatter(across, forward, c=values, cmap="YlOrRd", vmin=0, vmax=18, s=900, marker="s")
     for v, u, value in found:
-        axes.text(v, u, f"{value:.1f}", ha="center", va="center", fontsize=9)
+        axes.text(v, u, f"{value:.1f}", ha="center", va="center", fontsize=9, c="white" if value > 12 else BLACK)
     axes.plot([0, 0, 1, 1], [0, 1, 0, 1], "k^", ms=7)
     axes.set(title=f"{words}, mm", xlim=(1.15, -0.15), ylim=(-0.25, 1.25), yticks=[0, 0.5, 1], xticks=[0, 0.5, 1])
     axes.set_xticklabels(["right", "", "left"])
@@ -212,5 +214,5 @@ PLOTS: tuple[tuple[str, Callable[[Experiment, Figure], None], tuple[float, float
     ("elbow", elbow, (10.5, 7.2)),
     ("limits", limits, (10.5, 6.0)),
     ("arms", arms, (8.5, 6.6)),
-    ("table", over_the_table, (9.5, 6.0)),
+    ("table", over_the_table, (11.5, 5.6)),
 )

@@ -41,7 +41,8 @@ TEXTS = {
     "table": (
         "All over the table",
         "Held-out targets on the lower face of the demonstrated cuboid (triangles: demonstrated corners), seen by the "
-        "person. Medians over the demonstrators of the largest error in states 20-60.",
+        "person. Medians over the demonstrators of the largest error in states 20-60 or at the target. What time "
+        "warping removes is a difference of progress: the same path, run through earlier or later.",
     ),
 }
 
