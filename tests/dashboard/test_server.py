@@ -163,13 +163,15 @@ def test_what_is_no_request_of_ours_is_refused_and_forgotten(
 def test_a_browser_gets_what_is_there_and_then_what_changes(page: PageServer, visitor: Visitor) -> None:
     page.show({"words": [], "clock": 1.0}, b"\xff\xd8image")
     with visitor.socket() as live:
+        assert live.recv(WAIT_S) == b"\xff\xd8image"
         first = json.loads(live.recv(WAIT_S))
         assert {"words": [], "clock": 1.0}.items() <= first.items()
-        assert live.recv(WAIT_S) == b"\xff\xd8image"
         assert page.watched
         page.show({"clock": 2.0})
+        live.send("next")
         while "clock" not in (message := json.loads(live.recv(WAIT_S))):
             assert "words" not in message
+            live.send("next")
         assert message["clock"] == 2.0
         assert "words" not in message
 
@@ -230,24 +232,28 @@ def test_two_hundred_silent_connections_do_not_keep_a_browser_out(page: PageServ
     assert visitor.get("/")[0] == 200
 
 
-def test_a_browser_that_does_not_read_costs_nothing(page: PageServer, visitor: Visitor) -> None:
-    """Of 400 images of 1 MB it would keep none; the others are shown the newest."""
+def test_a_browser_that_does_not_read_or_answer_costs_nothing(page: PageServer, visitor: Visitor) -> None:
+    """Of 400 images of 1 MB it gets one; the others are shown the newest."""
     image = b"\xff\xd8" + bytes(MEGABYTE)
     page.show({"clock": 0.0}, image)
-    with visitor.socket(max_queue=1) as slow:
-        slow.recv(WAIT_S)
+    with visitor.socket(max_queue=1) as deaf, visitor.socket() as silent, visitor.socket() as quick:
+        assert silent.recv(WAIT_S) == image
+        assert "clock" in json.loads(silent.recv(WAIT_S))
         before = psutil.Process().memory_info().rss
-        with visitor.socket() as quick:
-            seen = 0
-            for number in range(1, 400):
-                page.show({"clock": float(number)}, image)
-                if number % 40 == 0:
-                    while seen < number:
-                        message = quick.recv(WAIT_S)
-                        if isinstance(message, str):
-                            seen = json.loads(message).get("clock", seen)
-        assert seen >= 360
+        seen = -1.0
+        for number in range(400):
+            page.show({"clock": float(number)}, image)
+            while number % 40 == 0 and seen < number:
+                message = quick.recv(WAIT_S)
+                if isinstance(message, str):
+                    seen = json.loads(message).get("clock", seen)
+                    quick.send("next")
+        assert seen == 360
         assert psutil.Process().memory_info().rss - before < 48 * MEGABYTE
+        silent.send("next")
+        assert silent.recv(WAIT_S) == image
+        assert json.loads(silent.recv(WAIT_S))["clock"] == 399, "what it missed is not sent later"
+        assert deaf.recv(WAIT_S) == image
 
 
 def test_words_of_the_run_stay_data(page: PageServer, visitor: Visitor) -> None:

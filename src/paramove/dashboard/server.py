@@ -1,8 +1,9 @@
 """The page's server: a few files and one socket for each browser, on loopback, in a thread of its own.
 
 The bus's thread leaves the newest content with `show` and never waits. Each browser is sent what has changed since it
-was last sent something, so a slow one gets fewer pictures, and nothing piles up. The only word that a browser may say
-is "stop"; it makes `pressed` readable, which the bus's thread watches.
+was last sent something, once it has said "next": it has drawn what it got before. So a slow one gets fewer pictures but
+no older ones, and nothing piles up, not even in the sockets. The only other word that a browser may say is "stop"; it
+makes `pressed` readable, which the bus's thread watches.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ OPENING_S = 5.0
 SEND_PERIOD_S = 0.05
 BEAT_PERIOD_S = 1.0
 LOGGED_REFUSALS = 20
-STOP = "stop"
+FAREWELL_S = 3.0
+STOP, NEXT = "stop", "next"
 
 MEDIA_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 KEY_MARK = b"{{key}}"
@@ -148,7 +150,9 @@ class PageServer:
         self._link_file = self._link_file.at(self._access.port)
         self._started.set()
         await self._leaving.wait()
-        await asyncio.sleep(2 * SEND_PERIOD_S)  # the farewell goes out
+        end_s = time.monotonic() + FAREWELL_S
+        while self._browsers and time.monotonic() < end_s:  # the farewell goes out
+            await asyncio.sleep(SEND_PERIOD_S)
         server.close()
         await server.wait_closed()
 
@@ -233,49 +237,53 @@ class PageServer:
     async def _attend(self, connection: ServerConnection) -> None:
         """Serves one browser until it goes."""
         self._browsers += 1
-        listening = asyncio.create_task(self._listen(connection))
+        ready = asyncio.Event()
+        ready.set()
+        listening = asyncio.create_task(self._listen(connection, ready))
         try:
-            await self._tell(connection)
+            await self._tell(connection, ready)
         except ConnectionClosed:
             pass
         finally:
             self._browsers -= 1
             listening.cancel()
 
-    async def _listen(self, connection: ServerConnection) -> None:
+    async def _listen(self, connection: ServerConnection, ready: asyncio.Event) -> None:
         try:
             async for word in connection:
-                if word != STOP:
-                    await connection.close(1008, f"only {STOP!r} is understood")
+                if word == STOP:
+                    os.eventfd_write(self.pressed, 1)
+                elif word == NEXT:
+                    ready.set()
+                else:
+                    await connection.close(1008, f"only {STOP!r} and {NEXT!r} are understood")
                     return
-                os.eventfd_write(self.pressed, 1)
         except ConnectionClosed:
             return
 
-    async def _tell(self, connection: ServerConnection) -> None:
-        """Sends what is new, again and again; waits where the browser does not read."""
+    async def _tell(self, connection: ServerConnection, ready: asyncio.Event) -> None:
+        """Sends what is new, an image first, whenever the browser is ready for it."""
         told: dict[str, int] = {}
         image_told = 0
         said_s = 0.0
-        while True:
-            new = {name: item for name, item in dict(self._sections).items() if told.get(name) != item[0]}
-            now_s = time.monotonic()
-            leaving = self._leaving.is_set()
-            if new or leaving or now_s - said_s >= BEAT_PERIOD_S:
-                said_s = now_s
-                parts = [f"{json.dumps(name)}:{text}" for name, (_, text) in new.items()]
-                parts.append(f'"beat":{{"quiet_s":{now_s - self._shown_s:.1f}}}')
-                if leaving and self._farewell:
-                    parts.append(f'"ended":{json.dumps(self._farewell)}')
-                await connection.send("{" + ",".join(parts) + "}")
-                told.update((name, version) for name, (version, _) in new.items())
-            if self._image[0] != image_told:
-                image_told, image = self._image
-                await connection.send(image)
-            if leaving:
-                await connection.close(1001)
-                return
+        while not self._leaving.is_set():
             await asyncio.sleep(SEND_PERIOD_S)
+            if not ready.is_set():
+                continue
+            new = {name: item for name, item in dict(self._sections).items() if told.get(name) != item[0]}
+            number, image = self._image
+            if not new and number == image_told and time.monotonic() - said_s < BEAT_PERIOD_S:
+                continue
+            ready.clear()
+            said_s = time.monotonic()
+            if number != image_told:
+                image_told = number
+                await connection.send(image)
+            told.update((name, version) for name, (version, _) in new.items())
+            await connection.send(_text({name: text for name, (_, text) in new.items()}, said_s - self._shown_s))
+        if self._farewell:
+            await connection.send(_text({"ended": json.dumps(self._farewell)}, 0.0))
+        await connection.close(1001 if self._farewell else 1012)
 
 
 class _Connection(ServerConnection):
@@ -295,6 +303,12 @@ class _Connection(ServerConnection):
     def connection_lost(self, exc: Exception | None) -> None:
         self._page._connections -= 1
         super().connection_lost(exc)
+
+
+def _text(sections: Mapping[str, str], quiet_s: float) -> str:
+    """One message of sections that are JSON already, and how long ago the run last said something."""
+    parts = [f"{json.dumps(name)}:{text}" for name, text in sections.items()]
+    return "{" + ",".join([*parts, f'"beat":{{"quiet_s":{quiet_s:.1f}}}']) + "}"
 
 
 def _read_files() -> dict[str, bytes]:

@@ -25,7 +25,6 @@ export class CameraView {
     this.bitmap = bitmap;
     this.arrived += 1;
     this.arrivedAt = performance.now();
-    this.draw();
   }
 
   update(state) {

@@ -15,7 +15,7 @@ history.replaceState(null, "", "/"); // the token is spent
 const state = {};
 const camera = new CameraView($("camera"));
 const world = new WorldView($("world"), $("labels"));
-let socket = null, connected = false, ended = "", quietS = 0, pressedAt = null, everConnected = false;
+let socket = null, image = null, connected = false, ended = "", quietS = 0, pressedAt = null, everConnected = false;
 
 function text(element, value) {
   if (element.textContent !== value) element.textContent = value;
@@ -109,18 +109,25 @@ function showRules(objects) {
   text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Places are x, y from the right shoulder, as the robot believes them.` : "No object was seen yet.");
 }
 
-let wanted = false;
-function drawSoon() {
-  if (wanted) return;
-  wanted = true;
-  requestAnimationFrame(() => {
-    wanted = false;
-    const { tracked = {}, plane = {}, objects = {}, pointed = "", robot = {}, goal = {} } = state;
-    camera.update({ tracked, plane, objects, pointed });
-    world.update({ world: state.world ?? null, robot, objects, goal, plane });
-    world.draw();
-    if (performance.now() - camera.arrivedAt > 500) camera.draw();
-  });
+function draw() {
+  const { tracked = {}, plane = {}, objects = {}, pointed = "", robot = {}, goal = {} } = state;
+  camera.update({ tracked, plane, objects, pointed });
+  world.update({ world: state.world ?? null, robot, objects, goal, plane });
+  world.draw();
+  camera.draw();
+}
+
+// The server sends the next message once this one is drawn, so that a slow browser shows little but never the past.
+async function take(data, from) {
+  if (typeof data !== "string") { image = data; return; }
+  heard(JSON.parse(data));
+  if (!document.hidden) {
+    if (image) await camera.image(image);
+    image = null;
+    await new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 1000); });
+    draw();
+  }
+  if (from.readyState === WebSocket.OPEN) from.send("next");
 }
 
 function heard(message) {
@@ -129,7 +136,6 @@ function heard(message) {
   if (farewell) ended = farewell;
   Object.assign(state, sections);
   for (const [name, content] of Object.entries(sections)) SHOW[name]?.(content);
-  drawSoon();
   judge();
 }
 
@@ -159,11 +165,17 @@ function stop() {
 }
 
 function connect() {
-  socket = new WebSocket(`ws://${location.host}/live?key=${encodeURIComponent(key)}`);
-  socket.binaryType = "arraybuffer";
-  socket.onopen = () => { connected = everConnected = true; ended = ""; judge(); };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? heard(JSON.parse(data)) : camera.image(data));
-  socket.onclose = () => { connected = false; judge(); if (!ended) setTimeout(connect, RETRY_MS); };
+  const opened = new WebSocket(`ws://${location.host}/live?key=${encodeURIComponent(key)}`);
+  socket = opened;
+  opened.binaryType = "arraybuffer";
+  opened.onopen = () => { connected = everConnected = true; ended = ""; judge(); };
+  opened.onmessage = ({ data }) => take(data, opened);
+  opened.onclose = ({ code }) => {
+    connected = false;
+    if (code === 1001 && !ended) ended = "The run has ended.";
+    judge();
+    if (!ended) setTimeout(connect, RETRY_MS);
+  };
 }
 
 $("stop").addEventListener("click", stop);
