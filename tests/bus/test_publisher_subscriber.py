@@ -15,7 +15,7 @@ import pytest
 import zmq
 
 from paramove.bus import topics
-from paramove.bus.endpoint import BusFolderError, TopicTakenError, is_alive, prepare_folder, socket_path
+from paramove.bus.endpoint import BusFolderError, TopicTakenError, is_alive, is_held, prepare_folder, socket_path
 from paramove.bus.envelope import Reason
 from paramove.bus.publisher import Publisher
 from paramove.bus.subscriber import Subscriber
@@ -137,10 +137,12 @@ def test_a_killed_publisher_is_named_while_it_lives_and_replaced_after(
         assert process.stdout.readline() == b"bound\n"
         with pytest.raises(TopicTakenError, match=f"pid {process.pid} "):
             Publisher(context, folder, topics.GESTURES, "recognizer")
+        path = socket_path(folder, "gestures")
+        assert is_held(path)
         process.send_signal(signal.SIGKILL)
-    path = socket_path(folder, "gestures")
     assert path.exists()
     assert not is_alive(path)
+    assert not is_held(path)
     publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
     subscriber = Subscriber(context, folder, topics.GESTURES)
     _connect(publisher, subscriber, wait)

@@ -50,6 +50,17 @@ def holder_of(path: Path) -> str:
         return ""
 
 
+def is_held(path: Path) -> bool:
+    """Whether a process holds the lock of the socket `path`, without touching lock or socket."""
+    try:
+        lock = path.with_name(path.name + ".lock").stat()
+        held = Path("/proc/locks").read_text(encoding="ascii")
+    except OSError:
+        return False
+    file = f"{os.major(lock.st_dev):02x}:{os.minor(lock.st_dev):02x}:{lock.st_ino}"
+    return any(file in line.split() for line in held.splitlines())
+
+
 def prepare_folder(folder: Path) -> None:
     """Makes the bus folder (mode 0700); raises BusFolderError if it belongs to others or is open to them."""
     try:

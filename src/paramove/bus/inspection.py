@@ -14,7 +14,7 @@ from typing import Any
 import zmq
 
 from paramove.bus import topics
-from paramove.bus.endpoint import holder_of, is_alive, socket_path
+from paramove.bus.endpoint import holder_of, is_held, socket_path
 from paramove.bus.subscriber import Heard, Subscriber
 from paramove.bus.topics import Topic
 
@@ -27,7 +27,7 @@ class Speaker:
 
     Attributes:
         topic: Row of the table.
-        alive: Whether a process listens at the topic's socket.
+        alive: Whether a process holds the topic.
         holder: What the holder of the topic's lock wrote, such as "pid 12 (camera)"; "" if nobody ever said it.
     """
 
@@ -90,7 +90,7 @@ def speakers(folder: Path) -> list[Speaker]:
 def speaker(folder: Path, topic: Topic) -> Speaker:
     """Who says one topic."""
     path = socket_path(folder, topic.name)
-    return Speaker(topic, is_alive(path), holder_of(path))
+    return Speaker(topic, is_held(path), holder_of(path))
 
 
 def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Heard]:
