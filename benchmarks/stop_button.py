@@ -1,0 +1,121 @@
+"""How long a stop takes from the page's socket to the arm's gate, in real time, with the real nodes.
+
+python benchmarks/stop_button.py [--presses 20]
+
+A robot that only plays its stream (tests/robots/hoap3/fake_robot.py) is moved by the real driver; at some moment of the
+movement the stop is sent through the page's socket. Measured on the wall clock, each time with new processes: until the
+gate says "stopping", and until the robot has the batch with the stop ramp.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from paramove.bus import topics  # noqa: E402
+from paramove.bus.bus import Bus  # noqa: E402
+from paramove.bus.settings import BusSettings  # noqa: E402
+from paramove.bus.turns import Tick  # noqa: E402
+from paramove.dashboard.link_file import NAME, link_in  # noqa: E402
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
+from tests.dashboard.conftest import Visitor  # noqa: E402
+from tests.robots.hoap3.fake_robot import FakeRobot, trajectory  # noqa: E402
+from tests.robots.hoap3.movements import HOAP3  # noqa: E402
+
+GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0}
+HEARS = (topics.ARM_SAFETY, topics.WIRE_HOAP3_STREAM)
+SAYS = (topics.WIRE_HOAP3_STATE, topics.OPERATOR_ARM, topics.ARM_TRAJECTORY)
+
+
+class World:
+    """The robot's side of the wire and the person at the page."""
+
+    def __init__(self, folder: Path, press_at_s: float) -> None:
+        self.bus = Bus("world", BusSettings(folder=folder / "bus"), HEARS, SAYS)
+        self.folder = folder
+        self.robot = FakeRobot()
+        self.robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
+        self.press_at_s = press_at_s
+        self.moving_s = self.pressed_s = self.stopping_s = self.batch_s = 0.0
+
+    def run(self) -> tuple[float, float]:
+        """Seconds from the press to "stopping" and to the batch with the ramp."""
+        played_s = time.monotonic()
+        with self.bus:
+            for event in self.bus.events(*HEARS, tick=True):
+                now_s = time.monotonic()
+                if isinstance(event, Tick):
+                    self.robot.play(round(1e3 * (now_s - played_s)))
+                    played_s = now_s
+                    self.bus.publish(topics.WIRE_HOAP3_STATE, self.robot.state(event.now_ns))
+                    if self.moving_s and not self.pressed_s and now_s - self.moving_s > self.press_at_s:
+                        self.pressed_s = float("inf")
+                        threading.Thread(target=self._press, daemon=True).start()
+                elif event.topic is topics.WIRE_HOAP3_STREAM:
+                    self.robot.reader.offer(event.message)
+                    if self.stopping_s and not self.batch_s:
+                        self.batch_s = now_s
+                elif event.message.state == SafetyState.STATE_DISARMED:
+                    self.bus.publish(topics.OPERATOR_ARM, ArmRequest(source="benchmark", armed=True))
+                elif event.message.state == SafetyState.STATE_ARMED and not self.moving_s and link_in(self.folder):
+                    self.moving_s = now_s
+                    self.bus.publish(topics.ARM_TRAJECTORY, trajectory("one", GOAL, 3.0))
+                elif event.message.state == SafetyState.STATE_STOPPING and not self.stopping_s:
+                    self.stopping_s = now_s
+                elif event.message.state == SafetyState.STATE_HOLD:
+                    break
+        return self.stopping_s - self.pressed_s, (self.batch_s or self.stopping_s) - self.pressed_s
+
+    def _press(self) -> None:
+        visitor = Visitor(json.loads((self.folder / NAME).read_text())["port"])
+        visitor.open_link(link_in(self.folder))
+        with visitor.socket() as live:
+            live.recv()
+            self.pressed_s = time.monotonic()
+            live.send("stop")
+            live.recv(60)
+
+
+def measure(press_at_s: float) -> tuple[float, float]:
+    """One stop with new processes."""
+    with tempfile.TemporaryDirectory(prefix="paramove-") as name:
+        folder = Path(name)
+        processes = []
+        try:
+            for node in ("dashboard", "arm_driver"):
+                config = folder / f"{node}.yaml"
+                bus = {"folder": str(folder / "bus"), "clock": "monotonic"}
+                config.write_text(json.dumps({"node": node, "bus": bus, "parameters": {}, "run_folder": name}))
+                command = [sys.executable, "-m", f"nodes.{node}", "--config", str(config)]
+                processes.append(subprocess.Popen(command, cwd=ROOT, stderr=subprocess.DEVNULL))
+            return World(folder, press_at_s).run()
+        finally:
+            for process in processes:
+                process.terminate()
+            for process in processes:
+                process.wait()
+
+
+def main() -> None:
+    """Prints median and largest."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--presses", type=int, default=20)
+    moments = np.linspace(0.4, 1.8, parser.parse_args().presses)
+    found = 1e3 * np.array([measure(float(moment)) for moment in moments])
+    for what, times in zip(("gate says stopping", "robot has the stop ramp"), found.T, strict=True):
+        sys.stdout.write(f"{what:<24} median {np.median(times):6.1f} ms   largest {times.max():6.1f} ms\n")
+
+
+if __name__ == "__main__":
+    main()
