@@ -57,8 +57,9 @@ def is_held(path: Path) -> bool:
         held = Path("/proc/locks").read_text(encoding="ascii")
     except OSError:
         return False
-    file = f"{os.major(lock.st_dev):02x}:{os.minor(lock.st_dev):02x}:{lock.st_ino}"
-    return any(file in line.split() for line in held.splitlines())
+    # Not the device: on overlay and btrfs the kernel's list names another one than stat does.
+    locks = [line.split() for line in held.splitlines() if " FLOCK " in line]
+    return any(field.endswith(f":{lock.st_ino}") for fields in locks for field in fields)
 
 
 def prepare_folder(folder: Path) -> None:
