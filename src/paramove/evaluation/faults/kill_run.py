@@ -105,13 +105,15 @@ class KillRun:
                 self._strike(run, now)
             runtime = run.bus_folder.parent
             folder = run.folder
+            over_ns = time.monotonic_ns()
             if run.alive and run.end() is None:
                 results[-1].problems.append("the launcher did not end within 30 s of Ctrl-C")
+            real_s = _real_s(run.events, over_ns)
         _wait(lambda: not left_over(self._domain, runtime))
         left = left_over(self._domain, runtime)
         for result in results:
             result.run_folder = str(folder)
-            self._judge_whole(result, folder, left, _real_s(run.events))
+            self._judge_whole(result, folder, left, real_s)
         return results
 
     def _next(self, run: LiveRun, waiting: list[KillResult]) -> KillResult | None:
@@ -265,9 +267,9 @@ def _wait(happened: Callable[[], bool]) -> bool:
     return done
 
 
-def _real_s(events: Sequence[dict[str, Any]]) -> float:
-    """How long the simulator ran, s: from when it was ready to the newest event of it or of the others."""
-    ready = [
-        event["monotonic_ns"] for event in events if event.get("node") == "simulator" and event["event"] == "ready"
-    ]
-    return (events[-1]["monotonic_ns"] - ready[0]) * 1e-9 if ready else 0.0
+def _real_s(events: Sequence[dict[str, Any]], over_ns: int) -> float:
+    """How long the simulator ran, s: from when it was ready to when it was killed, stopped or asked to end."""
+    own = [event for event in events if event.get("node") == "simulator"]
+    ready = [event["monotonic_ns"] for event in own if event["event"] == "ready"]
+    ended = [event["monotonic_ns"] for event in own if event["event"] in ("ended", "suspended", "asked")]
+    return (min([*ended, over_ns]) - ready[0]) * 1e-9 if ready else 0.0
