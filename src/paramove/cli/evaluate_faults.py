@@ -128,7 +128,9 @@ def _perform(missing: list[Any], options: Any, results: dict[str, dict[str, Any]
         def ended(result: Any) -> None:
             results[result.case.name] = json.loads(json.dumps(result.as_json()))
             verdict = (
-                "[green]passed[/]" if result.passed else f"[red]failed[/] {'; '.join((*result.problems, *result.late))}"
+                "[green]passed[/]"
+                if result.passed
+                else f"[red]failed[/] {'; '.join((*result.problems, *result.late, result.not_sent))}"
             )
             progress.console.print(f"{result.case.name}: {verdict}", soft_wrap=True)
             progress.advance(task)

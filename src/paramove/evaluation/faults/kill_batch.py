@@ -14,6 +14,8 @@ from typing import Any
 from paramove.evaluation.faults.kill_cases import KillCase, runs_of
 from paramove.evaluation.faults.kill_run import InterruptedRunError, KillResult, KillRun
 
+ATTEMPTS = 3
+
 
 @dataclass(frozen=True)
 class KillOptions:
@@ -52,33 +54,38 @@ def run_cases(
 ) -> None:
     """Perform all cases; `begun` and `ended` are called in this thread.
 
+    A case whose run ended before its moment came is made again in another run, up to three times in all.
     A KeyboardInterrupt ends the runs under way in order; their cases have no result then.
     """
     options.folder.mkdir(parents=True, exist_ok=True)
-    waiting = list(enumerate(runs_of(cases), start=1))
+    waiting = [(group, 1) for group in runs_of(cases)]
     interrupted = threading.Event()
     with ThreadPoolExecutor(max_workers=options.jobs) as pool:
-        running: set[Future[list[KillResult]]] = set()
+        running: dict[Future[list[KillResult]], int] = {}
         try:
             while waiting or running:
                 while waiting and len(running) < options.jobs:
-                    number, group = waiting.pop(0)
+                    group, attempt = waiting.pop(0)
                     begun(group)
-                    running.add(pool.submit(_perform, group, number, options, interrupted))
-                done, running = wait(running, return_when=FIRST_COMPLETED)
-                for result in (result for future in done for result in future.result()):
-                    _keep(options.folder, result)
-                    ended(result)
+                    running[pool.submit(_perform, group, attempt, options, interrupted)] = attempt
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    attempt = running.pop(future)
+                    again = [result.case for result in future.result() if result.not_sent and attempt < ATTEMPTS]
+                    waiting += [(group, attempt + 1) for group in runs_of(again)]
+                    for result in future.result():
+                        if result.case not in again:
+                            _keep(options.folder, result)
+                            ended(result)
         except KeyboardInterrupt:
             interrupted.set()
             raise
 
 
 def _perform(
-    group: Sequence[KillCase], number: int, options: KillOptions, interrupted: threading.Event
+    group: Sequence[KillCase], attempt: int, options: KillOptions, interrupted: threading.Event
 ) -> list[KillResult]:
-    folder = options.folder / "runs" / group[0].name
-    domain = f"kills-{os.getpid()}-{number}"
+    folder = options.folder / "runs" / f"{group[0].name}-{attempt}"
+    domain = f"kills-{os.getpid()}-{group[0].name.lower()}-{attempt}"[:40]
     try:
         return KillRun(options.workspace, folder, domain, options.seed, options.pace, interrupted.is_set).perform(group)
     except InterruptedRunError:

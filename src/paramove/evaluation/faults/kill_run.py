@@ -36,6 +36,7 @@ class KillResult:
     Attributes:
         problems: What was not as it must be.
         late: What came later than it must.
+        not_sent: Why the signal was not sent; nothing was measured then.
         step: The whole run's largest step, see `firmware_log.LargestStep`.
         pace: Simulated seconds per second of the whole run.
     """
@@ -52,11 +53,12 @@ class KillResult:
     pace: float | None = None
     problems: list[str] = field(default_factory=list)
     late: list[str] = field(default_factory=list)
+    not_sent: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether all was as it must be, and in time."""
-        return not self.problems and not self.late
+        return not (self.problems or self.late or self.not_sent)
 
     def as_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -113,11 +115,12 @@ class KillRun:
         left = left_over(self._domain, runtime)
         for result in results:
             result.run_folder = str(folder)
-            self._judge_whole(result, folder, left, real_s)
+            if not result.not_sent:
+                self._judge_whole(result, folder, left, real_s)
         return results
 
     def _next(self, run: LiveRun, waiting: list[KillResult]) -> KillResult | None:
-        """Waits for the moment of one of the cases; None, with problems noted, if none comes."""
+        """Waits for the moment of one of the cases; None, and told in all of them, if none comes."""
         found: list[KillResult] = []
 
         def come() -> bool:
@@ -128,18 +131,18 @@ class KillRun:
             return found[0]
         why = "the moment never came" if run.alive else f"the run had ended before: {run.last_sentence}"
         for result in waiting:
-            result.problems.append(why)
+            result.not_sent = why
         return None
 
     def _strike(self, run: LiveRun, result: KillResult) -> None:
         case = result.case
-        pid = run.pid_of(case.node)
-        if pid is None:
-            result.problems.append("its process was never started")
-            return
         goals_before = len(run.goals_done)
         struck_ns = time.monotonic_ns()
-        os.kill(pid, SIGNALS[case.signal])
+        try:
+            os.kill(run.pid_of(case.node) or 0, SIGNALS[case.signal])
+        except ProcessLookupError:
+            result.not_sent = f"its process had ended before: {run.last_sentence}"
+            return
         if case.node == LAUNCHER:
             self._follow_launcher(run, result, struck_ns)
             return

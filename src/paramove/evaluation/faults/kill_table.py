@@ -47,10 +47,10 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
 
 
 def problems_of(results: Sequence[dict[str, Any]]) -> list[str]:
-    """One line per problem and per lateness."""
+    """One line per problem, per lateness and per case that was never made."""
     return [
         f"{result['case']['node']} {result['case']['signal']} {result['case']['moment']}: {problem} "
         f"({result['run_folder']})"
         for result in results
-        for problem in (*result["problems"], *result["late"])
+        for problem in (*result["problems"], *result["late"], *([result["not_sent"]] if result["not_sent"] else []))
     ]
