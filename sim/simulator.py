@@ -85,7 +85,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
     bus.ready("waits for the members of the lockstep" if bus.settings.lockstep else "runs in real time")
     if not barrier.wait_for_members():
         return
-    started_s = time.perf_counter()
+    started_s = due_s = time.perf_counter()
     while not bus.stopped and simulation.world.time_s < config.max_duration_s:
         _say(bus, simulation)
         for heard in barrier.advance(simulation.now_ns):
@@ -95,8 +95,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
         simulation.run_to_tick(barrier.tick)
         wall_s = time.perf_counter() - started_s
         if not bus.settings.lockstep:
-            # Also one that lags behind looks at its sockets: subscriptions are answered and the status is said there.
-            bus.exchange.wait(max(0.0, simulation.world.time_s / config.pace - wall_s))
+            due_s = _keep_pace(bus, due_s + 1 / (CAMERA_HZ * config.pace))
         if barrier.tick % (REPORT_S * CAMERA_HZ) == 0:
             bus.ready(_sentence(simulation, wall_s))
     wall_s = time.perf_counter() - started_s
@@ -105,6 +104,16 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
     pairs = simulation.world.contacts.unwanted_pairs
     if pairs:
         _log.warning("unwanted contacts: %s", ", ".join(f"{name} ({count})" for name, count in sorted(pairs.items())))
+
+
+def _keep_pace(bus: Bus, due_s: float) -> float:
+    """Waits until `due_s`; returns when the tick really came.
+
+    A world that is late stays late: in a hurry it would outrun the nodes that the same lack of time has slowed.
+    """
+    bus.exchange.wait(0.0)  # also a late one answers subscriptions and says its status
+    bus.idle(due_s - time.perf_counter())
+    return max(due_s, time.perf_counter())
 
 
 def _say(bus: Bus, simulation: Simulation) -> None:

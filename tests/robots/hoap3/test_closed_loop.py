@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pytest
 
-from paramove.msgs.hoap3_wire_pb2 import Hoap3State
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.robots.hoap3.driver import DriverSays
 from paramove.robots.hoap3.firmware import Firmware
 from tests.robots.hoap3.fake_robot import FakeRobot, Rig
 from tests.robots.hoap3.movements import HOAP3
@@ -68,3 +70,32 @@ def test_without_a_driver_the_arm_comes_to_rest_by_itself() -> None:
     assert np.abs(robot.data.qvel[geared]).max() < np.deg2rad(0.5)
     off = robot.data.qpos[QPOS] - HOAP3.units.to_radians(robot.reader.target)
     assert np.abs(off[HOAP3.velocity_loop]).max() < np.deg2rad(0.3)
+
+
+class SlowRig(Rig):
+    """Its driver's batches reach the robot after it has played on, and so many ticks late besides."""
+
+    def __init__(self, ticks_late: int) -> None:
+        super().__init__()
+        self.ticks_late = ticks_late
+        self._on_the_way: list[StreamBatch | None] = []
+
+    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverSays | None:
+        says = super().tick(lose=True, driver_runs=driver_runs)
+        self._on_the_way.append(says.stream if says is not None and driver_runs and not lose else None)
+        if len(self._on_the_way) > self.ticks_late:
+            batch = self._on_the_way.pop(0)
+            if batch is not None:
+                self.robot.reader.offer(batch)
+        return says
+
+
+@pytest.mark.parametrize(("late", "arrives"), [(0, True), (1, True), (5, False)])
+def test_batches_that_come_late_make_the_guard_longer(late: int, arrives: bool) -> None:
+    rig = SlowRig(late)
+    rig.tick()
+    rig.arm()
+    rig.send("reach", GOAL, duration_s=1.2)
+    rig.run_until_rest()
+    assert (rig.statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED) == arrives, rig.statuses[-1].reason
+    assert rig.robot.reader.refused_batches <= 1 or late > 0

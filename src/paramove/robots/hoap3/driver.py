@@ -41,6 +41,9 @@ MAX_TRAJECTORY_AGE_S = 1.0
 MAX_STALL_S = 0.5
 # The stop ramp's path ahead of the last row sent; a ramp from the operating limits runs over 0.1 s of it.
 AHEAD_ROWS = 400
+# Batches that came too late make the guard longer, for this trajectory, and so a stop as much later.
+GUARD_STEP_MS = 70
+LONGEST_GUARD_MS = 240
 TICKS_PER_PROGRESS = 5
 
 
@@ -79,6 +82,7 @@ class ArmDriver:
         self._last_status: dict[str, TrajectoryStatus] = {}
         self._ticks = 0
         self._refused = 0
+        self._guard_ms = description.stream.guard_ms
 
     def _begin_at(self, start_ns: int) -> None:
         d = self._description
@@ -96,6 +100,11 @@ class ArmDriver:
         """Hear what the robot says of its stream and joints; a report that cannot be read counts as none."""
         report = RobotReport.of(message, captured_ns, self._description, self._report)
         if report is not None:
+            before, execution = self._report, self._execution
+            # A first batch is sent until it is known to be played; what is refused of that was not late.
+            begun = before is not None and execution is not None and before.next_index > execution.start_index
+            if before is not None and begun and report.refused_batches > before.refused_batches:
+                self._guard_ms = min(self._guard_ms + GUARD_STEP_MS, LONGEST_GUARD_MS)
             self._report = report
             self._reported = True
 
@@ -183,6 +192,7 @@ class ArmDriver:
             self._start_tolerance,
         )
         start_index = report.next_index if report.epoch == self._writer.epoch else 0
+        self._guard_ms = self._description.stream.guard_ms
         self._execution = Execution(message.id, path.rows, path.dt_s, start_index, self._now_ns)
         self._say(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
 
@@ -192,7 +202,7 @@ class ArmDriver:
             return None
         stream = self._description.stream
         known = report.next_index if report.epoch == self._writer.epoch else 0
-        guard, cover = (ms * 1000 // stream.period_us for ms in (stream.guard_ms, stream.cover_ms))
+        guard, cover = (ms * 1000 // stream.period_us for ms in (self._guard_ms, stream.cover_ms))
         rows, ahead, first_index = execution.window(known, guard, cover, AHEAD_ROWS)
         if not len(rows):
             return None

@@ -25,6 +25,7 @@ class RobotReport:
     epoch: int
     next_index: int
     playing: Hoap3State.Playing
+    refused_batches: int
     refusal: str
     positions: FloatArray
     commanded: FloatArray
@@ -51,6 +52,7 @@ class RobotReport:
             message.epoch,
             message.next_index,
             message.playing,
+            message.refused_batches,
             message.refusal,
             positions,
             commanded,
