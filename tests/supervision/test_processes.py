@@ -3,6 +3,7 @@
 import os
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -113,3 +114,13 @@ def test_last_lines_of_a_long_file_with_odd_bytes(tmp_path):
 )
 def test_control_characters_are_written_out(text, shown):
     assert printable(text) == shown
+
+
+def test_priority_is_that_of_the_process_and_of_its_session(guard, tmp_path):
+    process = started(guard, tmp_path, "import signal; signal.pause()")
+    process.prioritise(5)  # lower, which everybody may
+    assert os.getpriority(os.PRIO_PROCESS, process.pid) == 5
+    group = Path(f"/proc/{process.pid}/autogroup")
+    assert not group.exists() or group.read_text().split()[-1] == "5"
+    process.kill()
+    exit_code(process)

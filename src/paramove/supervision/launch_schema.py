@@ -62,6 +62,9 @@ class NodeSettings(_Checked):
     memory_limit_mb: Annotated[float, Field(gt=0.0)] | None = Field(
         default=None, description="a node that uses more is killed, and restarted as `restart` says"
     )
+    priority: Literal["low", "normal", "high"] = Field(
+        default="normal", description="share of the processor where it is scarce; high only where the system allows it"
+    )
     ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
     lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
     optional_topics: list[str] = Field(

@@ -96,6 +96,18 @@ class SupervisedProcess:
         self._guard = guard
         guard.watch(self.pid)
 
+    def prioritise(self, nice: int) -> None:
+        """Gives the process a nice value; what the system does not allow is left as it is.
+
+        Linux shares the processor between sessions first (autogroup), and each node has its own: both are set.
+        """
+        if nice == 0:
+            return
+        with contextlib.suppress(PermissionError, ProcessLookupError):
+            os.setpriority(os.PRIO_PROCESS, self.pid, nice)
+        with contextlib.suppress(OSError):
+            Path(f"/proc/{self.pid}/autogroup").write_text(str(nice), encoding="ascii")
+
     def ended(self) -> int | None:
         """Exit code (negative: number of the signal) once the process has ended, else None.
 

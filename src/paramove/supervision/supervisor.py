@@ -29,6 +29,9 @@ TURN_S = 0.05
 STOP_ALL_S = 10.0
 """For all waves together."""
 
+NICE = {"low": 5, "normal": 0, "high": -10}
+"""Nice value by the launch file's priority."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -246,13 +249,15 @@ class Supervisor:
 
     def _spawn_node(self, name: str) -> SupervisedProcess:
         command = [sys.executable, "-m", self._file.nodes[name].module, "--config", str(self._folder.config(name))]
-        return SupervisedProcess(
+        process = SupervisedProcess(
             command,
             folder=self._workspace,
             environment=self._environment,
             guard=self._guard,
             log=self._folder.log(name),
         )
+        process.prioritise(NICE[self._file.nodes[name].priority])
+        return process
 
     def _hear(self, status: NodeStatus) -> None:
         if status.node in self.nodes:
