@@ -79,6 +79,19 @@ def test_before_the_calibration_an_object_is_where_the_robot_put_it() -> None:
     ]
 
 
+def test_an_object_that_the_robot_put_away_unseen_is_where_it_put_it() -> None:
+    """The hand hides how it goes in: it vanished on the way, and nobody has seen it since."""
+    done = RelocationStatus(goal_id="goal-9", state=RelocationStatus.STATE_SUCCEEDED)
+    stood = Gesture(kind=Gesture.KIND_RESTED, object="green", located=True, x=0.171, y=-0.078)
+    gone = Gesture(kind=Gesture.KIND_VANISHED, object="green")
+    said = [(topics.GESTURES, stood), (topics.RELOCATION_GOAL, scene.goal()), (topics.GESTURES, gone)]
+    said.append((topics.RELOCATION_STATUS, done))
+    green = sections(*said)["objects"]["green"]
+    assert (green["state"], green["place"]) == ("in an opening", [0.131, 0.018])
+    green = sections(*said, (topics.GESTURES, stood))["objects"]["green"]
+    assert (green["state"], green["place"]) == ("stands", [0.171, -0.078])
+
+
 def test_a_goal_ends_once_however_often_it_is_said() -> None:
     done = RelocationStatus(goal_id="goal-9", state=RelocationStatus.STATE_FAILED, reason="nothing was felt")
     other = RelocationStatus(goal_id="goal-8", state=RelocationStatus.STATE_SUCCEEDED)

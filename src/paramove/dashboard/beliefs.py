@@ -105,6 +105,8 @@ class Beliefs:
             known = self._objects.setdefault(gesture.object, _Object())
             known.state = _GESTURES[gesture.kind]
             known.seen = (gesture.x, gesture.y) if gesture.located else None
+            if gesture.located and known.state != "gone":
+                known.put = None  # it is seen elsewhere than where the robot put it
 
     def on_goal(self, goal: RelocationGoal, now_s: float) -> None:
         """What the arm shall do; the same goal is said again until somebody acknowledges it."""
@@ -159,6 +161,8 @@ class Beliefs:
         place, state = self._seen_now(name) or known.seen or known.put, known.state
         if name == self.held:
             place, state = None, IN_HAND
+        elif state == "gone" and known.put is not None:  # the hand hid how it went in
+            place, state = known.put, "in an opening"
         elif state == "gone":
             inside = known.seen is not None and self._on_surface(known.seen)
             place, state = (known.seen, "in an opening") if inside else (None, "not in view")

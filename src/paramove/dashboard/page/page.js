@@ -28,7 +28,8 @@ function cell(row, value, name = "") {
   return made;
 }
 
-const cm = (place) => place.slice(0, 2).map((value) => (100 * value).toFixed(1).replace("-", "−")).join(", ") + " cm";
+const pair = (place) => place.slice(0, 2).map((value) => (100 * value).toFixed(1).replace("-", "−")).join(", ");
+const cm = (place) => `${pair(place)} cm`;
 
 const SHOW = {
   world(content) { text($("title"), content.title); document.title = `${content.title} – paramove`; },
@@ -51,7 +52,7 @@ const SHOW = {
   goal(content) {
     const { kind, object, to, from } = content;
     text($("goal"), kind ? [kind, object].filter(Boolean).join(" ") : "nothing yet");
-    const way = from && to ? `${cm(from)} → ${cm(to)}` : to ? `→ ${cm(to)}` : "";
+    const way = from && to ? `${pair(from)} → ${cm(to)}` : to ? `→ ${cm(to)}` : "";
     const progress = content.ended ? content.state : [content.phase || content.state, content.attempt > 1 ? `attempt ${content.attempt}` : ""].filter(Boolean).join(", ");
     text($("phase"), [progress, way].filter(Boolean).join("  ·  "));
   },
@@ -62,6 +63,7 @@ const SHOW = {
       item.textContent = [result.kind, result.object].filter(Boolean).join(" ");
       more.textContent = ` ${[`${result.took_s} s`, result.attempt > 1 ? `attempt ${result.attempt}` : "", result.reason].filter(Boolean).join(" · ")}`;
       item.append(more);
+      item.title = item.textContent;
       return item;
     }));
   },
@@ -149,6 +151,7 @@ function judge() {
   else if (!connected) words = "Not connected. Open the link that paramove launch --view printed; it works once.";
   else if (stopped) words = `The arm is stopped and holds its pose: ${stopped}.`;
   else if (quietS > QUIET_S) words = `No news from the run for ${Math.round(quietS)} s.`;
+  $("stop").disabled = Boolean(ended);
   text(alert, words);
   alert.className = calm ? "calm" : "";
   alert.hidden = !words;
