@@ -1,0 +1,55 @@
+"""`--view` adds the page to any choice of overlays and tells its link once."""
+
+from pathlib import Path
+
+import pytest
+
+from paramove.cli import live_view
+from paramove.dashboard.link_file import LinkFile
+from paramove.supervision import application
+from paramove.supervision.launch_file import load
+
+ROOT = Path(__file__).parents[2]
+
+
+class Shown:
+    def __init__(self):
+        self.stories, self.refreshed = [], 0
+
+    def story(self, text):
+        self.stories.append(text)
+
+    def refresh(self, nodes):
+        self.refreshed += 1
+
+
+@pytest.mark.parametrize(
+    ("overlays", "expected"), [(None, ["sim", "view"]), (["sim", "real_time"], ["sim", "real_time", "view"])]
+)
+def test_the_page_is_laid_over_what_was_chosen_and_fits(overlays, expected):
+    found, title = live_view.with_page(ROOT / "launch", "rule_learning", overlays)
+    assert found == expected
+    launch = load(ROOT / "launch", "rule_learning", found, [title])
+    application.check(launch, ROOT)
+    page = launch.file.nodes["dashboard"]
+    assert page.parameters["title"] == launch.file.description
+    assert not page.lockstep, "time never waits for a page"
+    assert not page.truth
+
+
+def test_the_link_is_told_once_and_no_browser_opens_without_a_display(tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(live_view.webbrowser, "open", opened.append)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    shown = Shown()
+    view = live_view.AnnouncingView(shown, tmp_path)
+    view.refresh([])
+    assert shown.stories == []
+    file = LinkFile.kept_or_new(tmp_path, 4711)
+    file.write()
+    view.refresh([])
+    view.refresh([])
+    assert shown.stories == [f"live page: {file.link}"]
+    assert shown.refreshed == 3
+    assert opened == []
