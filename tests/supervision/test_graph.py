@@ -127,7 +127,7 @@ def test_command_writes_each_format(tmp_path, monkeypatch):
     ("arguments", "code", "message"),
     [
         (["rule_lerning"], 66, "did you mean 'rule_learning'?"),
-        (["rule_learning", "--with", "real_time"], 78, "no node of this launch file says"),
+        (["rule_learning", "--with", "real_time"], 78, "nodes.simulator.module is missing"),
         (["--live"], 1, "nothing is running in this domain"),
     ],
 )
