@@ -35,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
         topics.OPERATOR_ARM: driver.on_arm_request,
         topics.WIRE_HOAP3_STATE: driver.on_robot_state,
     }
-    bus.ready("disarmed, waiting for the robot")
+    bus.ready(driver.sentence)
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
             if event.topic is not topics.OPERATOR_STOP:
@@ -50,7 +50,7 @@ def run(bus: Bus, config: Config) -> None:
         for status in says.statuses:
             bus.publish(topics.ARM_TRAJECTORY_STATUS, status)
         bus.publish(topics.ARM_SAFETY, says.safety)
-        bus.ready(f"the safety gate says: {driver.state.value}")
+        bus.ready(driver.sentence)
 
 
 if __name__ == "__main__":

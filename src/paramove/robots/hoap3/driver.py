@@ -96,6 +96,13 @@ class ArmDriver:
         """Of the safety gate."""
         return self._core.state
 
+    @property
+    def sentence(self) -> str:
+        """How the gate stands, for people."""
+        if self._core.state is State.DISCONNECTED:
+            return "disarmed, waiting for the robot"
+        return f"the safety gate says: {self._core.state.value}"
+
     def on_robot_state(self, message: Hoap3State, captured_ns: int) -> None:
         """Hear what the robot says of its stream and joints; a report that cannot be read counts as none."""
         report = RobotReport.of(message, captured_ns, self._description, self._report)
