@@ -46,10 +46,10 @@ class RememberedPlans(ClearPlans):
 
     _known: ClassVar[dict[tuple[bytes | str, ...], PlannedMotion]] = {}
 
-    def _first(self, ways: Sequence[Callable[[], PlannedMotion]], standing: np.ndarray) -> PlannedMotion:
+    def _first(self, ways: Sequence[Callable[[], PlannedMotion]], standing: np.ndarray, choices=None) -> PlannedMotion:
         key = (*(f"{way.func.__name__} {way.args} {way.keywords}" for way in ways), np.asarray(standing).tobytes())
         if key not in self._known:
-            self._known[key] = super()._first(ways, standing)
+            self._known[key] = super()._first(ways, standing, choices)
         return self._known[key]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -42,6 +42,10 @@ class _Way(Protocol):
     def __call__(self) -> PlannedMotion: ...
 
 
+_Choices = Mapping[str, object]
+"""Phase -> what a way does in it. Ways that do the same in a phase are alike there; all are in a phase not named."""
+
+
 class ClearPlans:
     """Tries the ways of a motion in order of preference.
 
@@ -61,8 +65,10 @@ class ClearPlans:
             standing: Other objects, [M, 2].
         """
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
-        ways = [partial(self.planner.fetch, source, height, above) for above in (False, True) for height in heights]
-        return self._first(ways, standing)
+        kinds = [(height, above) for above in (False, True) for height in heights]
+        ways = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
+        choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
+        return self._first(ways, standing, choices)
 
     def deliver(self, start: FloatArray, target: FloatArray, standing: FloatArray) -> PlannedMotion:
         """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
@@ -71,13 +77,19 @@ class ClearPlans:
         """
         back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
         detours: list[list[FloatArray]] = [[], [back], [back + _HIGHER_CARRY]]
+        leavings = [(upward, opened) for opened in (None, _HALF_OPEN) for upward in (False, True)]
+        kinds = [(number, leaving) for leaving in leavings for number in range(len(detours))]
         ways = [
-            partial(self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detour], upward, opened)
-            for opened in (None, _HALF_OPEN)
-            for upward in (False, True)
-            for detour in detours
+            partial(
+                self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detours[number]], *leaving
+            )
+            for number, leaving in kinds
         ]
-        return self._first(ways, standing)
+        choices = [
+            {"carry": number, "release": leaving[1], "withdraw": leaving, "retreat": leaving}
+            for number, leaving in kinds
+        ]
+        return self._first(ways, standing, choices)
 
     def leave(self, here: FloatArray, opening: float, standing: FloatArray) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
@@ -130,7 +142,10 @@ class ClearPlans:
         """Open or close the hand where it is."""
         return self._first([partial(self.planner.fingers, here, start, end)], standing)
 
-    def _first(self, ways: Sequence[_Way], standing: FloatArray) -> PlannedMotion:
+    def _first(
+        self, ways: Sequence[_Way], standing: FloatArray, choices: Sequence[_Choices] | None = None
+    ) -> PlannedMotion:
+        """The first way that is reachable and clear. With `choices`, ways that would fail as one before are skipped."""
         if len(standing) > self._checker.n_standing:
             raise NoClearPlanError(
                 f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
@@ -140,7 +155,10 @@ class ClearPlans:
         reasons = []
         in_the_way = set()
         next_best: tuple[float, PlannedMotion | None] = (0.0, None)
-        for way in ways:
+        hopeless: list[tuple[str, object]] = []
+        for number, way in enumerate(ways):
+            if choices and any(choices[number].get(phase) == choice for phase, choice in hopeless):
+                continue
             try:
                 motion = way()
             except UnreachablePoseError as error:
@@ -154,6 +172,8 @@ class ClearPlans:
                 if closest.distance >= max(_LEAST_TO_STANDING, next_best[0]):
                     next_best = closest.distance, motion
             phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
+            if choices:
+                hopeless.append((phase, choices[number].get(phase)))
             reasons.append(
                 f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
                 f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
