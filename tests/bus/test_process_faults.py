@@ -60,7 +60,11 @@ def test_a_child_made_by_fork_is_told_at_its_first_use_and_the_parent_goes_on(fo
 WALL_CLOCK = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "datetime.now", "datetime.utcnow"}
 
 
-@pytest.mark.parametrize("path", sorted(Path(paramove.bus.__file__).parent.glob("*.py")), ids=lambda path: path.stem)
+# A line of a log bears the wall clock's time too, for people.
+SOURCES = [path for path in sorted(Path(paramove.bus.__file__).parent.glob("*.py")) if path.stem != "log_format"]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
 def test_no_wall_clock_is_read(path: Path) -> None:
     calls = {
         ast.unparse(node.func) for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)
