@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -173,6 +174,7 @@ def _batch(
             progress.console.print(f"seed {result['seed']}: {verdict}, {result.get('objects_placed', 0)} placed")
             progress.advance(task)
 
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the runs under way end in order
         try:
             run_batch(missing, options, begun, ended)
         except KeyboardInterrupt:
