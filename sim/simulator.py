@@ -38,6 +38,8 @@ SAYS = (
 )
 
 REPORT_S = 5
+CONNECTION_S = 0.5
+"""Without lockstep: for those who wait for this process's topics, to connect; they try again every 0.2 s."""
 FIRMWARE_LOG = "firmware_frames.int16"
 
 _log = logging.getLogger(__name__)
@@ -85,6 +87,8 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
     bus.ready("waits for the members of the lockstep" if bus.settings.lockstep else "runs in real time")
     if not barrier.wait_for_members():
         return
+    if not bus.settings.lockstep:
+        bus.idle(CONNECTION_S)
     started_s = due_s = time.perf_counter()
     while not bus.stopped and simulation.world.time_s < config.max_duration_s:
         _say(bus, simulation)
