@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import signal
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,7 +14,8 @@ from rich.table import Table
 from paramove.cli import completions
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
-from paramove.supervision import application, exit_codes
+from paramove.cli.evaluation_io import seeds_in, workspace_here, write_numbers
+from paramove.supervision import exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
 app.command("kills")(kills)
@@ -72,7 +71,7 @@ def rule_learning(
             console.print(
                 f"seed {result['seed']}: {result.get('reason') or 'failed'} ({result['run_folder']})", markup=False
             )
-    _write(json_file, {"results": results, "totals": totals_of(results)}, console)
+    write_numbers(json_file, {"results": results, "totals": totals_of(results)}, console)
     raise typer.Exit(exit_codes.OK if enough(results) else JUDGED_A_FAILURE)
 
 
@@ -110,7 +109,7 @@ def homography(
             Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
             raise typer.Exit(exit_codes.INPUT_MISSING) from error
     console.print(_homography_table(rows))
-    _write(json_file, rows, console)
+    write_numbers(json_file, rows, console)
     good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
     raise typer.Exit(exit_codes.OK if good else JUDGED_A_FAILURE)
 
@@ -139,17 +138,9 @@ def _batch(
     video: bool,
     drop_recordings: bool,
 ) -> list[dict[str, Any]]:
-    from paramove.evaluation.batch import BatchOptions, SeedsError, finished, run_batch, seeds_of
+    from paramove.evaluation.batch import BatchOptions, finished, run_batch
 
-    try:
-        wanted = seeds_of(seeds)
-    except SeedsError as error:
-        raise typer.BadParameter(str(error), param_hint="--seeds") from error
-    try:
-        workspace = application.find_workspace(Path.cwd())
-    except FileNotFoundError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    wanted, workspace = seeds_in(seeds), workspace_here()
     folder = (runs or workspace / RUNS).resolve()
     options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays))
     results = {} if again else finished(folder, wanted, settings, overlays)
@@ -181,18 +172,6 @@ def _batch(
             console.print(f"interrupted; {len(results)} of {len(wanted)} results are kept in {folder}", soft_wrap=True)
             raise typer.Exit(130) from None
     return [results[seed] for seed in wanted]
-
-
-def _write(file: Path | None, numbers: Any, console: Console) -> None:
-    if file is None:
-        return
-    text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
-    if str(file) == "-":
-        sys.stdout.write(text)
-        return
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text, encoding="utf-8")
-    console.print(f"numbers: {file}", markup=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-from paramove.supervision import application, exit_codes
+from paramove.cli.evaluation_io import workspace_here, write_numbers
+from paramove.supervision import exit_codes
 
 JUDGED_A_FAILURE = 3
 RUNS = Path("runs/kills")
@@ -52,7 +52,7 @@ def kills(
     from paramove.supervision.launch_file import load
 
     console = Console(highlight=False, emoji=False)
-    workspace = _workspace()
+    workspace = workspace_here()
     file = load(workspace / "launch", APPLICATION, ["sim", "real_time"]).file
     try:
         cases = cases_of(file, _names(nodes), _names(signals), _names(moments))
@@ -68,7 +68,7 @@ def kills(
     console.print(LEGEND, style="dim")
     for line in problems_of(ordered):
         console.print(Text(line, style="red"), soft_wrap=True)
-    _write(json_file, {"cases": ordered}, console)
+    write_numbers(json_file, {"cases": ordered}, console)
     raise typer.Exit(exit_codes.OK if all(result["passed"] for result in ordered) else JUDGED_A_FAILURE)
 
 
@@ -84,7 +84,7 @@ def faults(
     from paramove.evaluation.faults.fault_tests import TestsNotRunError, run_tests
 
     console = Console(highlight=False, emoji=False)
-    workspace = _workspace()
+    workspace = workspace_here()
     try:
         rows = read_page(workspace / PAGE)
     except (FileNotFoundError, FaultPageError) as error:
@@ -111,7 +111,7 @@ def faults(
     for result in results:
         if result.outcome in ("failed", "missing"):
             console.print(Text(f"{result.row.id}: {result.message} ({', '.join(result.row.tests)})", style="red"))
-    _write(json_file, [result.as_json() for result in results], console)
+    write_numbers(json_file, [result.as_json() for result in results], console)
     bad = any(result.outcome in ("failed", "missing") for result in results)
     raise typer.Exit(JUDGED_A_FAILURE if bad else exit_codes.OK)
 
@@ -167,23 +167,3 @@ _STYLES = {"passed": "green", "failed": "red", "skipped": "yellow", "missing": "
 
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def _workspace() -> Path:
-    try:
-        return application.find_workspace(Path.cwd())
-    except FileNotFoundError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from error
-
-
-def _write(file: Path | None, content: Any, console: Console) -> None:
-    if file is None:
-        return
-    text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
-    if str(file) == "-":
-        sys.stdout.write(text)
-        return
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text, encoding="utf-8")
-    console.print(f"results: {file}", markup=False, soft_wrap=True)

@@ -10,7 +10,8 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.supervision import application, exit_codes
+from paramove.cli.evaluation_io import seeds_in, workspace_here
+from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
     from paramove.evaluation.imitation.thesis import Compared
@@ -32,21 +33,12 @@ def imitation(
     Writes report.html, imitation.json and the plots. Exit codes: 0 every goal is met; 3 some are not, and the report
     says in which states and why; 66 no workspace.
     """
-    from paramove.evaluation.batch import SeedsError, seeds_of
     from paramove.evaluation.imitation.experiment import Setup, run_experiment
     from paramove.evaluation.imitation.report import write_results
     from paramove.evaluation.imitation.thesis import compared
 
     console = Console(highlight=False, emoji=False)
-    try:
-        wanted = seeds_of(seeds)
-    except SeedsError as error:
-        raise typer.BadParameter(str(error), param_hint="--seeds") from error
-    try:
-        workspace = application.find_workspace(Path.cwd())
-    except FileNotFoundError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    wanted, workspace = seeds_in(seeds), workspace_here()
     cache = user_cache_path("paramove")
     cache.mkdir(parents=True, exist_ok=True)
     setup = Setup(workspace / "robot_description" / "hoap3", tuple(wanted), repetitions, raster, cache)

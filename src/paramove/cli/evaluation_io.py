@@ -1,0 +1,45 @@
+"""What the commands of `paramove evaluate` take in and give out alike: the workspace, seeds, numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+
+from paramove.supervision import application, exit_codes
+
+
+def workspace_here() -> Path:
+    """The workspace of the working directory; without one the command ends with exit code 66."""
+    try:
+        return application.find_workspace(Path.cwd())
+    except FileNotFoundError as error:
+        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+
+
+def seeds_in(text: str) -> list[int]:
+    """Seeds of `--seeds`; a text that names none is a wrong use of the command."""
+    from paramove.evaluation.batch import SeedsError, seeds_of
+
+    try:
+        return seeds_of(text)
+    except SeedsError as error:
+        raise typer.BadParameter(str(error), param_hint="--seeds") from error
+
+
+def write_numbers(file: Path | None, numbers: Any, console: Console) -> None:
+    """Writes what `--json` asks for: to the file and says so, or to standard output for `-`."""
+    if file is None:
+        return
+    text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    if str(file) == "-":
+        sys.stdout.write(text)
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    console.print(f"numbers: {file}", markup=False, soft_wrap=True)
