@@ -229,7 +229,9 @@ class KillRun:
             state = SafetyState.State.Name(run.safety).removeprefix("STATE_").lower()
             result.problems.append(f"the arm is {state}, not armed")
         if result.case.node == "synthesizer":
-            back = self._until(run, lambda: len(run.goals_done) > goals_before + 1 or not run.alive, SETTLE_S)
+            # One that was under way ends, too; at rest there is none, and after the last corner none follows for long.
+            enough = goals_before + (1 if result.case.moment == "rest" else 2)
+            back = self._until(run, lambda: len(run.goals_done) >= enough or not run.alive, SETTLE_S)
             if not back or not run.alive:
                 result.problems.append("no goals were done any more")
 
