@@ -8,7 +8,7 @@ BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
 
-.PHONY: help demo test check format setup messages lock benchmark-seeds bare clean
+.PHONY: help demo test check ci format setup messages lock benchmark-seeds bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -24,6 +24,9 @@ check: setup ## formatting, lint, types, generated messages
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python msgs/generate.py --check
+
+ci: ## check and test as on a machine that lacks everything; as root it installs Debian packages
+	@.ci/run
 
 format: setup ## puts the code into its standard form
 	$(BIN)/ruff format .
