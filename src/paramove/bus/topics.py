@@ -84,7 +84,7 @@ class Topic:
     @property
     def high_water_mark(self) -> int:
         """How many messages may wait at the listener before the newest is dropped (and counted as lost)."""
-        return 16 if self.is_image else 1000
+        return 60 if self.is_image else 1000
 
     @property
     def speaker_high_water_mark(self) -> int:
