@@ -115,7 +115,6 @@ def _keep_pace(bus: Bus, due_s: float) -> float:
 
     A world that is late stays late: in a hurry it would outrun the nodes that the same lack of time has slowed.
     """
-    bus.exchange.wait(0.0)  # also a late one answers subscriptions and says its status
     bus.idle(due_s - time.perf_counter())
     return max(due_s, time.perf_counter())
 

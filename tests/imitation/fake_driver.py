@@ -17,10 +17,17 @@ from paramove.imitation.motion import PlannedMotion
 from paramove.imitation.synthesizer import Synthesizer
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
-from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, checker, planner
+from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, OPENINGS, checker, planner
 
 PERIOD_NS = 66_666_667
 HELD_OPENING = 0.43  # at which the fingers stop on an object
+SUCCEEDED, FAILED, REFUSED = (
+    RelocationStatus.STATE_SUCCEEDED,
+    RelocationStatus.STATE_FAILED,
+    RelocationStatus.STATE_REFUSED,
+)
+PLACE = (0.177, -0.02)
+OFFER = (0.155, -0.02, -0.05)
 
 
 def goal(
@@ -39,6 +46,10 @@ def goal(
 def position(place) -> Position:
     x, y, *z = place
     return Position(x=x, y=y, z=z[0] if z else GRASP_Z)
+
+
+def relocate(name: str = "g", **more) -> RelocationGoal:
+    return goal(RelocationGoal.KIND_RELOCATE, name, **{"source": PLACE, "target": OPENINGS[1], **more})
 
 
 class RememberedPlans(ClearPlans):

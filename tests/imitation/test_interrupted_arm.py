@@ -14,20 +14,18 @@ from paramove.imitation.joint_path import joined, joint_motion
 from paramove.imitation.synthesizer import RESTARTED
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
-from tests.imitation.fake_driver import PERIOD_NS, Cell, FakeDriver, goal
-from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, OPENINGS, planner
-
-SUCCEEDED, FAILED, REFUSED = (
-    RelocationStatus.STATE_SUCCEEDED,
-    RelocationStatus.STATE_FAILED,
-    RelocationStatus.STATE_REFUSED,
+from tests.imitation.fake_driver import (
+    FAILED,
+    OFFER,
+    PERIOD_NS,
+    REFUSED,
+    SUCCEEDED,
+    Cell,
+    FakeDriver,
+    goal,
+    relocate,
 )
-PLACE = (0.177, -0.02)
-OFFER = (0.155, -0.02, -0.05)
-
-
-def relocate(name: str = "g", **more) -> RelocationGoal:
-    return goal(RelocationGoal.KIND_RELOCATE, name, **{"source": PLACE, "target": OPENINGS[1], **more})
+from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, planner
 
 
 def rest(name: str = "home") -> RelocationGoal:

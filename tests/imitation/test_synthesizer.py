@@ -11,21 +11,20 @@ import pytest
 from paramove.imitation.synthesizer import REMEMBERED_GOALS, RESEND_NS
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
-from tests.imitation.fake_driver import PERIOD_NS, Cell, FakeDriver, goal
-from tests.imitation.reaching import OPENINGS
+from tests.imitation.fake_driver import (
+    FAILED,
+    OFFER,
+    PERIOD_NS,
+    PLACE,
+    REFUSED,
+    SUCCEEDED,
+    Cell,
+    FakeDriver,
+    goal,
+    relocate,
+)
 
 ACCEPTED, EXECUTING = RelocationStatus.STATE_ACCEPTED, RelocationStatus.STATE_EXECUTING
-SUCCEEDED, FAILED, REFUSED = (
-    RelocationStatus.STATE_SUCCEEDED,
-    RelocationStatus.STATE_FAILED,
-    RelocationStatus.STATE_REFUSED,
-)
-PLACE = (0.177, -0.02)
-OFFER = (0.155, -0.02, -0.05)
-
-
-def relocate(name: str = "g", **more) -> RelocationGoal:
-    return goal(RelocationGoal.KIND_RELOCATE, name, **{"source": PLACE, "target": OPENINGS[1], **more})
 
 
 def test_relocates() -> None:

@@ -203,9 +203,11 @@ class Bus:
     def idle(self, seconds: float) -> None:
         """Does nothing for so long but what the bus needs: answers subscriptions, says the status, drains sockets.
 
-        For a process with a pace of its own, such as the simulator in real time. Ends early only if the bus is stopped.
+        For a process with a pace of its own, such as the simulator in real time. Also with no time left the bus gets
+        what it needs, once. Ends early only if the bus is stopped.
         """
         end_s = time.monotonic() + seconds
+        self.exchange.wait(max(0.0, seconds))
         while not self.stopped and (left_s := end_s - time.monotonic()) > 0:
             self.exchange.wait(left_s)
 

@@ -8,13 +8,20 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import Progress
 from rich.table import Table
 
 from paramove.cli import completions
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
-from paramove.cli.evaluation_io import seeds_in, workspace_here, write_numbers
+from paramove.cli.evaluation_io import (
+    JUDGED_A_FAILURE,
+    PROGRESS,
+    JsonFileOption,
+    seeds_in,
+    workspace_here,
+    write_numbers,
+)
 from paramove.supervision import exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
@@ -22,10 +29,8 @@ app.command("kills")(kills)
 app.command("faults")(faults)
 app.command("imitation")(imitation)
 
-JUDGED_A_FAILURE = 3
 RUNS = Path("runs/evaluation")
 
-JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the numbers to FILE too")]
 RunsOption = Annotated[
     Path | None, typer.Option(help="where runs and results are kept (default: runs/evaluation); finished ones are used")
 ]
@@ -149,8 +154,7 @@ def _batch(
             f"results of {len(results)} seeds are taken from {folder} (--again runs them anew)", soft_wrap=True
         )
     missing = [seed for seed in wanted if seed not in results]
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, disable=not missing) as progress:
+    with Progress(*PROGRESS, console=console, disable=not missing) as progress:
         task = progress.add_task("runs", total=len(missing))
         running: list[int] = []
 

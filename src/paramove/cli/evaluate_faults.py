@@ -8,20 +8,17 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from paramove.cli.evaluation_io import workspace_here, write_numbers
+from paramove.cli.evaluation_io import JUDGED_A_FAILURE, PROGRESS, JsonFileOption, workspace_here, write_numbers
 from paramove.supervision import exit_codes
 
-JUDGED_A_FAILURE = 3
 RUNS = Path("runs/kills")
 WIDTH = 130
 
-JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the results to FILE too")]
 ListOption = Annotated[str, typer.Option(metavar="A,B", help="only these; default: all")]
-_COLUMNS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
 
 
 def kills(
@@ -96,7 +93,7 @@ def faults(
     if unknown := [letter for letter in wanted if letter not in known]:
         raise typer.BadParameter(f"no section {', '.join(unknown)} with rows; there are {', '.join(known)}")
     rows = [row for row in rows if not wanted or row.id[0] in wanted]
-    with Progress(*_COLUMNS, console=console) as progress:
+    with Progress(*PROGRESS, console=console) as progress:
         task = progress.add_task("tests", total=None)
         try:
             results = run_tests(
@@ -119,7 +116,7 @@ def faults(
 def _perform(missing: list[Any], options: Any, results: dict[str, dict[str, Any]], console: Console) -> None:
     from paramove.evaluation.faults.kill_batch import run_cases
 
-    with Progress(*_COLUMNS, console=console, disable=not missing) as progress:
+    with Progress(*PROGRESS, console=console, disable=not missing) as progress:
         task = progress.add_task("cases", total=len(missing))
 
         def begun(group: Any) -> None:

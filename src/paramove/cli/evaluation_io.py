@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
 from paramove.supervision import application, exit_codes
+
+JUDGED_A_FAILURE = 3
+"""Exit code of an experiment that ran to its end and fell short of its goals."""
+JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the numbers to FILE too")]
+PROGRESS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
 
 
 def workspace_here() -> Path:

@@ -9,6 +9,7 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint,
 from paramove.msgs.safety_state_pb2 import ArmRequest
 from paramove.robots.hoap3.driver import ArmDriver, DriverSays
 from paramove.robots.hoap3.stream import StreamReader
+from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
 
 TICK_NS = 66_666_667
@@ -72,6 +73,14 @@ class Rig:
             ):
                 return
         raise AssertionError("the trajectory did not end")
+
+
+def armed() -> Rig:
+    rig = Rig()
+    rig.tick()
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+    return rig
 
 
 def trajectory(name: str, goal_deg: dict[str, float], duration_s: float, start_deg: float = 0.0) -> JointTrajectory:

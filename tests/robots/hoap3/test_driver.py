@@ -11,19 +11,11 @@ from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 from paramove.robots.hoap3.driver import ArmDriver
 from paramove.safety.gate_io import State
-from tests.robots.hoap3.fake_robot import Rig, trajectory
+from tests.robots.hoap3.fake_robot import Rig, armed, trajectory
 from tests.robots.hoap3.movements import HOAP3
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0, "right_wrist": 30.0, "right_fingers": 20.0}
 ACCEPTED, EXECUTING, SUCCEEDED, STOPPED, REFUSED = range(1, 6)
-
-
-def armed() -> Rig:
-    rig = Rig()
-    rig.tick()
-    rig.arm()
-    assert rig.driver.state is State.ARMED
-    return rig
 
 
 def expect_within_limits(rig: Rig) -> None:
