@@ -62,6 +62,12 @@ def _say(bus: Bus, name: str, starts: int = 1) -> None:
     bus.publish(topics.GESTURES, Gesture(object=name), captured_ns=42)
 
 
+def test_a_node_that_fails_at_once_is_heard_to_say_why(start: Start, bus: Bus) -> None:
+    process = start("{greeting: farewell}")
+    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == "nothing to greet with"
+    assert process.wait(10) == 66
+
+
 def test_a_node_hears_says_and_ends_on_a_signal(start: Start, bus: Bus) -> None:
     for starts, number in enumerate((signal.SIGTERM, signal.SIGINT), start=1):
         process = start("{greeting: good morning}")

@@ -1,6 +1,6 @@
 """A node that tests start as a process: repeats each gesture as a sentence; `trouble` raises, `given up` gives up.
 
-`missing` and `wrong` are inputs that it cannot use.
+`missing` and `wrong` are inputs that it cannot use. With the greeting `farewell` it fails before anybody hears it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ class Config(NodeConfig):
 
 
 def run(bus: Bus, config: Config) -> None:
+    if config.greeting == "farewell":
+        raise InputError("nothing to greet with", missing=True)
     bus.ready(config.greeting)
     for heard in bus.events(topics.GESTURES):
         if heard.message.object == "trouble":

@@ -211,6 +211,15 @@ class Bus:
         while not self.stopped and (left_s := end_s - time.monotonic()) > 0:
             self.exchange.wait(left_s)
 
+    def wait_for_listener(self, seconds: float) -> None:
+        """Waits until somebody hears the node's status, at most so long.
+
+        For a node that ends as soon as it has begun: else it would take the reason with it.
+        """
+        end_s = time.monotonic() + seconds
+        while not (self._status.has_listener or self.stopped) and (left_s := end_s - time.monotonic()) > 0:
+            self.exchange.wait(left_s)
+
     def read_up_to(self, marks: Marks, keep: bool = False) -> list[Heard]:
         """Waits for everything heard up to the marks; returns it in the order of publish time, then of HEARS.
 

@@ -43,6 +43,8 @@ EXIT_OK = 0
 EXIT_FAILED = 70
 EXIT_TAKEN = 75
 EXIT_CONFIGURATION = 78
+LAST_WORD_S = 1.0
+"""A node that has failed waits so long at most for somebody to hear why."""
 
 
 class NodeConfig(BaseModel):
@@ -118,7 +120,10 @@ def main(
         _log.error("%s", error)
         sys.exit(EXIT_CONFIGURATION)
     with bus:
-        sys.exit(_run(run, bus, config))
+        code = _run(run, bus, config)
+        if code != EXIT_OK:
+            bus.wait_for_listener(LAST_WORD_S)
+        sys.exit(code)
 
 
 def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:

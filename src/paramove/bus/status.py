@@ -39,6 +39,11 @@ class StatusReporter:
         """Newest state said."""
         return self._state
 
+    @property
+    def has_listener(self) -> bool:
+        """Whether anybody has subscribed; from then on the newest state has been told, for the topic is latched."""
+        return self._publisher.subscriptions > 0
+
     def change(self, state: NodeStatus.State, sentence: str, now_ns: int) -> None:
         """Says a state and a sentence at once, if they are new."""
         sentence = sentence[:MAX_SENTENCE]
