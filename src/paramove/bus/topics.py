@@ -15,6 +15,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
@@ -104,6 +105,7 @@ CAMERA_IMAGE = Topic(
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
 GESTURES = Topic("gestures", Gesture, None, _QUEUE, recorded=True)
 CALIBRATION_PLANE = Topic("calibration/plane", PlaneCalibration, None, _LATCHED, "right_shoulder", recorded=True)
+HUMAN_ARM_POSE = Topic("human/arm_pose", ArmPose, None, _QUEUE, recorded=True)
 RULES = Topic("rules", Rules, None, _LATCHED, "right_shoulder", recorded=True)
 APPLICATION_STAGE = Topic("application/stage", ApplicationStage, 1, _LATCHED, recorded=True)
 SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)

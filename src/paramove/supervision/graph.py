@@ -126,6 +126,8 @@ def _graph(
     names = sorted({*said, *heard}, key=lambda name: (order.get(name, len(order)), name))
     edges = tuple(Edge(name, rates.get(name), tuple(said.get(name, ())), tuple(heard.get(name, ()))) for name in names)
     collectors = frozenset(node for node in nodes if sum(node in edge.heard_by for edge in edges) >= MANY)
+    # A collector hears the topics of every application; those that only it would hear here are of another one.
+    edges = tuple(edge for edge in edges if edge.said_by or not collectors.issuperset(edge.heard_by))
     ordered = {node: nodes[node] for node in _flow(list(nodes), edges, collectors)}
     return Graph(title, ordered, edges, collectors, frozenset(all_hear))
 
