@@ -86,24 +86,46 @@ def test_posture_at_the_table_is_natural() -> None:
         assert target[2] < body["elbow"][middle][2] < body["shoulder"][middle][2]
 
 
-def spread_at(target: np.ndarray, seed: int, count: int = 24) -> tuple[float, float, float]:
-    shown = demonstrations_at(target, np.random.default_rng(seed), repetitions=count).sequences
+def fingertip(movement: np.ndarray) -> np.ndarray:
+    return points(movement)["index"]
+
+
+def spread_at(target: np.ndarray, seed: int, count: int, action: Action) -> tuple[float, float, float]:
+    shown = demonstrations_at(target, np.random.default_rng(seed), repetitions=count, action=action).sequences
     movements = [resample(one, 100) for one in shown]
     pairs = [movement_distance(movements[i], movements[j]) for i in range(count) for j in range(i)]
-    misses = [np.linalg.norm(gripper(one)[45] - target) for one in movements]
+    tip = gripper if action == "reaching" else fingertip
+    misses = [np.linalg.norm(tip(one)[45] - target) for one in movements]
     return float(np.mean(pairs)), float(np.std(pairs)), float(np.mean(misses))
 
 
-def test_repetitions_vary_as_in_the_recordings() -> None:
-    mean, deviation, miss = spread_at(COMFORTABLE_TARGET, 5)
+@pytest.mark.parametrize("action", ["reaching", "pointing"])
+def test_repetitions_vary_as_in_the_recordings(action: Action) -> None:
+    mean, deviation, miss = spread_at(COMFORTABLE_TARGET, 5, 24, action)
     assert 0.018 < mean < 0.028  # 2.3 cm (thesis 4.2.4)
     assert 0.002 < deviation < 0.008  # 0.4 cm
     assert 0.006 < miss < 0.010  # 0.8 cm (thesis 4.2.5)
-    corners = [spread_at(target, 6 + number, 16)[:2] for number, target in enumerate(table_targets(2, 2)[0])]
+    targets = table_targets(2, 2)[0]
+    corners = [spread_at(target, 6 + number, 16, action)[:2] for number, target in enumerate(targets)]
     worst, worst_deviation = max(corners)
     assert worst > mean
     assert 0.028 < worst < 0.045  # 3.5 cm
     assert 0.006 < worst_deviation < 0.020  # 1.3 cm
+
+
+FROZEN = {  # x of the elbow, wrist, knuckle, index finger and thumb in frame 60; sum of all coordinates
+    "reaching": ([-0.31081097, -0.07634474, 0.01766906, 0.10109456, 0.05107289], -357.66940977538695),
+    "pointing": ([-0.34581766, -0.10859569, -0.02107725, 0.05925606, -0.02328098], -376.39078680802714),
+}
+
+
+@pytest.mark.parametrize("action", ["reaching", "pointing"])
+def test_movements_are_those_that_every_evaluation_used(action: Action) -> None:
+    movement = Demonstrator().demonstrate(action, COMFORTABLE_TARGET, np.random.default_rng(1))
+    frame, total = FROZEN[action]
+    assert movement.shape == (197, 21)
+    assert_allclose(movement[60, [6, 9, 12, 15, 18]], frame, rtol=0.0, atol=1e-8)
+    assert_allclose(movement.sum(), total, rtol=1e-10, atol=0.0)
 
 
 def test_the_same_seed_gives_the_same_movement() -> None:

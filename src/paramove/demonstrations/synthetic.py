@@ -116,7 +116,7 @@ class Demonstrator:
         spread = self._spread(target, rng)
         progress = np.linspace(0.0, 1.0, round(timing.duration * SAMPLE_RATE_HZ) + 1)
         nearness = at_target(progress, timing)
-        pointing = nearness**0.5 if action == "pointing" else np.zeros_like(progress)
+        pointing = nearness**0.4 if action == "pointing" else np.zeros_like(progress)
         reach = self.lengths.grasp + pointing * (self.lengths.fingertip - self.lengths.grasp)
         posture = spread * self.variation.posture * rng.standard_normal(3)
         lean = leaning(target, self.lengths.upper_arm + self.lengths.forearm + float(reach.max()))
