@@ -4,13 +4,18 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.interpolative import InterpolativePHMM
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.polynomial import CubicPHMM, LinearPHMM, PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.storage import ModelFileError
 
 __all__ = [
+    "CubicPHMM",
     "InterpolativePHMM",
+    "LinearPHMM",
     "ModelFileError",
     "MovementDescription",
     "ParameterEstimate",
     "ParameterGrid",
     "ParametricHMM",
+    "PolynomialPHMM",
+    "QuadraticPHMM",
 ]

@@ -1,0 +1,183 @@
+"""Baum-Welch of HMMs whose state means are linear in features of theta (thesis 3.3.1, corrected (3.3)-(3.4))."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.hmm import kernels
+from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
+from paramove.hmm.options import TrainingOptions, TrainingSummary
+from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
+from paramove.phmm.slope_prior import SlopePrior
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+EVIDENCE_ITERATIONS = 8
+"""The prior's strength follows the evidence while covariances anneal, but at least so long; then it is constant."""
+
+
+@dataclass(frozen=True)
+class RegressedParameters:
+    """A family of HMMs with the means Z_i phi.
+
+    Attributes:
+        coefficients: Z, shape (N, D, F).
+        covariances: shape (N, D, D).
+        durations: p_i(d) in column d - 1, shape (N, d_max).
+        d_min: least number of frames of a state.
+    """
+
+    coefficients: Floats
+    covariances: Floats
+    durations: Floats
+    d_min: int
+
+    def at(self, features: Floats) -> Parameters:
+        """The member with these features (F,)."""
+        return Parameters(self.coefficients @ features, self.covariances, self.durations, self.d_min)
+
+
+@dataclass(frozen=True)
+class RegressionStatistics:
+    """Expected sums over all sequences; r are residuals of the coefficients with which they were gathered.
+
+    Attributes:
+        weights: gamma phi phi', shape (N, F, F).
+        crossed: gamma r phi', shape (N, D, F).
+        squared: gamma r r', shape (N, D, D).
+        weight: gamma, shape (N,).
+        durations: expected counts, shape (N, d_max).
+        log_likelihood: of all sequences.
+    """
+
+    weights: Floats
+    crossed: Floats
+    squared: Floats
+    weight: Floats
+    durations: Floats
+    log_likelihood: float
+
+    @classmethod
+    def gathered(
+        cls, parameters: RegressedParameters, sequences: Sequence[Floats], features: Floats
+    ) -> RegressionStatistics:
+        """E-step with the features (K, F) of the sequences."""
+        common = Evaluator.of(parameters.at(features[0]))
+        n_states, dim, _ = parameters.coefficients.shape
+        weights, firsts = np.zeros((len(sequences), n_states)), np.zeros((len(sequences), n_states, dim))
+        squared = np.zeros((n_states, dim, dim))
+        durations = np.zeros_like(parameters.durations)
+        log_likelihood = 0.0
+        means = np.einsum("ndf,kf->knd", parameters.coefficients, features)
+        for k, sequence in enumerate(sequences):
+            evaluator = replace(common, means=means[k])
+            value, gamma, counts = evaluator.expectation(sequence)
+            log_likelihood += value
+            durations += counts
+            ends = evaluator.ends(len(sequence))
+            kernels.add_moments(sequence, gamma, ends, means[k], weights[k], firsts[k], squared)
+        squared = squared + np.swapaxes(np.tril(squared, -1), 1, 2)
+        outer = np.einsum("kf,kg->kfg", features, features)
+        return cls(
+            np.tensordot(weights.T, outer, axes=1),
+            np.einsum("knd,kf->ndf", firsts, features, optimize=True),
+            squared,
+            weights.sum(axis=0),
+            durations,
+            log_likelihood,
+        )
+
+    def scatter(self, change: Floats) -> Floats:
+        """Sum of gamma (x - mu)(x - mu)' after the coefficients have changed (3.4), corrected. Shape (N, D, D)."""
+        cross = change @ np.swapaxes(self.crossed, 1, 2)
+        result: Floats = self.squared - cross - np.swapaxes(cross, 1, 2)
+        result += change @ self.weights @ np.swapaxes(change, 1, 2)
+        return 0.5 * (result + np.swapaxes(result, 1, 2))
+
+
+def train_regressed(
+    initial: RegressedParameters,
+    sequences: Sequence[Floats],
+    features: Floats,
+    degrees: Ints,
+    options: TrainingOptions,
+    smoothness: float | None,
+) -> tuple[RegressedParameters, TrainingSummary]:
+    """Iterate until the objective converges; without `smoothness` the coefficients have no prior (maximum likelihood).
+
+    Args:
+        initial: where to start.
+        sequences: (T_k, D) each.
+        features: phi of each sequence, (K, F); degrees: of the monomials, (F,).
+        options: as for an HMM; the objective is the log-likelihood plus the logarithms of all priors.
+        smoothness: see `SlopePrior.weak`.
+
+    Raises:
+        ValueError: The labels do not determine the coefficients and there is no prior.
+    """
+    n_frames = sum(len(sequence) for sequence in sequences)
+    monitor = ConvergenceMonitor(options.tolerance, n_frames)
+    scale = root_mean_deviation(sequences)
+    settled = max(options.annealing_iterations, EVIDENCE_ITERATIONS if smoothness is not None else 0)
+    parameters, prior, target = initial, None, None
+    for iteration in range(options.max_iterations):
+        found = RegressionStatistics.gathered(parameters, sequences, features)
+        if smoothness is not None and iteration <= settled:
+            prior = _prior(prior, parameters, found, degrees, smoothness, n_frames / len(sequences))
+        change = _change(parameters, found, prior)
+        scatter = found.scatter(change)
+        annealing = iteration < settled
+        if annealing or target is None or iteration == settled:
+            target = pooled_covariance(scatter, found.weight)
+        regularisation = regularisation_at(iteration, options, scale, target)
+        objective = None
+        if not annealing:
+            objective = found.log_likelihood + penalty(parameters.at(features[0]), regularisation)
+            objective += prior.log_density(parameters.coefficients) if prior is not None else 0.0
+        monitor.add(found.log_likelihood, objective)
+        parameters = RegressedParameters(
+            parameters.coefficients + change,
+            covariances_of(scatter, found.weight, regularisation),
+            durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+            parameters.d_min,
+        )
+        if monitor.converged:
+            break
+    return parameters, monitor.summary(len(sequences))
+
+
+def _prior(
+    prior: SlopePrior | None,
+    parameters: RegressedParameters,
+    found: RegressionStatistics,
+    degrees: Ints,
+    smoothness: float,
+    mean_frames: float,
+) -> SlopePrior:
+    n_states = len(parameters.coefficients)
+    pooled = found.squared.sum(axis=0) / found.weight.sum()
+    pooled = pooled + 1e-6 * np.trace(pooled) / len(pooled) * np.eye(len(pooled))
+    fresh = SlopePrior.weak(n_states, degrees, smoothness, pooled, max(1.0, mean_frames / n_states))
+    if prior is None:
+        return fresh
+    renewed = replace(fresh, strength=prior.strength)
+    return renewed.with_evidence(parameters.coefficients, found.weights, degrees)
+
+
+def _change(parameters: RegressedParameters, found: RegressionStatistics, prior: SlopePrior | None) -> Floats:
+    """What the M-step adds to the coefficients. Shape (N, D, F)."""
+    if prior is not None:
+        improved = prior.improved(parameters.coefficients, found.weights, found.crossed, parameters.covariances)
+        return improved - parameters.coefficients
+    try:
+        solved = np.linalg.solve(found.weights, np.swapaxes(found.crossed, 1, 2))  # Equation (3.3), corrected
+    except np.linalg.LinAlgError as error:
+        raise ValueError(
+            "the labels do not determine the model and it has no prior: give more different theta"
+        ) from error
+    return np.swapaxes(solved, 1, 2)
