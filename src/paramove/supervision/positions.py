@@ -131,18 +131,21 @@ def _merged(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
-def read_mapping(text: str, source: str) -> Document:
-    """Reads a YAML text whose top level is a mapping.
+EXAMPLE = "nodes: {camera: {...}}"
+
+
+def read_mapping(text: str, source: str, *, max_characters: int = MAX_CHARACTERS, example: str = EXAMPLE) -> Document:
+    """Reads a YAML text whose top level is a mapping, such as `example`.
 
     Tags, anchors, aliases, duplicate keys, keys that are no strings, numbers that are not finite, control characters,
-    more than one document, more than 100 000 characters and more than 20 levels are refused.
+    more than one document, more than `max_characters` and more than 20 levels are refused.
 
     Raises LaunchFileError with the positions of all that is refused; what is no YAML ends the search.
     """
-    node = _composed(text, source)
+    node = _composed(text, source, max_characters)
     start = Position(source, 1, 1)
     if node is None or (isinstance(node, ScalarNode) and _tag(node) == "null"):
-        raise LaunchFileError(start, "the file is empty; expected a mapping such as 'nodes: {camera: {...}}'")
+        raise LaunchFileError(start, f"the file is empty; expected a mapping such as '{example}'")
     if not isinstance(node, MappingNode):
         raise LaunchFileError(start, f"expected a mapping at the top level, found a {_kind(node)}")
     reader = _Reader(source, {(): start})
@@ -163,10 +166,10 @@ def read_value(text: str, source: str) -> Any:
     return value
 
 
-def _composed(text: str, source: str) -> Node | None:
+def _composed(text: str, source: str, max_characters: int = MAX_CHARACTERS) -> Node | None:
     """The tree of nodes; None of an empty text."""
-    if len(text) > MAX_CHARACTERS:
-        raise LaunchFileError(Position(source), f"{len(text)} characters; at most {MAX_CHARACTERS} are read")
+    if len(text) > max_characters:
+        raise LaunchFileError(Position(source), f"{len(text)} characters; at most {max_characters} are read")
     refused: list[LaunchFileError] = []
     try:
         _refuse_unwanted(text, source, refused)
@@ -218,7 +221,7 @@ def _yaml() -> YAML:
 
 
 def _refuse_unwanted(text: str, source: str, refused: list[LaunchFileError]) -> None:
-    """Collects what a launch file never needs, before anything is built from the text."""
+    """Collects what is never needed, before anything is built from the text."""
     depth = 0
     for event in _yaml().parse(text):
         where = Position(source, event.start_mark.line + 1, event.start_mark.column + 1)
@@ -233,14 +236,14 @@ def _refuse_unwanted(text: str, source: str, refused: list[LaunchFileError]) -> 
 
 def _refusal(event: Event) -> str:
     if isinstance(event, DocumentStartEvent) and (event.version or event.tags):
-        return "'%' directives are refused: a launch file is YAML 1.2"
+        return "'%' directives are refused: YAML 1.2 is expected"
     if isinstance(event, AliasEvent):
         return f"alias '*{event.anchor}' is refused: write the value out"
     if isinstance(event, NodeEvent) and event.anchor is not None:
         return f"anchor '&{event.anchor}' is refused: write the value out"
     if isinstance(event, ScalarEvent | CollectionStartEvent) and event.ctag is not None:
         tag = str(event.ctag).replace("tag:yaml.org,2002:", "!!")
-        return f"tag '{tag}' is refused: launch files hold plain values only"
+        return f"tag '{tag}' is refused: only plain values are taken"
     if isinstance(event, ScalarEvent) and event.value == "<<" and event.style is None:
         return "merge keys '<<' are refused: write the values out"
     return ""
