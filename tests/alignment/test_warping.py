@@ -50,3 +50,37 @@ def test_movement_distance_is_the_offset_of_shifted_points() -> None:
     movement = np.tile(np.concatenate([time, time**2, np.zeros_like(time)], axis=1), 7)
     shifted = movement + np.tile([0.0, 0.0, 0.03], 7)
     assert_allclose(movement_distance(movement, shifted), 0.03, rtol=1e-9, atol=0.0)
+
+
+@PROPERTY
+@given(st.integers(0, 2**31), st.integers(1, 40), st.integers(1, 40), st.integers(1, 9))
+def test_pattern_a_measures_both_ways_alike(seed: int, n_first: int, n_second: int, dim: int) -> None:
+    rng = np.random.default_rng(seed)
+    p, q = rng.standard_normal((n_first, dim)), rng.standard_normal((n_second, dim))
+    assert_allclose(warp(p, q).distance, warp(q, p).distance, rtol=1e-12, atol=0.0)
+    if 2 * min(n_first, n_second) > max(n_first, n_second):
+        assert_allclose(warp(p, q, "B").distance, warp(q, p, "B").distance, rtol=1e-12, atol=0.0)
+
+
+@PROPERTY
+@given(st.integers(0, 2**31), st.integers(20, 39), st.integers(20, 39), st.sampled_from(["A", "B"]))
+def test_the_path_joins_the_ends_by_allowed_steps(seed: int, n_first: int, n_second: int, pattern: StepPattern) -> None:
+    rng = np.random.default_rng(seed)
+    p, q = rng.standard_normal((n_first, 3)), rng.standard_normal((n_second, 3))
+    alignment = warp(p, q, pattern)
+    path = np.stack([alignment.first, alignment.second], axis=1)
+    assert_array_equal(path[0], [0, 0])
+    assert_array_equal(path[-1], [n_first - 1, n_second - 1])
+    allowed = {tuple(step) for step in STEPS[pattern].tolist()}
+    assert {tuple(step) for step in np.diff(path, axis=0).tolist()} <= allowed
+    along = np.linalg.norm(p[alignment.first] - q[alignment.second], axis=1).sum()
+    assert_allclose(alignment.distance, along, rtol=1e-12, atol=0.0)
+
+
+def test_what_cannot_be_aligned_is_refused_with_its_reason() -> None:
+    with pytest.raises(ValueError, match=r"patterns are 'A' and 'B', found 'C'"):
+        warp(np.zeros((3, 1)), np.zeros((3, 1)), "C")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="equally many dimensions, found 2 and 3"):
+        warp(np.zeros((3, 2)), np.zeros((3, 3)))
+    with pytest.raises(ValueError, match="not finite"):
+        warp(np.array([[0.0], [np.nan]]), np.zeros((2, 1)))

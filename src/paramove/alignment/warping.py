@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.hmm.compilation import compiled
+from paramove.alignment import kernels
 from paramove.hmm.sequences import checked_sequence
 
 Floats = NDArray[np.float64]
@@ -30,56 +30,24 @@ def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Ali
     """Align two sequences (T_1, D) and (T_2, D) so that the summed Euclidean distance d(p_i, q_j) is least.
 
     Pattern (A) may stay in either sequence; (B) moves on in both at every step, by at most two.
-    Raises ValueError where dimensions differ, or where no path exists: (B) needs a length ratio within [1/2, 2].
+    Raises ValueError where dimensions differ, or where no path exists: (B) needs a length ratio within [1/2, 2]
+    (corrected).
     """
     if pattern not in STEPS:
         raise ValueError(f"the step patterns are 'A' and 'B', found {pattern!r}")
     p = checked_sequence(first)
-    q = checked_sequence(second, p.shape[1])
-    total = accumulated_distances(p, q, STEPS[pattern])
+    q = checked_sequence(second)
+    if p.shape[1] != q.shape[1]:
+        raise ValueError(f"sequences to align have equally many dimensions, found {p.shape[1]} and {q.shape[1]}")
+    columns = np.ascontiguousarray(q.T)
+    total = kernels.accumulated_a(p, columns) if pattern == "A" else kernels.accumulated_b(p, columns)
     if not np.isfinite(total[-1, -1]):
         raise ValueError(
             f"step pattern (B) cannot align {len(p)} with {len(q)} frames: the last index of one may be at most twice "
             "that of the other (length ratio within [1/2, 2]); resample one of them"
         )
-    path = traced_back(total, STEPS[pattern])
+    path = kernels.traced_back(total, STEPS[pattern])
     return Alignment(path[:, 0], path[:, 1], float(total[-1, -1]))
-
-
-@compiled
-def accumulated_distances(p: Floats, q: Floats, steps: Ints) -> Floats:
-    """d_ij, the least summed distance of allowed paths to (i, j); infinity where none leads. Shape (T_1, T_2)."""
-    total = np.full((len(p), len(q)), np.inf)
-    for i in range(len(p)):
-        for j in range(len(q)):
-            best = 0.0 if i == 0 and j == 0 else np.inf
-            for s in range(len(steps)):
-                k, m = i - steps[s, 0], j - steps[s, 1]
-                if k >= 0 and m >= 0:
-                    best = min(best, total[k, m])
-            if best < np.inf:
-                total[i, j] = best + np.sqrt(((p[i] - q[j]) ** 2).sum())
-    return total
-
-
-@compiled
-def traced_back(total: Floats, steps: Ints) -> Ints:
-    """The best path, from its end back along the smallest predecessors (corrected). Shape (T', 2)."""
-    i, j = total.shape[0] - 1, total.shape[1] - 1
-    path = np.empty((i + j + 1, 2), np.int64)
-    count = 0
-    while True:
-        path[count, 0], path[count, 1] = i, j
-        count += 1
-        if i == 0 and j == 0:
-            break
-        best, next_i, next_j = np.inf, 0, 0
-        for s in range(len(steps)):
-            k, m = i - steps[s, 0], j - steps[s, 1]
-            if k >= 0 and m >= 0 and total[k, m] < best:
-                best, next_i, next_j = total[k, m], k, m
-        i, j = next_i, next_j
-    return path[:count][::-1].copy()
 
 
 def movement_distance(

@@ -38,7 +38,8 @@ def _compile() -> None:
     model = LeftRightHMM(n_states=5, d_min=2, d_max=8).fit(sequences)
     model.log_likelihood(sequences[0])
     model.decode(sequences[0])
-    warp(sequences[0], sequences[1])
+    warp(sequences[0], sequences[1], "A")
+    warp(sequences[0], sequences[1], "B")
 
 
 def _train() -> bool:
