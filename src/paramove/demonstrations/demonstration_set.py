@@ -1,0 +1,217 @@
+"""A demonstration set: a folder with recordings of arm poses and labels.yaml, as arrays to train and test with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from paramove.demonstrations import body_frame, timing
+from paramove.demonstrations.labels import FILE_NAME, load_labels
+from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.reading import read_movements
+from paramove.demonstrations.splitting import SplitBy, split_groups
+from paramove.demonstrations.writing import Label, Take, write_set
+
+if TYPE_CHECKING:
+    from paramove.demonstrations.reaching import Demonstrations
+
+
+class Sequences(NamedTuple):
+    """Movements as models take them.
+
+    Attributes:
+        sequences: Stacked positions, each (T_k, D), m.
+        theta: Shape (K, P).
+        labels: Actions, K.
+        subjects: K.
+    """
+
+    sequences: list[Floats]
+    theta: Floats
+    labels: list[str]
+    subjects: list[str]
+
+
+@dataclass(frozen=True)
+class DemonstrationSet(Sequence[Movement]):
+    """Movements with the same points, frame and parameters. Every change gives a new set.
+
+    Attributes:
+        movements: In the order of labels.yaml.
+        description: For people.
+        remarks: What was done on reading, such as gaps that were filled.
+
+    Raises DemonstrationError for movements whose points, frames or parameters differ; names both.
+    """
+
+    movements: tuple[Movement, ...]
+    description: str = ""
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for movement in self.movements[1:]:
+            first = self.movements[0]
+            for what in ("point_names", "frame", "parameter_names"):
+                one, other = getattr(first, what), getattr(movement, what)
+                if one != other:
+                    words = what.replace("_", " ")
+                    raise DemonstrationError(
+                        f"{movement.source}: {words} {_words(other)}, but {_words(one)} in {first.source}; "
+                        "a set has the same in all"
+                    )
+
+    @classmethod
+    def load(cls, folder: Path | str) -> DemonstrationSet:
+        """Reads a folder. Short losses of a point are filled (`max_gap` of labels.yaml) and told in `remarks`.
+
+        Raises DemonstrationError, or LabelsError with file:line:column of every segment that cannot be used: its
+        recording is missing or has other points, it is out of range, has a single frame, or a point is lost too long.
+        """
+        labels = load_labels(Path(folder) / FILE_NAME)
+        movements, remarks = read_movements(labels)
+        return cls(tuple(movements), labels.file.description, tuple(remarks))
+
+    def write(self, folder: Path | str) -> None:
+        """Writes a folder: one recording per recording that the movements come from, the movements one after another.
+
+        Positions are kept bit by bit, times to the nanosecond. Raises DemonstrationError if there is a set already.
+        """
+        takes = [
+            Take(
+                recording=movement.recording,
+                time=movement.time,
+                positions=movement.positions,
+                point_names=movement.point_names,
+                frame=movement.frame,
+                labels=(Label.of(movement),),
+            )
+            for movement in self.movements
+        ]
+        write_set(Path(folder), takes, self.parameter_names, self.description)
+
+    def __len__(self) -> int:
+        return len(self.movements)
+
+    def __getitem__(self, index: int) -> Movement:  # type: ignore[override]
+        return self.movements[index]
+
+    def __iter__(self) -> Iterator[Movement]:
+        return iter(self.movements)
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """Names of the points; () of an empty set."""
+        return self.movements[0].point_names if self.movements else ()
+
+    @property
+    def frame(self) -> str:
+        """Coordinate frame; "" of an empty set."""
+        return self.movements[0].frame if self.movements else ""
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the components of theta."""
+        return self.movements[0].parameter_names if self.movements else ()
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """Names of the actions, sorted."""
+        return tuple(sorted({movement.action for movement in self.movements}))
+
+    @property
+    def subjects(self) -> tuple[str, ...]:
+        """Names of the persons, sorted."""
+        return tuple(sorted({movement.subject for movement in self.movements}))
+
+    def select(self, action: str | None = None, subject: str | None = None) -> DemonstrationSet:
+        """The movements of one action, of one person, or both.
+
+        Raises DemonstrationError that names what there is, if there are none.
+        """
+        chosen = tuple(
+            movement
+            for movement in self.movements
+            if action in (None, movement.action) and subject in (None, movement.subject)
+        )
+        if not chosen:
+            raise DemonstrationError(
+                f"no movement with action {action or 'any'} and subject {subject or 'any'}; there are the actions "
+                f"{', '.join(self.actions) or 'none'} and the subjects {', '.join(self.subjects) or 'none'}"
+            )
+        return replace(self, movements=chosen)
+
+    def sequences(
+        self, action: str | None = None, subject: str | None = None, rate_hz: float | None = None
+    ) -> Sequences:
+        """Movements of an action and a person (None: all) as `fit` takes them, at `rate_hz` (None: as they are)."""
+        chosen = self.select(action, subject)
+        if rate_hz is not None:
+            chosen = chosen.resampled(rate_hz)
+        return Sequences(
+            [movement.frames for movement in chosen],
+            np.stack([movement.theta for movement in chosen]),
+            [movement.action for movement in chosen],
+            [movement.subject for movement in chosen],
+        )
+
+    def demonstrations(self, action: str | None = None) -> Demonstrations:
+        """The movements of one action (None: of the only one) with the description that a model keeps.
+
+        Raises DemonstrationError if there are several actions and none is named.
+        """
+        from paramove.demonstrations.reaching import Demonstrations
+        from paramove.phmm import MovementDescription
+
+        if action is None and len(self.actions) > 1:
+            raise DemonstrationError(f"a model is of one action; choose among {', '.join(self.actions)}")
+        chosen = self.select(action)
+        found = chosen.sequences()
+        duration = float(np.mean([movement.duration for movement in chosen]))
+        about = MovementDescription(
+            found.labels[0], self.point_names, "m", self.frame, self.parameter_names, duration, source=self.description
+        )
+        return Demonstrations(found.sequences, found.theta, about)
+
+    def resampled(self, rate_hz: float) -> DemonstrationSet:
+        """All at one frame rate (`timing.resampled`)."""
+        return self._each(lambda movement: timing.resampled(movement, rate_hz))
+
+    def cut_by_speed(self, point: str = timing.FINGERTIP, *, end: bool = False) -> DemonstrationSet:
+        """All cut by the absolute rule: from the first frame above 3 cm/s before 15 cm/s (`timing.cut_by_speed`)."""
+        return self._each(lambda movement: timing.cut_by_speed(movement, point, end=end))
+
+    def in_body_frame(self) -> DemonstrationSet:
+        """All seen from the person (`body_frame.in_body_frame`)."""
+        return self._each(body_frame.in_body_frame)
+
+    def with_right_arms(self) -> DemonstrationSet:
+        """Movements of left arms mirrored to right ones (`body_frame.mirrored`)."""
+        return self._each(lambda movement: body_frame.mirrored(movement) if movement.side == "left" else movement)
+
+    def scaled_to_arm(self, length: float | None = None) -> DemonstrationSet:
+        """Every person's movements scaled so that all arms are `length` metres long (None: the mean of the persons)."""
+        measured = [(movement.subject, body_frame.arm_length(movement)) for movement in self.movements]
+        lengths = {one: float(np.median([arm for name, arm in measured if name == one])) for one in self.subjects}
+        wanted = float(np.mean(list(lengths.values()))) if length is None else length
+        return self._each(lambda movement: body_frame.scaled(movement, wanted / lengths[movement.subject]))
+
+    def split(
+        self, by: SplitBy = "movement", fraction: float = 0.25, seed: int = 0, bins: int | None = None
+    ) -> tuple[DemonstrationSet, DemonstrationSet]:
+        """The set to train with and the set to test with (`splitting.split_groups`)."""
+        trained, tested = split_groups(self.movements, by, fraction, seed, bins)
+        return (
+            replace(self, movements=tuple(self.movements[n] for n in trained)),
+            replace(self, movements=tuple(self.movements[n] for n in tested)),
+        )
+
+    def _each(self, change: Callable[[Movement], Movement]) -> DemonstrationSet:
+        return replace(self, movements=tuple(change(movement) for movement in self.movements))
+
+
+def _words(value: tuple[str, ...] | str) -> str:
+    return f"'{value}'" if isinstance(value, str) else f"({', '.join(value)})"

@@ -1,0 +1,77 @@
+"""Points that were lost for some frames: named, and filled where the loss is short."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from paramove.demonstrations.movement import Floats, runs
+
+NEIGHBOURS = 5
+"""So many frames on each side of a gap shape what is put into it."""
+
+
+@dataclass(frozen=True)
+class PointGap:
+    """A point was lost from frame `first` until before frame `end`, for `duration` seconds between seen frames."""
+
+    point: str
+    first: int
+    end: int
+    duration: float
+
+    def __str__(self) -> str:
+        frames = f"frame {self.first}" if self.end - self.first == 1 else f"frames {self.first}-{self.end - 1}"
+        length = "it is not seen on both sides" if np.isinf(self.duration) else f"{self.duration:.3g} s"
+        return f"{self.point} in {frames} ({length})"
+
+
+def lost(positions: Floats) -> NDArray[np.bool_]:
+    """Where a point has no finite position. Shape (T, P, 3) -> (T, P)."""
+    result: NDArray[np.bool_] = np.asarray(~np.isfinite(positions).all(axis=-1))
+    return result
+
+
+def fill_gaps(
+    time: Floats, positions: Floats, point_names: tuple[str, ...], max_gap: float
+) -> tuple[Floats, list[PointGap], list[PointGap]]:
+    """Fills gaps of at most `max_gap` seconds by a cubic spline through the frames around them.
+
+    Args:
+        time: Shape (T,), s, increasing.
+        positions: Shape (T, P, 3); not finite where a point was lost.
+        point_names: Of the P points.
+        max_gap: Longest time between the frames before and after a gap that is filled, less one frame period.
+
+    Returns:
+        Positions, with NaN where nothing was filled; the filled gaps; those left open, which are too long or lie at
+        the beginning or end. What was seen is returned as it was.
+    """
+    result = positions.copy()
+    missing = lost(positions)
+    result[missing] = np.nan
+    filled, left = [], []
+    for point in np.flatnonzero(missing.any(axis=0)):
+        seen = np.flatnonzero(~missing[:, point])
+        for first, end in runs(missing[:, point]):
+            at_edge = first == 0 or end == len(time)
+            duration = np.inf if at_edge else (time[end] - time[first - 1]) * (end - first) / (end - first + 1)
+            gap = PointGap(point_names[point], first, end, float(duration))
+            if duration > max_gap * (1.0 + 1e-9):
+                left.append(gap)
+                continue
+            split = int(np.searchsorted(seen, first))
+            around = seen[max(0, split - NEIGHBOURS) : split + NEIGHBOURS]
+            result[first:end, point] = _between(time, positions[:, point], around, time[first:end])
+            filled.append(gap)
+    return result, filled, left
+
+
+def _between(time: Floats, path: Floats, around: NDArray[np.intp], wanted: Floats) -> Floats:
+    if len(around) < 4:
+        return np.stack([np.interp(wanted, time[around], path[around, axis]) for axis in range(3)], axis=-1)
+    result: Floats = CubicSpline(time[around], path[around])(wanted)
+    return result

@@ -1,0 +1,248 @@
+"""labels.yaml of a demonstration set: which part of which recording shows what; read, checked and written."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import YAMLError
+
+from paramove.demonstrations.movement import DemonstrationError
+from paramove.supervision.names import nearest
+from paramove.supervision.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
+
+FILE_NAME = "labels.yaml"
+MAX_CHARACTERS = 20_000_000
+EXAMPLE = "segments: [{recording: a.mcap, start: 0.0, end: 2.5, action: reaching}]"
+HEAD = """\
+# A demonstration set. Each segment is one movement: start and end in seconds from the first pose of its recording.
+# Parameters whose names end in _x, _y, _z are a place in the frame of the recording, in metres.
+"""
+
+
+class LabelsError(DemonstrationError):
+    """labels.yaml is wrong: one finding or several, a line each, that begin with file:line:column."""
+
+    def __init__(self, findings: LaunchFileError) -> None:
+        super().__init__(str(findings))
+        self.findings = findings
+
+    def __str__(self) -> str:
+        return str(self.findings)
+
+
+class _Checked(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def _number_as_text(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+Word = Annotated[str, Field(min_length=1, max_length=80)]
+
+
+class Segment(_Checked):
+    """One movement in a recording."""
+
+    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(description="file, beside labels.yaml")
+    start: float = Field(ge=0.0, description="s from the first pose of the recording; the first frame of the movement")
+    end: float = Field(gt=0.0, description="s; the last frame of the movement")
+    action: Word = Field(description="what is done, such as reaching")
+    theta: list[float] = Field(
+        default_factory=list, description="the movement's parameters, as `parameters` names them"
+    )
+    subject: Annotated[str, BeforeValidator(_number_as_text)] = Field(default="", max_length=80, description="who")
+    repetition: int = Field(default=0, ge=0, description="counts movements with the same action, theta and subject")
+    side: Literal["right", "left"] = Field(default="right", description="which arm moves")
+
+
+class LabelsFile(_Checked):
+    """Everything that labels.yaml says."""
+
+    version: Literal[1] = Field(default=1, description="of this form")
+    description: str = Field(default="", description="for people")
+    parameters: list[Word] = Field(default_factory=list, description="names of the components of theta")
+    points: list[Word] | None = Field(default=None, min_length=1, description="which points, in which order; null: all")
+    max_gap: float = Field(default=0.1, ge=0.0, le=1.0, description="s; longer losses of a point are not filled")
+    segments: list[Segment] = Field(default_factory=list, description="the movements")
+
+
+@dataclass(frozen=True)
+class Labels:
+    """A checked labels.yaml and where each value stood."""
+
+    path: Path
+    file: LabelsFile
+    document: Document
+
+    def error(self, index: int, message: str, key: str = "") -> LaunchFileError:
+        """A finding about segment number `index` from 0, at one of its keys or at its beginning."""
+        path: KeyPath = ("segments", str(index), *([key] if key else []))
+        return self.document.error(path, message)
+
+    def line(self, index: int) -> int:
+        """Line of segment number `index` from 0."""
+        return self.document.position(("segments", str(index))).line
+
+
+def load_labels(path: Path) -> Labels:
+    """Reads and checks labels.yaml; the recordings are not looked at.
+
+    Raises DemonstrationError if there is no such file, LabelsError with the positions of all that is wrong in it.
+    """
+    if not path.is_file():
+        raise DemonstrationError(
+            f"there is no {path}: a demonstration set is a folder with recordings and a {FILE_NAME}; "
+            "make one with `paramove demos import`, `paramove demos label` or `paramove demos synthesize`",
+            missing=True,
+        )
+    try:
+        document = read_mapping(_text(path), str(path), max_characters=MAX_CHARACTERS, example=EXAMPLE)
+        labels = Labels(path, _validated(document), document)
+        raise_any(_contradictions(labels))
+    except LaunchFileError as error:
+        raise LabelsError(error) from error
+    return labels
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DemonstrationError(f"{path} cannot be read as UTF-8 text: {error}") from error
+
+
+def _validated(document: Document) -> LabelsFile:
+    try:
+        return LabelsFile.model_validate(document.data)
+    except ValidationError as error:
+        raise LaunchFileError.of([_finding(document, found) for found in error.errors()]) from error
+
+
+_EXPECTED = {
+    "model_type": "expected a mapping 'key: value'",
+    "list_type": "expected a list in brackets",
+    "string_type": "expected a text, in quotes if it could be something else",
+    "float_type": "expected a number, without quotes",
+    "int_type": "expected a whole number, without quotes",
+}
+
+
+def _finding(document: Document, details: ErrorDetails) -> LaunchFileError:
+    path = tuple(str(part) for part in details["loc"])
+    keys = list((Segment if path[:1] == ("segments",) and len(path) > 2 else LabelsFile).model_fields)
+    if details["type"] == "extra_forbidden":
+        return document.error(path, f"unknown key '{path[-1]}'; {nearest(path[-1], keys)}")
+    if details["type"] == "missing":
+        return document.error(path, f"'{path[-1]}' of this segment is missing")
+    message = _EXPECTED.get(details["type"], details["msg"][0].lower() + details["msg"][1:])
+    return document.error(path, f"{'.'.join(path)}: {message}, found {details['input']!r:.80}")
+
+
+def _contradictions(labels: Labels) -> list[LaunchFileError]:
+    """Segments that contradict themselves or each other."""
+    findings: list[LaunchFileError] = []
+    seen: dict[tuple[object, ...], int] = {}
+    names = labels.file.parameters
+    for kind, words in (("parameters", names), ("points", labels.file.points or [])):
+        if len(set(words)) < len(words):
+            findings.append(labels.document.error((kind,), f"{kind}: each name once, found {', '.join(words)}"))
+    for index, segment in enumerate(labels.file.segments):
+        if segment.end <= segment.start:
+            message = f"the segment ends at {segment.end:g} s, before its start at {segment.start:g} s"
+            findings.append(labels.error(index, message, "end"))
+        if len(segment.theta) != len(names):
+            message = f"theta has {len(segment.theta)} components; 'parameters' names {len(names)}: {', '.join(names)}"
+            findings.append(labels.error(index, message, "theta"))
+        if (Path(segment.recording).is_absolute()) or ".." in Path(segment.recording).parts:
+            message = f"{segment.recording!r}: expected a file in the folder of {FILE_NAME}; copy it there"
+            findings.append(labels.error(index, message, "recording"))
+        key = (segment.recording, segment.start, segment.end, segment.action, segment.side)
+        first = seen.setdefault(key, index)
+        if first != index:
+            message = (
+                f"the same segment ({segment.recording}, {segment.start:g} to {segment.end:g} s) "
+                f"is in line {labels.line(first)} too; remove one"
+            )
+            findings.append(labels.error(index, message))
+    return findings
+
+
+def write_labels(path: Path, content: LabelsFile) -> None:
+    """Writes a new labels.yaml; raises FileExistsError if there is one."""
+    tree = CommentedMap(content.model_dump(exclude={"segments", "points", "max_gap"}, exclude_defaults=True))
+    tree.insert(0, "version", content.version)
+    tree["parameters"] = _in_one_line(content.parameters)
+    if content.points is not None:
+        tree["points"] = _in_one_line(content.points)
+    tree["max_gap"] = content.max_gap
+    tree["segments"] = CommentedSeq([_segment(segment) for segment in content.segments])
+    with path.open("x", encoding="utf-8") as file:
+        file.write(HEAD + _dumped(tree))
+
+
+def append_segments(path: Path, segments: Sequence[Segment]) -> None:
+    """Adds segments to a labels.yaml; comments, order and whatever else is written there stay as they are.
+
+    Raises DemonstrationError or LabelsError, and leaves the file alone, if it would not be a sound one afterwards.
+    """
+    before = _text(path)
+    load_labels(path)
+    try:
+        tree = _yaml().load(before)
+    except YAMLError as error:  # what read_mapping takes and this refuses: not known of any file
+        raise DemonstrationError(f"{path} cannot be read as YAML: {error}") from error
+    if not tree.get("segments"):
+        tree["segments"] = CommentedSeq()
+    tree["segments"].extend(_segment(segment) for segment in segments)
+    after = path.with_name(path.name + ".new")
+    after.write_text(_dumped(tree), encoding="utf-8")
+    try:
+        load_labels(after)
+    except LabelsError as error:
+        after.unlink()
+        named = (LaunchFileError(one.position, one.message) for one in error.findings)
+        raise DemonstrationError(
+            f"{path} would not be sound with this segment: {'; '.join(one.message for one in named)}"
+        ) from error
+    after.replace(path)
+
+
+def _segment(segment: Segment) -> CommentedMap:
+    values: dict[str, Any] = segment.model_dump()
+    values["theta"] = _in_one_line(values["theta"])
+    for key, empty in (("side", "right"), ("subject", "")):
+        if values[key] == empty:
+            del values[key]
+    tree = CommentedMap(values)
+    tree.fa.set_flow_style()
+    return tree
+
+
+def _in_one_line(values: Sequence[Any]) -> CommentedSeq:
+    sequence = CommentedSeq(values)
+    sequence.fa.set_flow_style()
+    return sequence
+
+
+def _yaml() -> YAML:
+    yaml = YAML()
+    yaml.version = (1, 2)
+    yaml.width = 4096
+    yaml.preserve_quotes = True
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
+
+
+def _dumped(tree: CommentedMap) -> str:
+    text = io.StringIO()
+    _yaml().dump(tree, text)
+    return text.getvalue().removeprefix("%YAML 1.2\n---\n")

@@ -1,0 +1,103 @@
+"""Recordings of arm poses: MCAP files with the topic human/arm_pose, read into arrays and written from them."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.bus.topics import HUMAN_ARM_POSE
+from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.msgs.arm_pose_pb2 import ArmPose
+from paramove.recording.reader import read
+from paramove.recording.writer import RecordingWriter
+
+BILLION = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class PoseRecording:
+    """Poses over time.
+
+    Attributes:
+        time_ns: Capture times, increasing. Shape (T,), ns.
+        positions: Shape (T, P, 3), m, in `frame`; NaN where a point was not seen.
+        point_names: Of the P points, in the order in which they were first seen.
+        frame: Coordinate frame.
+    """
+
+    time_ns: NDArray[np.int64]
+    positions: Floats
+    point_names: tuple[str, ...]
+    frame: str
+
+    @property
+    def time(self) -> Floats:
+        """Capture times from that of the first pose. Shape (T,), s."""
+        result: Floats = (self.time_ns - self.time_ns[:1]) / BILLION
+        return result
+
+
+def read_poses(path: Path) -> PoseRecording:
+    """All poses of a recording; of one that was never finished (ending `.part`), those that are there.
+
+    Raises DemonstrationError if there is no such file or no pose in it, or if times or frames contradict each other.
+    """
+    part = path.with_name(path.name + ".part")
+    file = path if path.is_file() or not part.is_file() else part
+    times, poses, frames = [], [], set()
+    with contextlib.suppress(FileNotFoundError):
+        for recorded in read(file, only=[HUMAN_ARM_POSE.name]):
+            times.append(recorded.message.captured.ToNanoseconds())
+            poses.append({point.name: (point.x, point.y, point.z) for point in recorded.message.points})
+            frames.add(recorded.message.frame)
+    if not poses:
+        raise _nothing(file)
+    time_ns = np.array(times, dtype=np.int64)
+    backwards = np.flatnonzero(np.diff(time_ns) <= 0)
+    if backwards.size:
+        first = int(backwards[0])
+        raise DemonstrationError(
+            f"{file}: pose {first + 1} was captured at {time_ns[first + 1] / 1e9:.6f} s, not after pose {first} at "
+            f"{time_ns[first] / 1e9:.6f} s; two sources spoke on {HUMAN_ARM_POSE.name}: record them apart"
+        )
+    if len(frames) > 1:
+        raise DemonstrationError(f"{file}: poses in different frames: {', '.join(sorted(frames))}; record them apart")
+    names = tuple(dict.fromkeys(name for pose in poses for name in pose))
+    unseen = (np.nan, np.nan, np.nan)
+    rows = [[pose.get(name, unseen) for name in names] for pose in poses]
+    return PoseRecording(time_ns, np.array(rows, dtype=np.float64).reshape(len(rows), -1, 3), names, frames.pop())
+
+
+def _nothing(file: Path) -> DemonstrationError:
+    if not file.is_file():
+        return DemonstrationError(f"there is no recording {file}", missing=True)
+    with file.open("rb") as content:
+        begin = content.read(8)
+    if begin != b"\x89MCAP0\r\n":
+        return DemonstrationError(f"{file} is no MCAP recording; `paramove demos import` makes one of other files")
+    return DemonstrationError(
+        f"{file} holds no pose on {HUMAN_ARM_POSE.name} that can be read; "
+        f"if it is damaged, try `paramove recover {file}`"
+    )
+
+
+def write_poses(path: Path, recording: PoseRecording, library: str) -> None:
+    """Writes a recording; a point without a finite position is left out of its pose.
+
+    Raises RecordingExistsError if there is such a file.
+    """
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(recording.positions).all(axis=-1))
+    with RecordingWriter(path, library) as writer:
+        for number, at in enumerate(recording.time_ns.tolist()):
+            pose = ArmPose(frame=recording.frame)
+            pose.captured.FromNanoseconds(at)
+            for name, place, known in zip(
+                recording.point_names, recording.positions[number].tolist(), seen[number].tolist(), strict=True
+            ):
+                if known:
+                    pose.points.add(name=name, x=place[0], y=place[1], z=place[2])
+            writer.write(HUMAN_ARM_POSE.name, pose, at, at, number + 1)

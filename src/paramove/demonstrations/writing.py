@@ -1,0 +1,151 @@
+"""Writes demonstration sets: takes of motion capture become recordings, their labels become labels.yaml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
+from paramove.demonstrations.movement import DemonstrationError, Floats, Movement, Side
+from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
+
+LIBRARY = "paramove demonstrations"
+BETWEEN_NS = 2 * BILLION
+"""Between takes that share a recording; no loss of points is filled across it."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """What a part of a take shows: the frames from `first` to before `end`."""
+
+    first: int
+    end: int
+    action: str
+    theta: tuple[float, ...] = ()
+    subject: str = ""
+    repetition: int = 0
+    side: Side = "right"
+
+    @classmethod
+    def of(cls, movement: Movement) -> Label:
+        """The label of a whole movement."""
+        theta = tuple(movement.theta.tolist())
+        return cls(0, len(movement.time), movement.action, theta, movement.subject, movement.repetition, movement.side)
+
+
+@dataclass(frozen=True)
+class Take:
+    """Frames that were captured one after the other.
+
+    Attributes:
+        recording: Name of the recording that it becomes, or becomes a part of.
+        time: Shape (T,), s, increasing.
+        positions: Shape (T, P, 3), m; NaN where a point was lost.
+        point_names: Of the P points.
+        frame: Coordinate frame.
+        labels: What is shown when.
+    """
+
+    recording: str
+    time: Floats
+    positions: Floats
+    point_names: tuple[str, ...]
+    frame: str
+    labels: tuple[Label, ...] = ()
+
+
+def recording_name(text: str) -> str:
+    """A name of a recording made of any text: letters, digits, '_' and '-', and the ending."""
+    return (re.sub(r"[^A-Za-z0-9_-]+", "_", text.removesuffix(".mcap")).strip("_") or "recording") + ".mcap"
+
+
+def write_set(
+    folder: Path,
+    takes: Sequence[Take],
+    parameter_names: Sequence[str] = (),
+    description: str = "",
+    max_gap: float = LabelsFile.model_fields["max_gap"].default,
+    *,
+    add: bool = False,
+) -> None:
+    """Writes recordings and labels; with `add` to a set that is there already, whose labels.yaml keeps its comments.
+
+    Raises DemonstrationError if there is a set or a recording already, or if parameters differ from those of the set.
+    """
+    there = (folder / FILE_NAME).exists()
+    _refuse(folder, takes, parameter_names, there, add)
+    folder.mkdir(parents=True, exist_ok=True)
+    segments: list[Segment] = []
+    for name in dict.fromkeys(take.recording for take in takes):
+        together, found = _together([take for take in takes if take.recording == name])
+        write_poses(folder / name, together, LIBRARY)
+        segments += found
+    if there:
+        append_segments(folder / FILE_NAME, segments)
+        return
+    content = LabelsFile(
+        description=description, parameters=list(parameter_names), max_gap=max_gap, segments=_in_order(takes, segments)
+    )
+    write_labels(folder / FILE_NAME, content)
+
+
+def _refuse(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str], there: bool, add: bool) -> None:
+    if not takes:
+        raise DemonstrationError("there is no movement to write")
+    if there and not add:
+        raise DemonstrationError(f"{folder} holds a demonstration set already; choose another folder, or --add to it")
+    if there:
+        has = load_labels(folder / FILE_NAME).file.parameters
+        if list(parameter_names) != has:
+            raise DemonstrationError(
+                f"{folder / FILE_NAME} has the parameters ({', '.join(has)}), not ({', '.join(parameter_names)}); "
+                "a set has the same in all: give --parameters, or choose another folder"
+            )
+    for name in {take.recording for take in takes}:
+        for file in (folder / name, folder / f"{name}.part"):
+            if file.exists():
+                raise DemonstrationError(f"{file} exists; recordings are never overwritten: give another --name")
+
+
+def _together(takes: Iterable[Take]) -> tuple[PoseRecording, list[Segment]]:
+    """One recording of several takes, one after the other, and the segments in it."""
+    begin_ns, times, positions, segments = 0, [], [], list[Segment]()
+    first = None
+    for take in takes:
+        first = first or take
+        if (take.point_names, take.frame) != (first.point_names, first.frame):
+            raise DemonstrationError(f"takes of {take.recording} differ in points or frame; give them different names")
+        time_ns = begin_ns + np.rint((take.time - take.time[0]) * BILLION).astype(np.int64)
+        times.append(time_ns)
+        positions.append(take.positions)
+        for label in take.labels:
+            start, end = (float(time_ns[frame] / BILLION) for frame in (label.first, label.end - 1))
+            segments.append(_segment(take.recording, start, end, label))
+        begin_ns = int(time_ns[-1]) + BETWEEN_NS
+    assert first is not None
+    return PoseRecording(np.concatenate(times), np.concatenate(positions), first.point_names, first.frame), segments
+
+
+def _segment(recording: str, start: float, end: float, label: Label) -> Segment:
+    return Segment(
+        recording=recording,
+        start=start,
+        end=end,
+        action=label.action,
+        theta=list(label.theta),
+        subject=label.subject,
+        repetition=label.repetition,
+        side=label.side,
+    )
+
+
+def _in_order(takes: Sequence[Take], segments: Sequence[Segment]) -> list[Segment]:
+    """Segments in the order of the takes, though those of one recording were written together."""
+    waiting: dict[str, list[Segment]] = {}
+    for segment in segments:
+        waiting.setdefault(segment.recording, []).append(segment)
+    return [waiting[take.recording].pop(0) for take in takes for _ in take.labels]
