@@ -11,7 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.hmm import kernels
+from paramove.hmm.covariances import Covariance, covariances_of, floored, log_prior, pooled_covariance
+from paramove.hmm.gaussians import whitening_of
 from paramove.hmm.options import Regularisation
+from paramove.hmm.sequences import Stack
+
+__all__ = [
+    "Evaluator",
+    "Parameters",
+    "Statistics",
+    "covariances_of",
+    "durations_of",
+    "floored",
+    "penalty",
+    "pooled_covariance",
+    "whitened",
+]
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +48,23 @@ class Parameters:
     d_min: int
 
 
+def whitened(covariances: Floats) -> tuple[Floats, Floats]:
+    """Inverse Cholesky factors, shape (N, D, D), and ln of the densities at the means, shape (N,).
+
+    Raises ValueError naming a state whose covariance is not positive definite.
+    """
+    whitening, log_determinant, bad = whitening_of(np.ascontiguousarray(covariances))
+    if bad >= 0 or not np.isfinite(log_determinant).all():
+        state = max(bad, 0) if bad >= 0 else int(np.argmin(np.isfinite(log_determinant)))
+        finite = np.isfinite(covariances[state]).all()
+        least = f"least eigenvalue {np.linalg.eigvalsh(covariances[state])[0]:.3g}" if finite else "not finite"
+        raise ValueError(
+            f"the covariance of state {state} is not positive definite ({least}); train with a floor, with more "
+            "sequences or with fewer states"
+        )
+    return whitening, -0.5 * (covariances.shape[1] * np.log(2.0 * np.pi) + log_determinant)
+
+
 @dataclass(frozen=True)
 class Evaluator:
     """Whitening matrices and log densities ready for the kernels; made once per set of parameters."""
@@ -46,21 +78,10 @@ class Evaluator:
     @classmethod
     def of(cls, parameters: Parameters) -> "Evaluator":
         """Prepare the parameters. Raises ValueError naming a state whose covariance is not positive definite."""
-        means, covariances = parameters.means, parameters.covariances
-        dim = means.shape[1]
-        try:
-            factors = np.linalg.cholesky(covariances)
-        except np.linalg.LinAlgError as error:
-            least = np.linalg.eigvalsh(covariances)[:, 0]
-            raise ValueError(
-                f"the covariance of state {int(least.argmin())} is not positive definite (least eigenvalue "
-                f"{least.min():.3g}); train with a floor or with more sequences"
-            ) from error
-        whitening = np.ascontiguousarray(np.linalg.inv(factors))
-        log_determinant = 2.0 * np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+        means = parameters.means
+        whitening, log_norm = whitened(parameters.covariances)
         with np.errstate(divide="ignore"):
             log_duration = np.log(parameters.durations)
-        log_norm = -0.5 * (dim * np.log(2.0 * np.pi) + log_determinant)
         return cls(np.ascontiguousarray(means), whitening, log_norm, log_duration, parameters.d_min)
 
     def ends(self, n_frames: int) -> NDArray[np.int64]:
@@ -82,15 +103,35 @@ class Evaluator:
 
         Raises ValueError where the likelihood is zero, since there are no responsibilities then.
         """
-        ends = self.ends(len(sequence))
-        outputs = kernels.log_outputs(sequence, self.means, self.whitening, self.log_norm, ends)
-        ending = kernels.forward(outputs, self.log_duration, self.d_min, ends)
-        if not np.isfinite(ending[-1, -1]):
-            raise ValueError(f"the model gives a sequence of {len(sequence)} frames the likelihood zero: its durations "
-                             "exclude this length; train with duration_pseudocount > 0")  # fmt: skip
-        following = kernels.backward(outputs, self.log_duration, self.d_min, ends)
-        gamma, counts = kernels.posteriors(outputs, self.log_duration, self.d_min, ends, ending, following)
-        return float(ending[-1, -1]), gamma, counts
+        gamma, counts = np.zeros((len(self.means), len(sequence))), np.zeros_like(self.log_duration)
+        values = self.stacked_expectation(Stack.of([sequence]), gamma, counts)
+        return float(values[0]), gamma.T, counts
+
+    def stacked_expectation(
+        self, stack: Stack, gamma: Floats, counts: Floats, diagonal: bool = False, before: int = 0
+    ) -> Floats:
+        """Log-likelihood of each sequence, shape (K,).
+
+        Writes the responsibilities within the feasible windows to gamma (N, frames), adds to counts (N, d_max).
+        Raises ValueError naming a sequence whose likelihood is zero, since there are no responsibilities then; `before`
+        sequences are in other stacks.
+        """
+        windows = self.windows(stack)
+        outputs = kernels.stacked_log_outputs(
+            stack.columns, windows, self.means, self.whitening, self.log_norm, diagonal
+        )
+        values = kernels.stacked_segments(outputs, stack.offsets, self.log_duration, self.d_min, gamma, counts)
+        if not np.isfinite(values).all():
+            index = int(np.argmin(np.isfinite(values)))
+            raise ValueError(
+                f"the model gives sequence {before + index} of {stack.lengths[index]} frames the likelihood zero: "
+                "its durations exclude this length; train with duration_pseudocount > 0"
+            )
+        return values
+
+    def windows(self, stack: Stack) -> NDArray[np.int64]:
+        """First column that a state can have in each sequence, and the one after the last. Shape (K, N, 2)."""
+        return kernels.segment_windows(stack.offsets, len(self.means), self.d_min, self.log_duration.shape[1])
 
 
 @dataclass(frozen=True)
@@ -107,19 +148,26 @@ class Statistics:
     @classmethod
     def gathered(cls, parameters: Parameters, sequences: Sequence[Floats]) -> "Statistics":
         """E-step over all sequences."""
-        evaluator = Evaluator.of(parameters)
+        return cls.of(parameters, Stack.parts(sequences, len(parameters.means)))
+
+    @classmethod
+    def of(cls, parameters: Parameters, stacks: Sequence[Stack], kind: Covariance = "full") -> "Statistics":
+        """E-step over all stacks; `second` holds diagonals alone if the covariances are diagonal."""
+        evaluator, diagonal = Evaluator.of(parameters), kind == "diagonal"
         n_states, dim = parameters.means.shape
+        gamma, durations = (
+            np.empty((n_states, max(stack.n_frames for stack in stacks))),
+            np.zeros_like(parameters.durations),
+        )
         weight, first, second = np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim))
-        durations = np.zeros_like(parameters.durations)
-        log_likelihood = 0.0
-        for sequence in sequences:
-            value, gamma, counts = evaluator.expectation(sequence)
-            log_likelihood += value
-            durations += counts
-            ends = evaluator.ends(len(sequence))
-            kernels.add_moments(sequence, gamma, ends, evaluator.means, weight, first, second)
-        lower = np.tril(second, -1)
-        second = second + np.swapaxes(lower, 1, 2)
+        log_likelihood, before = 0.0, 0
+        for stack in stacks:
+            values = evaluator.stacked_expectation(stack, gamma, durations, diagonal, before)
+            windows = evaluator.windows(stack)
+            moments = kernels.stacked_moments(stack.columns, windows, gamma, evaluator.means, diagonal)
+            weight, first, second = weight + moments[0], first + moments[1], second + moments[2]
+            log_likelihood += float(values.sum())
+            before += len(values)
         return cls(evaluator.means, weight, first, second, durations, log_likelihood)
 
     def means(self) -> Floats:
@@ -136,33 +184,6 @@ class Statistics:
         return result
 
 
-def covariances_of(scatter: Floats, weight: Floats, regularisation: Regularisation) -> Floats:
-    """Covariances with prior, shrinkage and floor; the exact M-step of the penalised objective once sigma is zero.
-
-    Sigma_i = (scatter_i + kappa target_i) / (weight_i + kappa) + sigma^2 I, eigenvalues not below the floor.
-    """
-    kappa = regularisation.target_frames
-    pooled = scatter + kappa * regularisation.target
-    covariances: Floats = pooled / (weight + kappa)[:, None, None]
-    covariances += regularisation.added_variance * np.eye(scatter.shape[1])
-    return floored(covariances, regularisation.floor_variance)
-
-
-def floored(covariances: Floats, floor_variance: float) -> Floats:
-    """The covariances with every eigenvalue at least `floor_variance`. Shape (N, D, D)."""
-    values, vectors = np.linalg.eigh(0.5 * (covariances + np.swapaxes(covariances, 1, 2)))
-    if (values >= floor_variance).all():
-        return covariances
-    lifted = np.maximum(values, floor_variance)
-    result: Floats = (vectors * lifted[:, None, :]) @ np.swapaxes(vectors, 1, 2)
-    return 0.5 * (result + np.swapaxes(result, 1, 2))
-
-
-def pooled_covariance(scatter: Floats, weight: Floats) -> Floats:
-    """Mean covariance over the states, repeated for each state. Shape (N, D, D)."""
-    return np.broadcast_to(scatter.sum(axis=0) / weight.sum(), scatter.shape)
-
-
 def durations_of(counts: Floats, d_min: int, pseudocount: float) -> Floats:
     """Duration distributions from expected counts. Shape (N, d_max)."""
     raised = counts.copy()
@@ -173,13 +194,8 @@ def durations_of(counts: Floats, d_min: int, pseudocount: float) -> Floats:
 
 def penalty(parameters: Parameters, regularisation: Regularisation) -> float:
     """What makes the log-likelihood the objective that the M-step maximises (inverse Wishart, Dirichlet terms)."""
-    total = 0.0
+    total = log_prior(parameters.covariances, regularisation)
     if regularisation.duration_pseudocount > 0:
         allowed = parameters.durations[:, parameters.d_min - 1 :]
         total += regularisation.duration_pseudocount * float(np.log(allowed).sum())
-    if regularisation.target_frames > 0:
-        log_determinants = np.linalg.slogdet(parameters.covariances)[1]
-        ratio = np.linalg.solve(parameters.covariances, regularisation.target)
-        traces = np.trace(ratio, axis1=1, axis2=2)
-        total -= 0.5 * regularisation.target_frames * float((log_determinants + traces).sum())
     return total

@@ -12,9 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.hmm.compilation import compiled
+from paramove.hmm.gaussians import add_moments, log_outputs, stacked_log_outputs, stacked_moments
+
+__all__ = [
+    "add_moments",
+    "backward",
+    "best_segmentation",
+    "feasible_ends",
+    "forward",
+    "log_outputs",
+    "posteriors",
+    "segment_windows",
+    "stacked_log_outputs",
+    "stacked_moments",
+    "stacked_segments",
+]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+UNDERFLOW = -745.0  # exp of less is zero
 
 
 @compiled
@@ -26,27 +43,6 @@ def feasible_ends(n_states: int, d_min: int, d_max: int, n_frames: int) -> Ints:
         ends[i, 0] = max(i * d_min, n_frames - left * d_max)
         ends[i, 1] = min(i * d_max, n_frames - left * d_min)
     return ends
-
-
-@compiled
-def log_outputs(sequence: Floats, means: Floats, whitening: Floats, log_norm: Floats, ends: Ints) -> Floats:
-    """ln b_i(x_t) of the feasible pairs, -inf elsewhere. `whitening` is the inverse Cholesky factor. Shape (T, N)."""
-    n_frames, dim = sequence.shape
-    n_states = means.shape[0]
-    out = np.full((n_frames, n_states), -np.inf)
-    difference = np.empty(dim)
-    for i in range(n_states):
-        for t in range(ends[i, 0], ends[i + 1, 1]):
-            for k in range(dim):
-                difference[k] = sequence[t, k] - means[i, k]
-            squared = 0.0
-            for row in range(dim):
-                value = 0.0
-                for k in range(row + 1):
-                    value += whitening[i, row, k] * difference[k]
-                squared += value * value
-            out[t, i] = log_norm[i] - 0.5 * squared
-    return out
 
 
 @compiled
@@ -154,25 +150,104 @@ def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends
 
 
 @compiled
-def add_moments(
-    sequence: Floats, gamma: Floats, ends: Ints, reference: Floats, weight: Floats, first: Floats, second: Floats
+def _forward_shares(
+    log_output: Floats, offset: int, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, shares: Floats
 ) -> None:
-    """Add sum gamma, sum gamma (x - ref) and sum gamma (x - ref)(x - ref)^T of one sequence, in place.
+    """As `forward`, and the probability of each last duration given that i states end at t, in `shares[i, t, d - 1]`.
 
-    Moments about a reference near the data keep their precision where moments about zero would cancel.
+    Entries outside the feasible ends are neither read nor written.
     """
-    dim = sequence.shape[1]
-    difference = np.empty(dim)
-    for i in range(reference.shape[0]):
-        for t in range(ends[i, 0], ends[i + 1, 1]):
-            share = gamma[t, i]
-            if share < 1e-14:
+    n_states, d_max = log_duration.shape
+    ending[0, 0] = 0.0
+    for i in range(n_states):
+        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
+            shortest, longest = max(d_min, t - ends[i, 1]), min(d_max, t - ends[i, 0])
+            largest, likeliest, outputs = -np.inf, 0, 0.0
+            for d in range(1, longest + 1):
+                outputs += log_output[i, offset + t - d]
+                if d >= shortest:
+                    term = ending[i, t - d] + log_duration[i, d - 1] + outputs
+                    shares[i, t, d - 1] = term
+                    if term > largest:
+                        largest, likeliest = term, d
+            if largest == -np.inf:
+                ending[i + 1, t] = -np.inf
+                shares[i, t, :] = 0.0
                 continue
-            weight[i] += share
-            for k in range(dim):
-                difference[k] = sequence[t, k] - reference[i, k]
-                first[i, k] += share * difference[k]
-            for row in range(dim):
-                scaled = share * difference[row]
-                for k in range(row + 1):
-                    second[i, row, k] += scaled * difference[k]
+            total = 1.0
+            for d in range(shortest, longest + 1):
+                if d != likeliest:
+                    difference = shares[i, t, d - 1] - largest
+                    shares[i, t, d - 1] = np.exp(difference) if difference > UNDERFLOW else 0.0
+                    total += shares[i, t, d - 1]
+            shares[i, t, likeliest - 1] = 1.0
+            ending[i + 1, t] = largest + np.log(total)
+            for d in range(shortest, longest + 1):
+                shares[i, t, d - 1] /= total
+
+
+@compiled
+def _smooth(
+    offset: int, d_min: int, ends: Ints, shares: Floats, complete: Floats, gamma: Floats, counts: Floats
+) -> None:
+    """Posterior of all segments from the last frame backwards: p(i ends at t | X) times the shares of its durations.
+
+    The same as alpha beta / p(X) (2.14), for what follows t does not depend on what was before, and without any
+    exponential function.
+    """
+    n_states, d_max = counts.shape
+    complete[n_states, ends[n_states, 0]] = 1.0
+    for i in range(n_states - 1, -1, -1):
+        complete[i, ends[i, 0] : ends[i, 1] + 1] = 0.0
+        gamma[i, offset + ends[i, 0] : offset + ends[i + 1, 1]] = 0.0
+        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
+            posterior = complete[i + 1, t]
+            if posterior == 0.0:
+                continue
+            shortest, longest = max(d_min, t - ends[i, 1]), min(d_max, t - ends[i, 0])
+            running = 0.0
+            for d in range(longest, 0, -1):
+                if d >= shortest:
+                    share = posterior * shares[i, t, d - 1]
+                    complete[i, t - d] += share
+                    counts[i, d - 1] += share
+                    running += share
+                gamma[i, offset + t - d] += running
+
+
+@compiled
+def stacked_segments(
+    log_output: Floats, offsets: Ints, log_duration: Floats, d_min: int, gamma: Floats, counts: Floats
+) -> Floats:
+    """E-step over many sequences: log-likelihood of each, shape (K,); -inf where a sequence is impossible.
+
+    Args:
+        log_output: ln b_i of all frames of all sequences, shape (N, frames).
+        offsets: first frame of each sequence, then the number of frames, shape (K + 1,).
+        gamma: responsibilities, written within the feasible windows, shape (N, frames).
+        counts: expected counts of durations, added to, shape (N, d_max).
+    """
+    n_states, d_max = log_duration.shape
+    longest = np.diff(offsets).max()
+    ending, complete = np.empty((n_states + 1, longest + 1)), np.empty((n_states + 1, longest + 1))
+    shares = np.empty((n_states, longest + 1, d_max))
+    log_likelihood = np.empty(len(offsets) - 1)
+    for s in range(len(offsets) - 1):
+        n_frames = offsets[s + 1] - offsets[s]
+        ends = feasible_ends(n_states, d_min, d_max, n_frames)
+        _forward_shares(log_output, offsets[s], log_duration, d_min, ends, ending, shares)
+        log_likelihood[s] = ending[n_states, n_frames]
+        if log_likelihood[s] > -np.inf:
+            _smooth(offsets[s], d_min, ends, shares, complete, gamma, counts)
+    return log_likelihood
+
+
+@compiled
+def segment_windows(offsets: Ints, n_states: int, d_min: int, d_max: int) -> Ints:
+    """First frame that state i can have in each sequence, and the one after the last. Shape (K, N, 2)."""
+    windows = np.empty((len(offsets) - 1, n_states, 2), np.int64)
+    for s in range(len(offsets) - 1):
+        ends = feasible_ends(n_states, d_min, d_max, offsets[s + 1] - offsets[s])
+        windows[s, :, 0] = offsets[s] + ends[:-1, 0]
+        windows[s, :, 1] = offsets[s] + ends[1:, 1]
+    return windows

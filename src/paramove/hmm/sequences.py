@@ -1,11 +1,59 @@
 """Checks and resampling of sequences."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+CACHED_VALUES = 1 << 16
+
+
+@dataclass(frozen=True)
+class Stack:
+    """All frames of several sequences side by side, as the kernels over many sequences take them.
+
+    Attributes:
+        columns: one column per frame, shape (D, frames).
+        offsets: first column of each sequence, then the number of columns, shape (K + 1,).
+    """
+
+    columns: Floats
+    offsets: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, sequences: Sequence[Floats]) -> "Stack":
+        """Stack sequences of shape (T_k, D)."""
+        offsets = np.cumsum([0, *(len(sequence) for sequence in sequences)])
+        columns = np.empty((sequences[0].shape[1], int(offsets[-1])))
+        for sequence, first, end in zip(sequences, offsets[:-1], offsets[1:], strict=True):
+            columns[:, first:end] = sequence.T
+        return cls(columns, offsets)
+
+    @classmethod
+    def parts(cls, sequences: Sequence[Floats], n_states: int) -> "list[Stack]":
+        """Several stacks, so small that what N states make of one stays in the processor's cache."""
+        most = max(1, CACHED_VALUES // n_states)
+        parts: list[list[Floats]] = [[]]
+        filled = 0
+        for sequence in sequences:
+            if parts[-1] and filled + len(sequence) > most:
+                parts.append([])
+                filled = 0
+            parts[-1].append(sequence)
+            filled += len(sequence)
+        return [cls.of(part) for part in parts]
+
+    @property
+    def n_frames(self) -> int:
+        """Of all sequences together."""
+        return int(self.offsets[-1])
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """Number of frames of each sequence. Shape (K,)."""
+        return np.diff(self.offsets)
 
 
 class SequenceLengthError(ValueError):

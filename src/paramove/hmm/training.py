@@ -17,6 +17,7 @@ from paramove.hmm.estimation import (
     pooled_covariance,
 )
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
+from paramove.hmm.sequences import Stack
 
 Floats = NDArray[np.float64]
 logger = logging.getLogger(__name__)
@@ -61,7 +62,9 @@ class ConvergenceMonitor:
 
 def root_mean_deviation(sequences: Sequence[Floats]) -> float:
     """Square root of the mean variance per dimension over all frames: the unit of the option fractions."""
-    return float(np.sqrt(np.concatenate(list(sequences)).var(axis=0).mean()))
+    frames = np.concatenate(list(sequences))
+    frames -= frames.mean(axis=0)
+    return float(np.sqrt(np.vdot(frames, frames) / frames.size))
 
 
 def equal_segments(
@@ -71,14 +74,12 @@ def equal_segments(
     dim = sequences[0].shape[1]
     labels = [np.arange(len(sequence)) * n_states // len(sequence) for sequence in sequences]
     frames, states = np.concatenate(list(sequences)), np.concatenate(labels)
+    frames = frames[np.argsort(states, kind="stable")]
     weight = np.bincount(states, minlength=n_states).astype(np.float64)
-    means = np.zeros((n_states, dim))
-    np.add.at(means, states, frames)
-    means /= weight[:, None]
-    scatter = np.empty((n_states, dim, dim))
-    for i in range(n_states):
-        deviations = frames[states == i] - means[i]
-        scatter[i] = deviations.T @ deviations
+    means, scatter = np.empty((n_states, dim)), np.empty((n_states, dim, dim))
+    for i, part in enumerate(np.split(frames, np.cumsum(weight[:-1]).astype(np.int64))):
+        means[i] = part.mean(axis=0)
+        scatter[i] = (part - means[i]).T @ (part - means[i])
     durations = np.zeros((n_states, d_max))
     durations[:, d_min - 1 :] = 1.0 / (d_max - d_min + 1)
     # The first E-step needs covariances that are safe whatever the options say, hence the pooled one underneath.
@@ -99,11 +100,12 @@ def train(
     Warns (LikelihoodDecreaseWarning) if the objective falls after the annealing.
     """
     scale = root_mean_deviation(sequences)
+    stacks = Stack.parts(sequences, len(initial.means))
     monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
     parameters = initial
     target: Floats | None = None
     for iteration in range(options.max_iterations):
-        statistics = Statistics.gathered(parameters, sequences)
+        statistics = Statistics.of(parameters, stacks)
         means = statistics.means()
         scatter = statistics.scatter(means)
         annealing = iteration < options.annealing_iterations
