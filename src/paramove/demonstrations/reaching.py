@@ -48,9 +48,15 @@ def table_targets(columns: int, rows: int, height: float = 0.07) -> tuple[Floats
     u runs from the person's left to the right, v away from the person. Shapes (M, 3), m, and (M, 2).
     """
     u, v = np.meshgrid(np.linspace(0.0, 1.0, columns), np.linspace(0.0, 1.0, rows), indexing="ij")
+    coordinates = np.stack([u, v], axis=-1).reshape(-1, 2)
+    return table_place(coordinates, height), coordinates
+
+
+def table_place(coordinates: ArrayLike, height: float = 0.07) -> Floats:
+    """The place (..., 3), m, of coordinates (u, v) (..., 2) on the table region of `table_targets`."""
+    u, v = np.moveaxis(np.asarray(coordinates, dtype=np.float64), -1, 0)
     x, y, _ = RESTING_SHOULDER
-    targets = np.stack([x + 0.20 + 0.30 * v, y + 0.40 - 0.80 * u, np.full_like(u, height)], axis=-1)
-    return targets.reshape(-1, 3), np.stack([u, v], axis=-1).reshape(-1, 2)
+    return np.stack([x + 0.20 + 0.30 * v, y + 0.40 - 0.80 * u, np.full_like(u, height)], axis=-1)
 
 
 def demonstrations_at(
