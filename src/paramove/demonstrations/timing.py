@@ -45,14 +45,15 @@ def speeds(movement: Movement, point: str = FINGERTIP) -> Floats:
     path = movement.point(point)
     period = float(np.median(np.diff(movement.time)))
     count = int(np.floor(movement.duration / period + 1e-6)) + 1
-    even: Floats = np.arange(count) * period  # the filter needs equal steps, recordings may have others
+    even = np.arange(count) * period  # the filter needs equal steps, recordings may have others
     spaced = np.stack([np.interp(even, movement.time, path[:, axis]) for axis in range(3)], axis=-1)
     window = min(2 * round(0.5 * SPEED_WINDOW / period) + 1, count - 1 + count % 2)
     if window < 3:
         velocity: Floats = np.asarray(np.gradient(spaced, period, axis=0), dtype=np.float64)
     else:
         velocity = savgol_filter(spaced, window, min(2, window - 1), deriv=1, delta=period, axis=0)
-    result: Floats = np.interp(movement.time, even, np.linalg.norm(velocity, axis=1)).astype(np.float64)
+    magnitude = np.linalg.norm(velocity, axis=1)
+    result: Floats = np.interp(movement.time, even, magnitude)
     return result
 
 

@@ -1,0 +1,201 @@
+"""BVH files: a hierarchy of joints and the rotations of each; the points are the joints' places by forward kinematics.
+
+A joint's place is its parent's place plus its OFFSET turned by all rotations above it. Rotations are about the joint's
+own axes in the order in which its channels are listed, in degrees. Position channels stand in place of the OFFSET. The
+end of a limb ("End Site") is a point too: `<joint>_end`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.movement import DemonstrationError, Floats
+
+CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint, or the end of a limb.
+
+    Attributes:
+        name: Unique in its file.
+        parent: Number of its parent, which comes before it; -1 of the root.
+        offset: From the parent, at rest. Shape (3,).
+        channels: Such as "Xposition", in the order of the file.
+    """
+
+    name: str
+    parent: int
+    offset: Floats
+    channels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Hierarchy and values of all channels, shape (T, C); frame time in s."""
+
+    joints: tuple[Joint, ...]
+    values: Floats
+    frame_time: float
+
+
+def read_bvh(path: Path) -> list[RawTake]:
+    """Places of all joints over time. BVH tells no unit; by custom y points up, z forward, x left.
+
+    Raises DemonstrationError with the line of what is wrong.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="strict")
+    except UnicodeDecodeError as error:
+        raise DemonstrationError(f"{path} is no text, so no BVH file: {error}") from error
+    motion = parse(text, str(path))
+    names = tuple(joint.name for joint in motion.joints)
+    positions = joint_positions(motion.joints, motion.values)
+    time: Floats = np.arange(len(positions), dtype=np.float64) * motion.frame_time
+    return [RawTake(path.stem, time, positions, names, axes="y_up")]
+
+
+def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
+    """Forward kinematics. Shapes: values (T, C), C channels of all joints in their order -> (T, J, 3)."""
+    places = np.zeros((len(values), len(joints), 3))
+    turns: list[NDArray[np.float64]] = []
+    column = 0
+    for number, joint in enumerate(joints):
+        place = np.broadcast_to(joint.offset, (len(values), 3)).copy()
+        turn = np.broadcast_to(np.eye(3), (len(values), 3, 3))
+        for channel in joint.channels:
+            axis, kind = channel[0].lower(), channel[1:].lower()
+            if kind == "position":
+                place[:, "xyz".index(axis)] = values[:, column]
+            else:
+                turn = turn @ Rotation.from_euler(axis, values[:, column], degrees=True).as_matrix()
+            column += 1
+        if joint.parent >= 0:
+            above = turns[joint.parent]
+            place = places[:, joint.parent] + np.einsum("tij,tj->ti", above, place)
+            turn = above @ turn
+        places[:, number] = place
+        turns.append(np.asarray(turn))
+    return places
+
+
+def parse(text: str, source: str) -> Motion:
+    """A BVH text; raises DemonstrationError with `source` and line of what is wrong."""
+    return _Parser(text, source).motion()
+
+
+class _Parser:
+    def __init__(self, text: str, source: str) -> None:
+        self._source = source
+        self._words = list(_words(text))
+        self._at = 0
+        self._joints: list[Joint] = []
+
+    def motion(self) -> Motion:
+        self._expect("HIERARCHY")
+        self._expect("ROOT")
+        self._joint(self._next("the name of the root"), -1)
+        self._expect("MOTION")
+        self._expect("Frames:")
+        frames = self._number("how many frames there are")
+        self._expect("Frame")
+        self._expect("Time:")
+        frame_time = self._number("the time of a frame in seconds")
+        if not 0.0 < frame_time < 10.0:
+            raise self._wrong(f"a frame time of {frame_time:g} s; expected such as 0.0083333")
+        return Motion(tuple(self._joints), self._values(frames), frame_time)
+
+    def _joint(self, name: str, parent: int) -> None:
+        if any(joint.name == name for joint in self._joints):
+            raise self._wrong(f"a second joint '{name}'; each needs a name of its own")
+        number = len(self._joints)
+        self._joints.append(Joint(name, parent, np.zeros(3)))
+        self._expect("{")
+        self._expect("OFFSET")
+        offset = np.array([self._number("an offset") for _ in range(3)])
+        channels = self._channels() if self._peek() == "CHANNELS" else ()
+        self._joints[number] = Joint(name, parent, offset, channels)
+        while (word := self._next("JOINT, End Site or }")) != "}":
+            if word == "JOINT":
+                self._joint(self._next("the name of a joint"), number)
+            elif word == "End":
+                self._expect("Site")
+                self._joint(f"{name}_end", number)
+            else:
+                raise self._wrong(f"'{word}'; expected JOINT, End Site or }}")
+
+    def _channels(self) -> tuple[str, ...]:
+        self._expect("CHANNELS")
+        count = self._number("how many channels there are")
+        found = tuple(self._next("the name of a channel") for _ in range(int(count)))
+        for name in found:
+            if not CHANNEL.fullmatch(name):
+                raise self._wrong(f"channel '{name}'; expected such as Xposition or Zrotation")
+        return found
+
+    def _values(self, frames: float) -> Floats:
+        width = sum(len(joint.channels) for joint in self._joints)
+        words = [word for _, word in self._words[self._at :]]
+        line = self._words[self._at][0] if words else 0
+        try:
+            values = np.array(words, dtype=np.float64)
+        except ValueError as error:
+            at = next(n for n, word in enumerate(words) if not _is_number(word))
+            raise self._wrong(f"'{words[at]}' is no number", self._words[self._at + at][0]) from error
+        if values.size != width * frames or frames < 1 or width == 0:
+            raise self._wrong(
+                f"{values.size} numbers follow; {frames:g} frames of {width} channels need {width * frames:g}. "
+                "The file is cut off, or its number of frames is wrong",
+                line,
+            )
+        if not np.isfinite(values).all():
+            at = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise self._wrong(f"{words[at]} in frame {at // width}", self._words[self._at + at][0])
+        return values.reshape(-1, width)
+
+    def _peek(self) -> str:
+        return self._words[self._at][1] if self._at < len(self._words) else ""
+
+    def _next(self, what: str) -> str:
+        if self._at == len(self._words):
+            raise self._wrong(f"the file ends; expected {what}")
+        self._at += 1
+        return self._words[self._at - 1][1]
+
+    def _expect(self, word: str) -> None:
+        found = self._next(word)
+        if found.upper() != word.upper():
+            raise self._wrong(f"'{found:.40}'; expected {word}")
+
+    def _number(self, what: str) -> float:
+        word = self._next(what)
+        if not _is_number(word) or not np.isfinite(float(word)):
+            raise self._wrong(f"'{word:.40}'; expected {what}")
+        return float(word)
+
+    def _wrong(self, message: str, line: int = 0) -> DemonstrationError:
+        line = line or (self._words[max(self._at - 1, 0)][0] if self._words else 1)
+        return DemonstrationError(f"{self._source}:{line}: {message}")
+
+
+def _words(text: str) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(text.splitlines(), start=1):
+        for word in line.split():
+            yield number, word
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

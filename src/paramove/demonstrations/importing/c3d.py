@@ -1,0 +1,48 @@
+"""C3D files, the exchange format of motion capture; read by ezc3d in a process of its own.
+
+A damaged file can hang or crash ezc3d, so it is given a time limit and harms nobody.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.importing import c3d_process
+from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.movement import DemonstrationError
+
+TIME_LIMIT_S = 120.0
+
+
+def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
+    """Points, names, unit and rate. Analog channels are not read; C3D does not tell which way its axes point.
+
+    Raises DemonstrationError if the file cannot be read, which names the reader's complaint.
+    """
+    with tempfile.TemporaryDirectory(prefix="paramove-c3d-") as folder:
+        result = Path(folder) / "result.npz"
+        command = [sys.executable, c3d_process.__file__, str(path), str(result)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=time_limit_s, check=False)
+        except subprocess.TimeoutExpired as error:
+            raise DemonstrationError(f"{path} is not read within {time_limit_s:g} s: a damaged C3D file") from error
+        if done.returncode != 0 or not result.is_file():
+            said = " ".join(done.stderr.split())[-300:] or f"the reader ended with {done.returncode}"
+            raise DemonstrationError(f"{path} cannot be read as C3D: {said}; export it again")
+        with np.load(result, allow_pickle=False) as arrays:
+            found = {key: arrays[key] for key in arrays.files}
+    positions = np.asarray(found["positions"], dtype=np.float64)
+    names = tuple(str(name).strip() for name in found["points"])
+    rate_hz = float(found["rate_hz"])
+    if positions.shape[1] != len(names) or len(set(names)) < len(names) or not positions.size:
+        raise DemonstrationError(
+            f"{path} has {len(positions)} frames of {positions.shape[1]} points with {len(set(names))} names; "
+            "expected points that have a name each"
+        )
+    time = np.arange(len(positions)) / rate_hz if np.isfinite(rate_hz) and rate_hz > 0.0 else None
+    return [RawTake(path.stem, time, positions, names, str(found["unit"]).strip() or None)]

@@ -1,0 +1,114 @@
+"""One file of motion capture, of whatever kind, as takes for a demonstration set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.gaps import fill_gaps
+from paramove.demonstrations.importing.bvh import read_bvh
+from paramove.demonstrations.importing.c3d import read_c3d
+from paramove.demonstrations.importing.conversion import ImportOptions, converted
+from paramove.demonstrations.importing.csv_file import read_csv
+from paramove.demonstrations.importing.npz import read_npz
+from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.movement import DemonstrationError
+from paramove.demonstrations.writing import Label, Take, recording_name
+
+READERS: dict[str, Callable[[Path], list[RawTake]]] = {
+    ".c3d": read_c3d,
+    ".bvh": read_bvh,
+    ".csv": read_csv,
+    ".tsv": read_csv,
+}
+SUFFIXES = (*READERS, ".npz")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What a file gave.
+
+    Attributes:
+        takes: In metres, x forward, y left, z up.
+        parameter_names: Of theta, as the file has them; () if it has no labels.
+        remarks: What was left out or will be filled.
+        refused: Labelled movements in which a point is lost for too long; they are not among the labels.
+    """
+
+    takes: tuple[Take, ...]
+    parameter_names: tuple[str, ...]
+    remarks: tuple[str, ...]
+    refused: tuple[str, ...]
+
+
+def import_file(
+    path: Path, options: ImportOptions, label: Label | None = None, max_gap: float = 0.1, name: str | None = None
+) -> Imported:
+    """Reads a file and checks its labelled movements for lost points.
+
+    Args:
+        path: Of one of `SUFFIXES`.
+        options: What the file does not tell.
+        label: What a file without labels shows; its `end` may be 0 for the last frame. None: it is left unlabelled.
+        max_gap: s; a point may be lost for so long in a labelled movement.
+        name: Begin of the recordings' names; None: the file's.
+
+    Raises DemonstrationError if the file is missing, damaged or of no known kind.
+    """
+    if not path.is_file():
+        raise DemonstrationError(f"there is no file {path}", missing=True)
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        raws, remarks = read_npz(path)
+    elif suffix in READERS:
+        raws, remarks = READERS[suffix](path), []
+    else:
+        raise DemonstrationError(f"{path}: files of motion capture end in {', '.join(SUFFIXES)}")
+    takes, refused = [], []
+    for raw in raws:
+        take = converted(raw, options, path)
+        if name is not None:
+            take = replace(take, recording=recording_name(name + raw.name.removeprefix(path.stem)))
+        if not take.labels and label is not None:
+            take = replace(take, labels=(replace(label, end=label.end or len(take.time)),))
+        sound, said, wrong = _checked(take, path, max_gap)
+        takes.append(sound)
+        remarks += said
+        refused += wrong
+    return Imported(tuple(takes), raws[0].parameter_names, tuple(remarks), tuple(refused))
+
+
+def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], list[str]]:
+    """The take with the labels of those movements in which no point is lost for too long; remarks; refusals."""
+    _, filled, left = fill_gaps(take.time, take.positions, take.point_names, max_gap)
+    labels, remarks, refused = [], [], []
+    for label in take.labels:
+        what = f"{path}: {label.action}, frames {label.first}-{label.end - 1}"
+        if not 0 <= label.first < label.end - 1 <= len(take.time) - 1:
+            refused.append(f"{what}: the file has frames 0-{len(take.time) - 1}, and a movement has at least 2")
+            continue
+        open_gaps = [gap for gap in left if gap.end > label.first and gap.first < label.end]
+        shut = [gap for gap in filled if gap.end > label.first and gap.first < label.end]
+        if open_gaps:
+            gaps = "; ".join(map(str, open_gaps[:4])) + _more(len(open_gaps) - 4)
+            always = [gap.point for gap in open_gaps if gap.end - gap.first == len(take.time)]
+            hint = (
+                f" {', '.join(always)} is never seen: is it (0, 0, 0) on purpose (--zeros-are-places)?"
+                if always
+                else ""
+            )
+            refused.append(f"{what}: lost for longer than {max_gap:g} s: {gaps}.{hint}")
+            continue
+        if shut:
+            remarks.append(f"{what}: filled {'; '.join(map(str, shut[:4]))}{_more(len(shut) - 4)}")
+        labels.append(label)
+    if not np.isfinite(take.positions).any():
+        refused.append(f"{path}: no point is seen in any frame")
+    return replace(take, labels=tuple(labels)), remarks, refused
+
+
+def _more(count: int) -> str:
+    return f" and {count} more" if count > 0 else ""

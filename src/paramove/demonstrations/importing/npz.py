@@ -1,0 +1,106 @@
+"""NPZ files: one take as plain arrays, or many labelled movements in one file.
+
+One take: `positions` (T, P, 3) or (T, 3 P); `points`, names; `time` (T,), s, or `rate_hz` or `fps`; `unit`; `axes`.
+
+Many: `flat` (frames, 3 P), `flat_time`, `offsets` (movements + 1,), `points`, `unit`, `axes`, and for each movement
+`action`, `target` (3,), `subject`, `repetition`, `segment` (first frame, one past the last), `ok`, `reason`; `hand`.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.writing import Label
+
+TARGET = ("target_x", "target_y", "target_z")
+SIDES = {"L": "left", "R": "right", "left": "left", "right": "right"}
+Arrays = dict[str, Any]
+
+
+def read_npz(path: Path) -> tuple[list[RawTake], list[str]]:
+    """Takes, and remarks on movements that are left out: those marked as not ok, and those without a target.
+
+    Raises DemonstrationError for arrays that are missing or do not fit together.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
+        raise DemonstrationError(f"{path} cannot be read as NPZ: {error}; arrays of objects are refused") from error
+    try:
+        return _many(path, arrays) if "flat" in arrays else ([_one(path, arrays)], [])
+    except KeyError as error:
+        there = ", ".join(sorted(arrays))
+        raise DemonstrationError(f"{path}: the array {error} is missing; there are {there}") from error
+    except (IndexError, ValueError, TypeError) as error:
+        if isinstance(error, DemonstrationError):
+            raise
+        raise DemonstrationError(f"{path}: its arrays do not fit together: {error}") from error
+
+
+def _one(path: Path, arrays: Arrays) -> RawTake:
+    names = tuple(str(name) for name in np.atleast_1d(arrays["points"]))
+    positions = np.asarray(arrays["positions"], dtype=np.float64)
+    if positions.size != len(positions) * len(names) * 3 or positions.ndim not in (2, 3):
+        raise DemonstrationError(
+            f"{path}: positions have shape {positions.shape}; {len(names)} points need (T, {len(names)}, 3)"
+        )
+    rate = next((float(arrays[key]) for key in ("rate_hz", "fps") if key in arrays), None)
+    time = np.asarray(arrays["time"], dtype=np.float64) if "time" in arrays else None
+    if time is None and rate is not None:
+        time = np.arange(len(positions)) / rate
+    if time is not None and time.shape != (len(positions),):
+        raise DemonstrationError(f"{path}: {len(positions)} frames have times of shape {time.shape}")
+    unit, axes = (str(arrays[key]) if key in arrays else None for key in ("unit", "axes"))
+    return RawTake(path.stem, time, positions.reshape(len(positions), -1, 3), names, unit, axes)
+
+
+def _many(path: Path, arrays: Arrays) -> tuple[list[RawTake], list[str]]:
+    names = tuple(str(name) for name in arrays["points"])
+    flat = np.asarray(arrays["flat"], dtype=np.float64).reshape(len(arrays["flat_time"]), len(names), 3)
+    offsets = arrays["offsets"].astype(int)
+    without, takes, left_out = 0, [], []
+    for number in range(len(arrays["action"])):
+        if not arrays["ok"][number]:
+            left_out.append(f"{number} ({arrays['reason'][number] or 'not ok'})")
+        elif not np.isfinite(arrays["target"][number]).all():
+            without += 1
+        else:
+            inside = slice(int(offsets[number]), int(offsets[number + 1]))
+            takes.append(_take(path, arrays, number, flat[inside], names))
+    remarks = [f"{path}: left out as the file says: movements {', '.join(left_out)}"] if left_out else []
+    if without:
+        remarks.append(f"{path}: left out {without} movements that have no target")
+    if not takes:
+        raise DemonstrationError(f"{path} has no movement that is ok and has a target")
+    return takes, remarks
+
+
+def _take(path: Path, arrays: Arrays, number: int, positions: Floats, names: tuple[str, ...]) -> RawTake:
+    begin, end = int(arrays["offsets"][number]), int(arrays["offsets"][number + 1])
+    time = np.asarray(arrays["flat_time"][begin:end], dtype=np.float64)
+    first, last = (int(frame) for frame in arrays["segment"][number])
+    if not 0 <= first < last - 1 <= len(time) - 1:
+        raise DemonstrationError(
+            f"{path}: movement {number} has the segment {first} to {last} of {len(time)} frames; "
+            "expected its first frame and one past its last"
+        )
+    subject = str(arrays["subject"][number])
+    side = SIDES[str(arrays["hand"][number])] if "hand" in arrays else "right"
+    label = Label(
+        first,
+        last,
+        str(arrays["action"][number]),
+        tuple(float(value) for value in arrays["target"][number]),
+        subject,
+        int(arrays["repetition"][number]),
+        "left" if side == "left" else "right",
+    )
+    unit, axes = str(arrays["unit"]), str(arrays["axes"])
+    return RawTake(f"{path.stem}_subject_{subject}", time, positions, names, unit, axes, (label,), TARGET)
