@@ -30,7 +30,7 @@ def _compile() -> None:
     import numpy as np
 
     from paramove.alignment import warp
-    from paramove.hmm import LeftRightHMM
+    from paramove.hmm import GaussianHMM, LeftRightHMM, TrainingOptions
 
     rng = np.random.default_rng(0)
     line = np.linspace(0.0, 1.0, 30)[:, None] + [0.0, 1.0]
@@ -38,6 +38,9 @@ def _compile() -> None:
     model = LeftRightHMM(n_states=5, d_min=2, d_max=8).fit(sequences)
     model.log_likelihood(sequences[0])
     model.decode(sequences[0])
+    once = TrainingOptions(max_iterations=1)
+    GaussianHMM(n_states=5, finish_state=True, options=once).fit(sequences).decode(sequences[0])
+    GaussianHMM(n_states=2, topology="ergodic", options=once).fit(sequences)
     warp(sequences[0], sequences[1], "A")
     warp(sequences[0], sequences[1], "B")
 

@@ -18,6 +18,7 @@ from paramove.hmm.sequences import Stack
 
 __all__ = [
     "Evaluator",
+    "Moments",
     "Parameters",
     "Statistics",
     "covariances_of",
@@ -29,6 +30,7 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+UNSEEN = 1e-20  # frames; responsibilities below 1e-30 are left out of the moments
 
 
 @dataclass(frozen=True)
@@ -135,13 +137,54 @@ class Evaluator:
 
 
 @dataclass(frozen=True)
-class Statistics:
-    """Pooled sufficient statistics; moments are taken about `reference`, shape (N, D)."""
+class Moments:
+    """Sums over frames of gamma, gamma (x - ref) and gamma (x - ref)(x - ref)^T for each state.
+
+    Attributes:
+        reference: shape (N, D).
+        weight: shape (N,).
+        first: shape (N, D).
+        second: shape (N, D, D).
+    """
 
     reference: Floats
     weight: Floats
     first: Floats
     second: Floats
+
+    @classmethod
+    def none(cls, reference: Floats) -> "Moments":
+        """Of no frames."""
+        n_states, dim = reference.shape
+        return Moments(reference, np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim)))
+
+    def plus(self, weight: Floats, first: Floats, second: Floats) -> "Moments":
+        """With those of more frames."""
+        return Moments(self.reference, self.weight + weight, self.first + first, self.second + second)
+
+    def unseen(self) -> NDArray[np.bool_]:
+        """States that practically no frame belongs to. Shape (N,)."""
+        return self.weight < UNSEEN
+
+    def means(self) -> Floats:
+        """Weighted means, corrected (2.23) and (3.7); of an unseen state the reference. Shape (N, D)."""
+        unseen = self.unseen()
+        result: Floats = self.reference + self.first * (~unseen / np.where(unseen, 1.0, self.weight))[:, None]
+        return result
+
+    def scatter(self, means: Floats) -> Floats:
+        """Sum of gamma (x - mu)(x - mu)^T about the given means. Shape (N, D, D)."""
+        shift = means - self.reference
+        cross = self.first[:, :, None] * shift[:, None, :]
+        squared = self.weight[:, None, None] * shift[:, :, None] * shift[:, None, :]
+        result: Floats = self.second - cross - np.swapaxes(cross, 1, 2) + squared
+        return result
+
+
+@dataclass(frozen=True)
+class Statistics(Moments):
+    """Pooled sufficient statistics, with expected counts of durations (N, d_max)."""
+
     durations: Floats
     log_likelihood: float
 
@@ -154,34 +197,17 @@ class Statistics:
     def of(cls, parameters: Parameters, stacks: Sequence[Stack], kind: Covariance = "full") -> "Statistics":
         """E-step over all stacks; `second` holds diagonals alone if the covariances are diagonal."""
         evaluator, diagonal = Evaluator.of(parameters), kind == "diagonal"
-        n_states, dim = parameters.means.shape
-        gamma, durations = (
-            np.empty((n_states, max(stack.n_frames for stack in stacks))),
-            np.zeros_like(parameters.durations),
-        )
-        weight, first, second = np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim))
+        moments, durations = Moments.none(evaluator.means), np.zeros_like(parameters.durations)
+        gamma = np.empty((len(parameters.means), max(stack.n_frames for stack in stacks)))
         log_likelihood, before = 0.0, 0
         for stack in stacks:
             values = evaluator.stacked_expectation(stack, gamma, durations, diagonal, before)
-            windows = evaluator.windows(stack)
-            moments = kernels.stacked_moments(stack.columns, windows, gamma, evaluator.means, diagonal)
-            weight, first, second = weight + moments[0], first + moments[1], second + moments[2]
+            moments = moments.plus(
+                *kernels.stacked_moments(stack.columns, evaluator.windows(stack), gamma, evaluator.means, diagonal)
+            )
             log_likelihood += float(values.sum())
             before += len(values)
-        return cls(evaluator.means, weight, first, second, durations, log_likelihood)
-
-    def means(self) -> Floats:
-        """Weighted means, corrected (2.23) and (3.7). Shape (N, D)."""
-        result: Floats = self.reference + self.first / self.weight[:, None]
-        return result
-
-    def scatter(self, means: Floats) -> Floats:
-        """Sum of gamma (x - mu)(x - mu)^T about the given means. Shape (N, D, D)."""
-        shift = means - self.reference
-        cross = self.first[:, :, None] * shift[:, None, :]
-        squared = self.weight[:, None, None] * shift[:, :, None] * shift[:, None, :]
-        result: Floats = self.second - cross - np.swapaxes(cross, 1, 2) + squared
-        return result
+        return cls(moments.reference, moments.weight, moments.first, moments.second, durations, log_likelihood)
 
 
 def durations_of(counts: Floats, d_min: int, pseudocount: float) -> Floats:

@@ -7,9 +7,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.hmm import kernels, synthesis
+from paramove.hmm.covariances import Covariance, check_kind
 from paramove.hmm.estimation import Evaluator, Parameters
+from paramove.hmm.filtering import DurationFilter
 from paramove.hmm.options import TrainingOptions, TrainingSummary
-from paramove.hmm.sequences import check_length, checked_sequence, checked_sequences
+from paramove.hmm.sequences import (
+    SequenceLengthError,
+    check_demonstrations,
+    check_length,
+    checked_sequence,
+    checked_sequences,
+)
 from paramove.hmm.training import equal_segments, train
 
 Floats = NDArray[np.float64]
@@ -17,7 +25,7 @@ Ints = NDArray[np.int64]
 
 
 class LeftRightHMM:
-    """A movement as N states passed in order, each for d_min to d_max frames, with full-covariance Gaussian outputs.
+    """A movement as N states passed in order, each for d_min to d_max frames, with Gaussian outputs.
 
     Thesis 2.2.3.1 (finish state) and 2.2.3.2 (explicit time restrictions), in the explicit-duration form, which gives
     the same likelihood as the expanded states (corrected statistics, see `paramove.hmm.estimation`).
@@ -25,6 +33,7 @@ class LeftRightHMM:
     Args:
         n_states: N.
         d_min, d_max: least and most frames of each state.
+        covariance: "full"; "diagonal", which takes dimensions as independent; "tied", one for all states.
         options: how it is trained.
 
     Attributes:
@@ -34,16 +43,25 @@ class LeftRightHMM:
         training_: what training did; None if the parameters were given.
 
     Raises:
-        ValueError: for counts below 1 or d_min > d_max.
+        ValueError: for counts below 1, d_min > d_max or an unknown covariance.
     """
 
-    def __init__(self, n_states: int, d_min: int, d_max: int, *, options: TrainingOptions | None = None) -> None:
+    def __init__(
+        self,
+        n_states: int,
+        d_min: int,
+        d_max: int,
+        *,
+        covariance: Covariance = "full",
+        options: TrainingOptions | None = None,
+    ) -> None:
         if n_states < 1 or not 1 <= d_min <= d_max:
             raise ValueError(
                 "n_states is at least 1 and 1 <= d_min <= d_max, found "
                 f"n_states={n_states}, d_min={d_min}, d_max={d_max}"
             )
-        self.n_states, self.d_min, self.d_max = n_states, d_min, d_max
+        check_kind(covariance)
+        self.n_states, self.d_min, self.d_max, self.covariance = n_states, d_min, d_max, covariance
         self.options = options if options is not None else TrainingOptions()
         self.training_: TrainingSummary | None = None
         self._parameters: Parameters | None = None
@@ -81,13 +99,18 @@ class LeftRightHMM:
     def fit(self, sequences: Sequence[ArrayLike]) -> Self:
         """Train by Baum-Welch on sequences of shape (T_k, D), lengths between N d_min and N d_max.
 
-        Raises SequenceLengthError for an impossible length and ValueError for bad values.
+        Raises SequenceLengthError for an impossible length and ValueError for bad values, copies and dimensions that
+        never change; the sequence or dimension is named.
         """
         checked = checked_sequences(sequences)
-        for sequence in checked:
-            check_length(len(sequence), self.n_states, self.d_min, self.d_max)
-        initial = equal_segments(checked, self.n_states, self.d_min, self.d_max, self.options)
-        self._parameters, self.training_ = train(initial, checked, self.options)
+        for index, sequence in enumerate(checked):
+            try:
+                check_length(len(sequence), self.n_states, self.d_min, self.d_max)
+            except SequenceLengthError as error:
+                raise SequenceLengthError(f"sequence {index}: {error}") from error
+        check_demonstrations(checked, self.options.floor_deviation)
+        initial = equal_segments(checked, self.n_states, self.d_min, self.d_max, self.options, self.covariance)
+        self._parameters, self.training_ = train(initial, checked, self.options, self.covariance)
         self._evaluator = None
         return self
 
@@ -112,25 +135,33 @@ class LeftRightHMM:
         outputs, ends = ready.log_outputs(checked), ready.ends(len(checked))
         return kernels.best_segmentation(outputs, ready.log_duration, self.d_min, ends)[1]
 
+    def filter(self) -> DurationFilter:
+        """State probabilities of a new movement, frame by frame without lookahead."""
+        ready = self._ready()
+        return DurationFilter(self.durations_, ready.means, ready.whitening, ready.log_norm)
+
     def expected_durations(self) -> Floats:
         """Expected number of frames of each state (2.28). Shape (N,)."""
         return synthesis.expected_durations(self.durations_)
 
     def synthesize(self, n_samples: int | None = None, timing: synthesis.Timing = "uniform") -> Floats:
         """The prototype movement (method D): means in order, linearly interpolated. Shape (n_samples, D)."""
-        return synthesis.prototype(self.means_, self.durations_, n_samples, timing)
+        return synthesis.prototype(self.means_, self.expected_durations(), n_samples, timing)
 
     def sample(self, rng: np.random.Generator) -> Floats:
         """One sequence drawn from the model (method A). Shape (T, D)."""
-        return synthesis.sampled(self.means_, self.covariances_, self.durations_, rng)
+        return synthesis.emitted(self._path(rng), self.means_, self.covariances_, rng)
 
     def sample_average(self, rng: np.random.Generator, n_sequences: int = 100) -> Floats:
         """The average of many drawn sequences (method B). Shape (T, D)."""
-        return synthesis.averaged(self.means_, self.covariances_, self.durations_, rng, n_sequences)
+        return synthesis.averaged([self.sample(rng) for _ in range(n_sequences)])
 
     def sample_spline(self, rng: np.random.Generator) -> Floats:
         """A spline through one drawn output per state (method C). Shape (T, D)."""
-        return synthesis.splined(self.means_, self.covariances_, self.durations_, rng)
+        return synthesis.splined(self._path(rng), self.means_, self.covariances_, rng)
+
+    def _path(self, rng: np.random.Generator) -> Ints:
+        return np.repeat(np.arange(self.n_states), synthesis.drawn_durations(self.durations_, rng))
 
     def _ready(self) -> Evaluator:
         if self._evaluator is None:

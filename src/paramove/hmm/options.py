@@ -21,7 +21,10 @@ class TrainingOptions:
         prior_fraction: initial deviation sigma; sigma^2 I is added after each M-step while it lasts.
         floor_fraction: least standard deviation of an output distribution in any direction, for ever.
         shrinkage_frames: weight, in frames, of the pooled covariance in each covariance.
-        duration_pseudocount: added to the count of each duration, so that no allowed duration becomes impossible.
+        duration_pseudocount: added to the count of each duration, so that no allowed duration becomes impossible; for a
+            plain chain, to the count of each allowed transition, start and exit.
+        floor_deviation: least standard deviation in the data's unit; the larger of the two floors holds. With it,
+            dimensions that never change may be trained.
     """
 
     max_iterations: int = 20
@@ -31,13 +34,14 @@ class TrainingOptions:
     floor_fraction: float = 0.005
     shrinkage_frames: float = 10.0
     duration_pseudocount: float = 0.5
+    floor_deviation: float = 0.0
 
     def __post_init__(self) -> None:
         if self.max_iterations < 1:
             raise ValueError(f"max_iterations is at least 1, found {self.max_iterations}")
         for name, value in vars(self).items():
-            if value < 0:
-                raise ValueError(f"{name} is not negative, found {value}")
+            if not 0 <= value < np.inf:
+                raise ValueError(f"{name} is finite and not negative, found {value}")
 
     @classmethod
     def maximum_likelihood(cls, max_iterations: int = 20) -> "TrainingOptions":

@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 CACHED_VALUES = 1 << 16
+LARGEST = 1e100
+LEAST_SPREAD = 1e-100
 
 
 @dataclass(frozen=True)
@@ -65,16 +67,27 @@ def checked_sequence(sequence: ArrayLike, dim: int | None = None) -> Floats:
 
     Raises ValueError for a wrong shape, a wrong dimension or values that are not finite.
     """
-    array = np.ascontiguousarray(sequence, dtype=np.float64)
-    if array.ndim != 2 or array.shape[0] == 0:
+    try:
+        array = np.ascontiguousarray(sequence, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            "a sequence is an array of numbers of shape (frames, dimensions), each frame with as many; "
+            f"this one cannot be read as such: {error}"
+        ) from error
+    if array.ndim != 2 or array.shape[0] == 0 or array.shape[1] == 0:
         raise ValueError(f"a sequence has shape (frames, dimensions) with at least one frame, found {array.shape}")
     if dim is not None and array.shape[1] != dim:
         raise ValueError(f"the model describes {dim} dimensions per frame, the sequence has {array.shape[1]}")
+    largest = np.abs(array).max()
+    if largest <= LARGEST:  # false for NaN too
+        return array
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise ValueError(f"{int(bad.sum())} of {len(array)} frames hold values that are not finite; "
                          f"the first is frame {int(bad.argmax())}; fill or cut them")  # fmt: skip
-    return array
+    raise ValueError(
+        f"values up to {largest:.3g} cannot be squared and summed; check the unit, use at most {LARGEST:g}"
+    )
 
 
 def checked_sequences(sequences: Sequence[ArrayLike]) -> list[Floats]:
@@ -84,10 +97,47 @@ def checked_sequences(sequences: Sequence[ArrayLike]) -> list[Floats]:
     checked: list[Floats] = []
     for index, sequence in enumerate(sequences):
         try:
-            checked.append(checked_sequence(sequence, checked[0].shape[1] if checked else None))
+            array = checked_sequence(sequence)
         except ValueError as error:
             raise ValueError(f"sequence {index}: {error}") from error
+        if checked and array.shape[1] != checked[0].shape[1]:
+            raise ValueError(
+                f"sequence {index}: it has {array.shape[1]} dimensions, sequence 0 has {checked[0].shape[1]}; "
+                "give all the same columns"
+            )
+        checked.append(array)
     return checked
+
+
+def check_demonstrations(sequences: Sequence[Floats], floor_deviation: float) -> None:
+    """Raise ValueError for sequences that no model can learn from, with the sequence or dimension and the remedy.
+
+    These are sequences of one frame, copies of another one, and dimensions that never change, unless a floor in the
+    data's unit says how exactly they are known.
+    """
+    seen: dict[tuple[int, bytes, bytes], list[int]] = {}
+    for index, sequence in enumerate(sequences):
+        if len(sequence) < 2:
+            raise ValueError(f"sequence {index}: it has one frame, which is no movement; give at least 2 frames")
+        alike = seen.setdefault((len(sequence), sequence[0].tobytes(), sequence[-1].tobytes()), [])
+        for other in alike:
+            if np.array_equal(sequences[other], sequence):
+                raise ValueError(
+                    f"sequence {index}: it is a copy of sequence {other}, which would make the variation look smaller "
+                    "than it is; leave it out"
+                )
+        alike.append(index)
+    if floor_deviation > 0:
+        return
+    low, high = np.array([s.min(axis=0) for s in sequences]), np.array([s.max(axis=0) for s in sequences])
+    spread, size = high.max(axis=0) - low.min(axis=0), np.maximum(np.abs(low), np.abs(high)).max(axis=0)
+    constant = (spread <= 1e-12 * size) | (spread < LEAST_SPREAD)
+    if constant.any():
+        dimension = int(constant.argmax())
+        raise ValueError(
+            f"dimension {dimension} has the value {low[0, dimension]:.6g} in all frames of all sequences, so its "
+            "variance is zero; leave it out, or give TrainingOptions(floor_deviation=...) in its unit"
+        )
 
 
 def check_length(n_frames: int, n_states: int, d_min: int, d_max: int) -> None:

@@ -1,5 +1,6 @@
 """Synthesis of movements from state means and durations (thesis 2.2.4)."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ from paramove.hmm.sequences import interpolate
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Timing = Literal["uniform", "expected"]
+LONGEST_PATH = 1_000_000
 
 
 def expected_durations(durations: Floats) -> Floats:
@@ -19,13 +21,12 @@ def expected_durations(durations: Floats) -> Floats:
     return result
 
 
-def prototype(means: Floats, durations: Floats, n_samples: int | None, timing: Timing) -> Floats:
+def prototype(means: Floats, lengths: Floats, n_samples: int | None, timing: Timing) -> Floats:
     """Method D: the state means in order, linearly interpolated. Shape (n_samples, D).
 
     timing "uniform" spends the same time between any two means; "expected" puts each mean at the middle of its expected
-    duration (2.28). Without n_samples: one sample per expected frame.
+    duration (2.28), given by `lengths` (N,). Without n_samples: one sample per expected frame.
     """
-    lengths = expected_durations(durations)
     if n_samples is None:
         n_samples = max(2, round(float(lengths.sum())))
     if n_samples < 2:
@@ -49,33 +50,49 @@ def drawn_durations(durations: Floats, rng: np.random.Generator) -> Ints:
     return result
 
 
-def sampled(means: Floats, covariances: Floats, durations: Floats, rng: np.random.Generator) -> Floats:
-    """Method A: one sequence drawn from the model, every path through all states. Shape (T, D)."""
-    states = np.repeat(np.arange(len(means)), drawn_durations(durations, rng))
+def drawn_path(
+    start: Floats, transitions: Floats, exits: Floats, n_frames: int | None, rng: np.random.Generator
+) -> Ints:
+    """States of a chain, to the finish state or for a number of frames. Shape (T,)."""
+    states = [_drawn(start, rng)]
+    while len(states) < (LONGEST_PATH if n_frames is None else n_frames):
+        step = _drawn(np.append(transitions[states[-1]], exits[states[-1]] if n_frames is None else 0.0), rng)
+        if step == len(start):
+            return np.array(states, dtype=np.int64)
+        states.append(step)
+    if n_frames is None:
+        raise ValueError(f"a drawn path did not reach the finish state in {LONGEST_PATH} frames; give n_frames")
+    return np.array(states, dtype=np.int64)
+
+
+def _drawn(probabilities: Floats, rng: np.random.Generator) -> int:
+    cumulative = probabilities.cumsum()
+    return int((rng.random() * cumulative[-1] >= cumulative).sum())
+
+
+def emitted(states: Ints, means: Floats, covariances: Floats, rng: np.random.Generator) -> Floats:
+    """Method A: an output drawn for each state of a path. Shape (T, D)."""
     factors = np.linalg.cholesky(covariances)
     noise = rng.standard_normal((len(states), means.shape[1]))
     result: Floats = means[states] + np.einsum("tij,tj->ti", factors[states], noise)
     return result
 
 
-def averaged(
-    means: Floats, covariances: Floats, durations: Floats, rng: np.random.Generator, n_sequences: int
-) -> Floats:
-    """Method B: the mean of many drawn sequences, each stretched to the mean length. Shape (T, D)."""
-    drawn = [sampled(means, covariances, durations, rng) for _ in range(n_sequences)]
+def averaged(drawn: Sequence[Floats]) -> Floats:
+    """Method B: the mean of drawn sequences, each stretched to the mean length. Shape (T, D)."""
     length = max(2, round(float(np.mean([len(sequence) for sequence in drawn]))))
     stretched = [interpolate(one, np.linspace(0.0, len(one) - 1.0, length)) for one in drawn]
     result: Floats = np.mean(stretched, axis=0)
     return result
 
 
-def splined(means: Floats, covariances: Floats, durations: Floats, rng: np.random.Generator) -> Floats:
-    """Method C: a cubic spline through one drawn output per state, timed by the drawn durations. Shape (T, D)."""
-    lengths = drawn_durations(durations, rng)
-    factors = np.linalg.cholesky(covariances)
-    controls = means + np.einsum("ijk,ik->ij", factors, rng.standard_normal(means.shape))
-    centres = np.cumsum(lengths) - 0.5 * (lengths + 1)
-    frames = np.clip(np.arange(int(lengths.sum()), dtype=np.float64), centres[0], centres[-1])
+def splined(states: Ints, means: Floats, covariances: Floats, rng: np.random.Generator) -> Floats:
+    """Method C: a cubic spline through one drawn output per stay in a state, at its middle. Shape (T, D)."""
+    borders = np.flatnonzero(np.diff(states)) + 1
+    begins, ends = np.append(0, borders), np.append(borders, len(states))
+    controls = emitted(states[begins], means, covariances, rng)
+    centres = 0.5 * (begins + ends - 1)
+    frames = np.clip(np.arange(len(states), dtype=np.float64), centres[0], centres[-1])
     if len(controls) == 1:
         return np.repeat(controls, len(frames), axis=0)
     result: Floats = CubicSpline(centres, controls)(frames)

@@ -2,20 +2,15 @@
 
 import logging
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.estimation import (
-    Parameters,
-    Statistics,
-    covariances_of,
-    durations_of,
-    penalty,
-    pooled_covariance,
-)
+from paramove.hmm.covariances import Covariance, covariances_of, pooled_covariance
+from paramove.hmm.estimation import Parameters, Statistics, durations_of, penalty
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import Stack
 
@@ -68,11 +63,27 @@ def root_mean_deviation(sequences: Sequence[Floats]) -> float:
 
 
 def equal_segments(
-    sequences: Sequence[Floats], n_states: int, d_min: int, d_max: int, options: TrainingOptions
+    sequences: Sequence[Floats],
+    n_states: int,
+    d_min: int,
+    d_max: int,
+    options: TrainingOptions,
+    kind: Covariance = "full",
 ) -> Parameters:
     """Initial parameters from cutting each sequence into N equal parts; durations uniform over d_min..d_max."""
-    dim = sequences[0].shape[1]
     labels = [np.arange(len(sequence)) * n_states // len(sequence) for sequence in sequences]
+    means, covariances = segment_outputs(sequences, labels, n_states, options, kind)
+    durations = np.zeros((n_states, d_max))
+    durations[:, d_min - 1 :] = 1.0 / (d_max - d_min + 1)
+    return Parameters(means, covariances, durations, d_min)
+
+
+def segment_outputs(
+    sequences: Sequence[Floats], labels: Sequence[NDArray[np.int64]], n_states: int, options: TrainingOptions,
+    kind: Covariance,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Means (N, D) and covariances (N, D, D) of frames with known states; each state has at least one frame."""
+    dim = sequences[0].shape[1]
     frames, states = np.concatenate(list(sequences)), np.concatenate(labels)
     frames = frames[np.argsort(states, kind="stable")]
     weight = np.bincount(states, minlength=n_states).astype(np.float64)
@@ -80,52 +91,79 @@ def equal_segments(
     for i, part in enumerate(np.split(frames, np.cumsum(weight[:-1]).astype(np.int64))):
         means[i] = part.mean(axis=0)
         scatter[i] = (part - means[i]).T @ (part - means[i])
-    durations = np.zeros((n_states, d_max))
-    durations[:, d_min - 1 :] = 1.0 / (d_max - d_min + 1)
     # The first E-step needs covariances that are safe whatever the options say, hence the pooled one underneath.
     scale = root_mean_deviation(sequences)
     target = pooled_covariance(scatter, weight) + (1e-3 * scale) ** 2 * np.eye(dim)
-    floor = (options.floor_fraction * scale) ** 2
-    start = Regularisation(
-        (options.prior_fraction * scale) ** 2, floor, target, max(dim, options.shrinkage_frames), 0.0
-    )
-    return Parameters(means, covariances_of(scatter, weight, start), durations, d_min)
+    added, shrinkage = (options.prior_fraction * scale) ** 2, max(dim, options.shrinkage_frames)
+    start = Regularisation(added, floor_variance(options, scale), target, shrinkage, 0.0)
+    return means, covariances_of(scatter, weight, start, kind)
 
 
 def train(
-    initial: Parameters, sequences: Sequence[Floats], options: TrainingOptions
+    initial: Parameters, sequences: Sequence[Floats], options: TrainingOptions, kind: Covariance = "full"
 ) -> tuple[Parameters, TrainingSummary]:
     """Iterate Baum-Welch from `initial` until the objective converges or the iterations are used up.
 
     Warns (LikelihoodDecreaseWarning) if the objective falls after the annealing.
     """
-    scale = root_mean_deviation(sequences)
     stacks = Stack.parts(sequences, len(initial.means))
+
+    def expect(parameters: Parameters) -> Statistics:
+        return Statistics.of(parameters, stacks, kind)
+
+    def maximise(old: Parameters, found: Statistics, regularisation: Regularisation) -> Parameters:
+        means = found.means()
+        covariances = covariances_of(found.scatter(means), found.weight, regularisation, kind)
+        durations = durations_of(found.durations, old.d_min, regularisation.duration_pseudocount)
+        return Parameters(means, covariances, durations, old.d_min)
+
+    return iterate(initial, sequences, options, expect, maximise, penalty)
+
+
+class Expectation(Protocol):
+    """What an E-step finds, as far as the loop below must know it."""
+
+    @property
+    def log_likelihood(self) -> float: ...
+
+    @property
+    def weight(self) -> Floats: ...
+
+    def means(self) -> Floats: ...
+
+    def scatter(self, means: Floats) -> Floats: ...
+
+
+Model = TypeVar("Model")
+Found = TypeVar("Found", bound=Expectation)
+
+
+def iterate(
+    initial: Model,
+    sequences: Sequence[Floats],
+    options: TrainingOptions,
+    expect: Callable[[Model], Found],
+    maximise: Callable[[Model, Found, Regularisation], Model],
+    penalise: Callable[[Model, Regularisation], float],
+) -> tuple[Model, TrainingSummary]:
+    """Expectation maximisation with annealed prior and convergence monitor, for any kind of HMM."""
+    scale = root_mean_deviation(sequences)
     monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
     parameters = initial
     target: Floats | None = None
     for iteration in range(options.max_iterations):
-        statistics = Statistics.of(parameters, stacks)
-        means = statistics.means()
-        scatter = statistics.scatter(means)
+        found = expect(parameters)
         annealing = iteration < options.annealing_iterations
         # The target moves while the prior does and then stays, which makes the objective a fixed function.
         if annealing or target is None or iteration == options.annealing_iterations:
-            target = pooled_covariance(scatter, statistics.weight)
+            target = pooled_covariance(found.scatter(found.means()), found.weight)
         regularisation = regularisation_at(iteration, options, scale, target)
-        objective = None if annealing else statistics.log_likelihood + penalty(parameters, regularisation)
-        monitor.add(statistics.log_likelihood, objective)
-        parameters = Parameters(
-            means,
-            covariances_of(scatter, statistics.weight, regularisation),
-            durations_of(statistics.durations, parameters.d_min, options.duration_pseudocount),
-            parameters.d_min,
-        )
+        objective = None if annealing else found.log_likelihood + penalise(parameters, regularisation)
+        monitor.add(found.log_likelihood, objective)
+        parameters = maximise(parameters, found, regularisation)
         if monitor.converged:
             break
-    logger.debug(
-        "trained %d states on %d sequences in %d iterations", len(parameters.means), len(sequences), iteration + 1
-    )
+    logger.debug("trained on %d sequences in %d iterations", len(sequences), iteration + 1)
     return parameters, monitor.summary(len(sequences))
 
 
@@ -133,5 +171,11 @@ def regularisation_at(iteration: int, options: TrainingOptions, scale: float, ta
     """The options in the data's unit; the prior's deviation falls linearly to zero (thesis 2.2.2)."""
     remaining = max(0.0, 1.0 - iteration / options.annealing_iterations) if options.annealing_iterations else 0.0
     added = (options.prior_fraction * scale * remaining) ** 2
-    floor = (options.floor_fraction * scale) ** 2
-    return Regularisation(added, floor, target, options.shrinkage_frames, options.duration_pseudocount)
+    return Regularisation(
+        added, floor_variance(options, scale), target, options.shrinkage_frames, options.duration_pseudocount
+    )
+
+
+def floor_variance(options: TrainingOptions, scale: float) -> float:
+    """Least variance of an output distribution in any direction, in the data's unit squared."""
+    return max(options.floor_fraction * scale, options.floor_deviation) ** 2

@@ -1,0 +1,131 @@
+"""State probabilities frame by frame, without looking ahead: for use while a movement is seen (thesis 2.1.4.2).
+
+The forward variables of (2.7), kept as logarithms and divided by their sum after each frame.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import logsumexp
+
+from paramove.hmm.sequences import checked_sequence
+
+Floats = NDArray[np.float64]
+
+
+class OnlineFilter(ABC):
+    """What is known of the state of a movement after each frame.
+
+    Attributes:
+        log_likelihood: ln p(x_1..x_t | lambda), of the beginning alone: nothing is said about its end.
+        n_frames: t.
+    """
+
+    def __init__(self, means: Floats, whitening: Floats, log_norm: Floats) -> None:
+        self._means, self._whitening, self._log_norm = means, whitening, log_norm
+        self.log_likelihood = 0.0
+        self.n_frames = 0
+
+    def update(self, frame: ArrayLike) -> Floats:
+        """p(q_t = i | x_1..x_t) after one more frame of shape (D,). Shape (N,).
+
+        Raises ValueError for a bad frame, and where the model excludes what was seen: a movement that is too long for
+        its durations. The filter stays as it was.
+        """
+        checked = checked_sequence(np.atleast_2d(np.asarray(frame, dtype=np.float64)), self._means.shape[1])[0]
+        white = np.einsum("ijk,ik->ij", self._whitening, checked - self._means)
+        log_output = self._log_norm - 0.5 * np.einsum("ij,ij->i", white, white)
+        with np.errstate(divide="ignore"):
+            joint = self._predicted()
+        joint = joint + log_output.reshape((-1,) + (1,) * (joint.ndim - 1))
+        gain = float(logsumexp(joint))
+        if not np.isfinite(gain):
+            raise ValueError(
+                f"the model has no path for frame {self.n_frames + 1} of this movement: it allows fewer frames; "
+                "begin a new filter where a new movement begins"
+            )
+        self._keep(joint - gain)
+        self.log_likelihood += gain
+        self.n_frames += 1
+        return self.posterior()
+
+    @abstractmethod
+    def posterior(self) -> Floats:
+        """p(q_t = i | x_1..x_t). Shape (N,)."""
+
+    @abstractmethod
+    def finish_probability(self) -> float:
+        """p(the movement ends with this frame | x_1..x_t), from the transition into the finish state."""
+
+    @abstractmethod
+    def _predicted(self) -> Floats:
+        """Log probabilities of what the next frame's state may be."""
+
+    @abstractmethod
+    def _keep(self, log_probabilities: Floats) -> None: ...
+
+
+class ChainFilter(OnlineFilter):
+    """For a plain chain; with a finish state the movement has not ended as long as frames come."""
+
+    def __init__(
+        self, start: Floats, transitions: Floats, exits: Floats, means: Floats, whitening: Floats, log_norm: Floats
+    ) -> None:
+        super().__init__(means, whitening, log_norm)
+        with np.errstate(divide="ignore"):
+            self._log_start, self._log_transitions = np.log(start), np.log(transitions)
+        self._exits = exits
+        self._log_state: Floats | None = None
+
+    def posterior(self) -> Floats:
+        """p(q_t = i | x_1..x_t); before the first frame p(q_1 = i). Shape (N,)."""
+        result: Floats = np.exp(self._log_start if self._log_state is None else self._log_state)
+        return result
+
+    def finish_probability(self) -> float:
+        """p(the movement ends with this frame | x_1..x_t)."""
+        return 0.0 if self._log_state is None else float(self.posterior() @ self._exits)
+
+    def _predicted(self) -> Floats:
+        if self._log_state is None:
+            return self._log_start
+        result: Floats = logsumexp(self._log_state[:, None] + self._log_transitions, axis=0)
+        return result
+
+    def _keep(self, log_probabilities: Floats) -> None:
+        self._log_state = log_probabilities
+
+
+class DurationFilter(OnlineFilter):
+    """For a left-right HMM with explicit durations: state and frames spent in it so far."""
+
+    def __init__(self, durations: Floats, means: Floats, whitening: Floats, log_norm: Floats) -> None:
+        super().__init__(means, whitening, log_norm)
+        lasting = np.cumsum(durations[:, ::-1], axis=1)[:, ::-1]  # p(at least d frames)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            leave = np.where(lasting > 0, durations / lasting, 1.0)
+            self._log_leave, self._log_stay = np.log(leave), np.log(np.clip(1.0 - leave[:, :-1], 0.0, 1.0))
+        self._log_state: Floats | None = None
+
+    def posterior(self) -> Floats:
+        """p(q_t = i | x_1..x_t); before the first frame the first state. Shape (N,)."""
+        n_states = len(self._log_leave)
+        result: Floats = np.eye(n_states)[0] if self._log_state is None else np.exp(self._log_state).sum(axis=1)
+        return result
+
+    def finish_probability(self) -> float:
+        """p(the movement ends with this frame | x_1..x_t)."""
+        return 0.0 if self._log_state is None else float(np.exp(self._log_state[-1] + self._log_leave[-1]).sum())
+
+    def _predicted(self) -> Floats:
+        result: Floats = np.full(self._log_leave.shape, -np.inf)
+        if self._log_state is None:
+            result[0, 0] = 0.0
+        else:
+            result[1:, 0] = logsumexp(self._log_state[:-1] + self._log_leave[:-1], axis=1)
+            result[:, 1:] = self._log_state[:, :-1] + self._log_stay
+        return result
+
+    def _keep(self, log_probabilities: Floats) -> None:
+        self._log_state = log_probabilities

@@ -1,0 +1,257 @@
+"""The plain HMM with one Gaussian per state: ergodic or left-right, with or without finish state (thesis 2.1, 2.2)."""
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.hmm import synthesis
+from paramove.hmm.chain import (
+    ChainEvaluator,
+    ChainParameters,
+    ChainStatistics,
+    Topology,
+    TopologyName,
+    chain_penalty,
+    check_parameters,
+    maximised,
+)
+from paramove.hmm.chain_kernels import best_path
+from paramove.hmm.covariances import Covariance, check_kind
+from paramove.hmm.filtering import ChainFilter
+from paramove.hmm.initialisation import Initialisation, check_initialisation, initial_chain
+from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
+from paramove.hmm.sequences import (
+    SequenceLengthError,
+    Stack,
+    check_demonstrations,
+    checked_sequence,
+    checked_sequences,
+)
+from paramove.hmm.training import iterate
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class GaussianHMM:
+    """A hidden Markov model lambda = (A, B, pi) with Gaussian outputs, trained by Baum-Welch on several sequences.
+
+    Args:
+        n_states: N.
+        topology: "left_right" (figure 2.2), "left_right_skips" or "ergodic".
+        max_skip: most states left out by one step of "left_right_skips".
+        self_transitions: False for left-right paths that leave a state with each frame (figure 2.3).
+        finish_state: whether each path ends in the finish state N + 1 (2.2.3.1).
+        covariance: "full", "diagonal" or "tied" (one for all states).
+        initialisation: "segments" cuts each sequence into N equal parts; "random" draws the cuts with `seed`.
+        seed: of "random".
+        options: how it is trained.
+
+    Attributes:
+        start_: pi, shape (N,).
+        transitions_: A, shape (N, N).
+        exits_: a_{i, N+1}, shape (N,); zero without finish state.
+        means_: shape (N, D), in the unit of the sequences.
+        covariances_: shape (N, D, D) for each kind of covariance.
+        training_: what training did; None if the parameters were given.
+
+    Raises:
+        ValueError: for a count below 1 or an unknown name.
+    """
+
+    def __init__(
+        self,
+        n_states: int,
+        *,
+        topology: TopologyName = "left_right",
+        max_skip: int = 1,
+        self_transitions: bool = True,
+        finish_state: bool = False,
+        covariance: Covariance = "full",
+        initialisation: Initialisation = "segments",
+        seed: int = 0,
+        options: TrainingOptions | None = None,
+    ) -> None:
+        if n_states < 1:
+            raise ValueError(f"n_states is at least 1, found {n_states}")
+        check_kind(covariance)
+        check_initialisation(initialisation)
+        self.n_states, self.covariance, self.initialisation, self.seed = n_states, covariance, initialisation, seed
+        self.topology = Topology(topology, max_skip, self_transitions, finish_state)
+        self.options = options if options is not None else TrainingOptions()
+        self.training_: TrainingSummary | None = None
+        self._evaluator: ChainEvaluator | None = None
+
+    def with_parameters(self, parameters: ChainParameters) -> Self:
+        """Give it parameters, trained elsewhere. Raises ValueError if they do not fit the topology."""
+        check_parameters(parameters, self.topology)
+        if len(parameters.means) != self.n_states:
+            raise ValueError(f"the model has {self.n_states} states, the parameters {len(parameters.means)}")
+        self._evaluator = ChainEvaluator.of(parameters, self.topology, self.covariance)
+        self.training_ = None
+        return self
+
+    @property
+    def parameters(self) -> ChainParameters:
+        """All parameters together. Raises RuntimeError before training."""
+        return self._ready().parameters
+
+    @property
+    def start_(self) -> Floats:
+        """pi. Shape (N,)."""
+        return self.parameters.start
+
+    @property
+    def transitions_(self) -> Floats:
+        """A. Shape (N, N)."""
+        return self.parameters.transitions
+
+    @property
+    def exits_(self) -> Floats:
+        """Probabilities of the transitions into the finish state. Shape (N,)."""
+        return self.parameters.exits
+
+    @property
+    def means_(self) -> Floats:
+        """State means. Shape (N, D)."""
+        return self.parameters.means
+
+    @property
+    def covariances_(self) -> Floats:
+        """State covariances. Shape (N, D, D)."""
+        return self.parameters.covariances
+
+    def fit(self, sequences: Sequence[ArrayLike], initial: ChainParameters | None = None) -> Self:
+        """Train by Baum-Welch on sequences of shape (T_k, D), of any lengths that the topology has paths for.
+
+        Args:
+            sequences: the demonstrations.
+            initial: where to begin, instead of the initialisation.
+
+        Raises:
+            SequenceLengthError: no path has the length of a sequence.
+            ValueError: bad values, copies, dimensions that never change, or initial parameters that do not fit; the
+                sequence or dimension is named.
+        """
+        checked = checked_sequences(sequences)
+        for index, sequence in enumerate(checked):
+            self._check_length(len(sequence), f"sequence {index}: ")
+        check_demonstrations(checked, self.options.floor_deviation)
+        if initial is None:
+            initial = initial_chain(
+                checked, self.n_states, self.topology, self.covariance, self.options, self.initialisation, self.seed
+            )
+        check_parameters(initial, self.topology)
+        stacks = Stack.parts(checked, self.n_states)
+
+        def expect(parameters: ChainParameters) -> ChainStatistics:
+            return ChainStatistics.of(parameters, stacks, self.topology, self.covariance)
+
+        def maximise(old: ChainParameters, found: ChainStatistics, regularisation: Regularisation) -> ChainParameters:
+            return maximised(old, found, regularisation, self.topology, self.covariance)
+
+        def penalise(parameters: ChainParameters, regularisation: Regularisation) -> float:
+            return chain_penalty(parameters, regularisation, self.topology)
+
+        parameters, summary = iterate(initial, checked, self.options, expect, maximise, penalise)
+        self.with_parameters(parameters)
+        self.training_ = summary
+        return self
+
+    def log_likelihood(self, sequence: ArrayLike) -> float:
+        """ln p(X | lambda); with a finish state over the paths that end in it.
+
+        -inf if the probabilities exclude the sequence. Raises SequenceLengthError where no path has its length.
+        """
+        return float(self._ready().expectation(self._stacked(sequence))[0][0])
+
+    def responsibilities(self, sequence: ArrayLike) -> Floats:
+        """gamma_i(t) = p(q_t = i | X, lambda) (2.14). Shape (T, N), rows sum to one.
+
+        Raises ValueError for a sequence of likelihood zero.
+        """
+        stack = self._stacked(sequence)
+        ready = self._ready()
+        values, gamma, _ = ready.expectation(stack)
+        if not np.isfinite(values[0]):
+            raise ValueError("the model excludes this sequence (likelihood zero), so no state is responsible for it")
+        windows, frames = ready.windows(stack)[0], np.arange(stack.n_frames)[:, None]
+        return np.where((frames >= windows[:, 0]) & (frames < windows[:, 1]), gamma.T, 0.0)
+
+    def decode(self, sequence: ArrayLike) -> Ints:
+        """State of each frame on the likeliest path (Viterbi). Shape (T,), counted from 0."""
+        ready, stack = self._ready(), self._stacked(sequence)
+        windows, frames = ready.windows(stack)[0], np.arange(stack.n_frames)
+        feasible = (frames >= windows[:, :1]) & (frames < windows[:, 1:])
+        outputs = np.where(feasible, ready.log_outputs(stack), -np.inf)
+        width = self.topology.step + 1 if self.topology.step else 0
+        return best_path(outputs, ready.log_start, ready.log_transitions, ready.log_exits, width)[1]
+
+    def filter(self) -> ChainFilter:
+        """State probabilities of a new movement, frame by frame without lookahead."""
+        ready, own = self._ready(), self.parameters
+        return ChainFilter(own.start, own.transitions, own.exits, own.means, ready.whitening, ready.log_norm)
+
+    def expected_durations(self) -> Floats:
+        """Expected number of consecutive frames of each state, 1 / (1 - a_ii) (2.2.4). Shape (N,).
+
+        Infinite for a state that is never left, such as the last one of a left-right chain without finish state.
+        """
+        leaving = 1.0 - np.diagonal(self.transitions_)
+        with np.errstate(divide="ignore"):
+            return np.where(leaving > 1e-12, 1.0 / leaving, np.inf)
+
+    def synthesize(self, n_samples: int | None = None, timing: synthesis.Timing = "uniform") -> Floats:
+        """The prototype movement (method D): means in order, linearly interpolated. Shape (n_samples, D).
+
+        A last state that is never left counts as long as the mean of the others. Raises ValueError for an ergodic
+        chain, whose states have no order.
+        """
+        if self.topology.name == "ergodic":
+            raise ValueError("method D needs the states in order; an ergodic chain has none: draw with sample instead")
+        lengths = self.expected_durations()
+        endless = ~np.isfinite(lengths)
+        lengths[endless] = lengths[~endless].mean() if not endless.all() else 2.0
+        return synthesis.prototype(self.means_, lengths, n_samples, timing)
+
+    def sample(self, rng: np.random.Generator, n_frames: int | None = None) -> Floats:
+        """One sequence drawn from the model (method A), to the finish state or of `n_frames`. Shape (T, D).
+
+        Raises ValueError if there is neither.
+        """
+        return synthesis.emitted(self._path(rng, n_frames), self.means_, self.covariances_, rng)
+
+    def sample_average(self, rng: np.random.Generator, n_sequences: int = 100, n_frames: int | None = None) -> Floats:
+        """The average of many drawn sequences, each stretched to the mean length (method B). Shape (T, D)."""
+        return synthesis.averaged([self.sample(rng, n_frames) for _ in range(n_sequences)])
+
+    def sample_spline(self, rng: np.random.Generator, n_frames: int | None = None) -> Floats:
+        """A spline through one drawn output per stay in a state (method C). Shape (T, D)."""
+        return synthesis.splined(self._path(rng, n_frames), self.means_, self.covariances_, rng)
+
+    def _path(self, rng: np.random.Generator, n_frames: int | None) -> Ints:
+        if n_frames is None and not self.topology.finish_state:
+            raise ValueError("without finish state a path has no end: give n_frames")
+        own = self.parameters
+        return synthesis.drawn_path(own.start, own.transitions, own.exits, n_frames, rng)
+
+    def _ready(self) -> ChainEvaluator:
+        if self._evaluator is None:
+            raise RuntimeError("this HMM has no parameters yet: call fit or with_parameters")
+        return self._evaluator
+
+    def _stacked(self, sequence: ArrayLike) -> Stack:
+        checked = checked_sequence(sequence, self.means_.shape[1])
+        self._check_length(len(checked), "")
+        return Stack.of([checked])
+
+    def _check_length(self, n_frames: int, place: str) -> None:
+        fewest, most = self.topology.lengths(self.n_states)
+        if n_frames < fewest or (most is not None and n_frames > most):
+            allowed = f"at least {fewest}" if most is None else f"{fewest} to {most}"
+            raise SequenceLengthError(
+                f"{place}a sequence of {n_frames} frames has no path through {self.n_states} states of this topology: "
+                f"allowed are {allowed} frames; resample it, or change n_states"
+            )

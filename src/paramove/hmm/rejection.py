@@ -1,0 +1,109 @@
+"""Rejection of movements that a model was not made for: the log-likelihood distribution test (thesis 2.2.5)."""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.hmm.sequences import SequenceLengthError
+
+Floats = NDArray[np.float64]
+
+
+class Likelihood(Protocol):
+    """Any model that says how likely a sequence is."""
+
+    def log_likelihood(self, sequence: ArrayLike) -> float: ...
+
+
+class Trainable(Likelihood, Protocol):
+    """A model that can be trained anew."""
+
+    def fit(self, sequences: Sequence[ArrayLike]) -> Any: ...
+
+
+class Generative(Likelihood, Protocol):
+    """A model that sequences can be drawn from, to its finish state."""
+
+    def sample(self, rng: np.random.Generator) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class LikelihoodTest:
+    """Compares ln p(X' | lambda) with the values of sequences that belong to the model.
+
+    The p-value of X' is the share of (K + 1) values, its own among them, that are not above its own: if X' is like the
+    K others, a p-value of at most `a` has probability at most `a`, whatever the model. It is never below 1 / (K + 1).
+
+    The thesis draws the K sequences from the model (`of_samples`). Frames of people are not independent as those drawn
+    are, so people's movements should be compared with people's movements: held out of training (`of_sequences`), or all
+    of them by training without each in turn (`cross_validated`).
+
+    Attributes:
+        model: lambda.
+        values: the K log-likelihoods, in increasing order.
+    """
+
+    model: Likelihood
+    values: Floats
+
+    @classmethod
+    def of_sequences(cls, model: Likelihood, sequences: Sequence[ArrayLike]) -> Self:
+        """Compare with sequences that the model was not trained on. Raises ValueError if there are none."""
+        if len(sequences) == 0:
+            raise ValueError("no sequences were given to compare with; at least one is needed, 19 for a level of 5 %")
+        return cls(model, np.sort([_value(model, sequence) for sequence in sequences]))
+
+    @classmethod
+    def of_samples(cls, model: Generative, rng: np.random.Generator, n_sequences: int = 1000) -> Self:
+        """Compare with sequences drawn from the model (method A), as the thesis does."""
+        return cls.of_sequences(model, [model.sample(rng) for _ in range(n_sequences)])
+
+    @classmethod
+    def cross_validated(cls, model: Trainable, sequences: Sequence[ArrayLike], n_parts: int | None = None) -> Self:
+        """Compare with the training sequences, each judged by a copy of the model trained without it.
+
+        Args:
+            model: trained on all sequences; it stays as it is.
+            sequences: its training sequences.
+            n_parts: leave out one of so many parts at a time; None leaves out single sequences.
+
+        Raises:
+            ValueError: fewer than 2 sequences or parts.
+        """
+        n_parts = len(sequences) if n_parts is None else n_parts
+        if not 2 <= n_parts <= len(sequences):
+            raise ValueError(f"n_parts is 2 to the number of sequences ({len(sequences)}), found {n_parts}")
+        values = []
+        for part in range(n_parts):
+            without = copy.copy(model)
+            without.fit([sequence for index, sequence in enumerate(sequences) if index % n_parts != part])
+            values += [_value(without, sequence) for sequence in sequences[part::n_parts]]
+        return cls(model, np.sort(values))
+
+    def p_value(self, sequence: ArrayLike) -> float:
+        """p(L <= L') of a new sequence, its own value counted in. A sequence of impossible length has the least."""
+        not_above = int(np.searchsorted(self.values, _value(self.model, sequence), side="right"))
+        return (1 + not_above) / (1 + len(self.values))
+
+    def accepts(self, sequence: ArrayLike, level: float = 0.05) -> bool:
+        """Whether the p-value is above `level`, the share of right movements that may be rejected.
+
+        Raises ValueError if there are too few values to reject anything at this level.
+        """
+        if 1.0 / (1 + len(self.values)) > level:
+            raise ValueError(
+                f"{len(self.values)} sequences can reject nothing at level {level:g}; give at least "
+                f"{int(np.ceil(1.0 / level)) - 1}, or a level of at least {1.0 / (1 + len(self.values)):.3g}"
+            )
+        return self.p_value(sequence) > level
+
+
+def _value(model: Likelihood, sequence: ArrayLike) -> float:
+    try:
+        return model.log_likelihood(sequence)
+    except SequenceLengthError:
+        return -np.inf
