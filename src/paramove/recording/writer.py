@@ -5,14 +5,19 @@ Chunks are small, so that a process that is killed loses little; the file bears 
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from google.protobuf.descriptor import FileDescriptor  # type: ignore[import-untyped]
 from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
+from mcap.records import Channel, Message, Schema
 from mcap.writer import CompressionType, Writer
 
+CHANNELS = "paramove.channels"
+"""Metadata that tells again which channel is which topic: with the chunk that tells it first, all would be lost."""
 CHUNK_BYTES = 64 * 1024
 CHUNK_NS = 250_000_000
 """Of the time of publication; a longer chunk would lose more with a process that is killed."""
@@ -40,6 +45,8 @@ class RecordingWriter:
             if existing.exists():
                 raise RecordingExistsError(f"{existing} exists; recordings are never overwritten: choose another name")
         self._file = self._part.open("xb")
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # ends with this process, however it ends
         self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._writer.start(profile="", library=library)
         self._chunk_begun_ns: int | None = None
@@ -56,18 +63,14 @@ class RecordingWriter:
             publish_ns: When it was said.
             sequence: Of the publisher.
         """
-        if self._chunk_begun_ns is None:
-            self._chunk_begun_ns = publish_ns
-        elif not 0 <= publish_ns - self._chunk_begun_ns < CHUNK_NS:
-            self._writer.flush()  # type: ignore[no-untyped-call]
-            self._chunk_begun_ns = publish_ns
-        self._writer.add_message(
-            channel_id=self._channel(topic, message),
-            log_time=log_ns,
-            publish_time=publish_ns,
-            sequence=sequence % 2**32,
-            data=message.SerializeToString(deterministic=True),
+        self._append(
+            self._channel(topic, message), log_ns, publish_ns, sequence, message.SerializeToString(deterministic=True)
         )
+
+    def copy(self, channel: Channel, schema: Schema, message: Message) -> None:
+        """Append a message of another recording as it is there."""
+        number = self._registered(channel.topic, channel.message_encoding, schema.name, schema.encoding, schema.data)
+        self._append(number, message.log_time, message.publish_time, message.sequence, message.data)
 
     def note(self, name: str, values: dict[str, str]) -> None:
         """Add a metadata record."""
@@ -89,20 +92,36 @@ class RecordingWriter:
     ) -> None:
         self.close()
 
+    def _append(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
+        if self._chunk_begun_ns is None:
+            self._chunk_begun_ns = publish_ns
+        elif not 0 <= publish_ns - self._chunk_begun_ns < CHUNK_NS:
+            self._writer.flush()  # type: ignore[no-untyped-call]
+            self._chunk_begun_ns = publish_ns
+        self._writer.add_message(
+            channel_id=channel, log_time=log_ns, publish_time=publish_ns, sequence=sequence % 2**32, data=data
+        )
+
     def _channel(self, topic: str, message: Any) -> int:
+        if topic in self._channels:
+            return self._channels[topic]
+        descriptor = message.DESCRIPTOR
+        schema = schema_of(descriptor.file).SerializeToString()
+        return self._registered(topic, "protobuf", descriptor.full_name, "protobuf", schema)
+
+    def _registered(self, topic: str, message_encoding: str, schema: str, schema_encoding: str, data: bytes) -> int:
+        """Number of the channel of a topic, which is made, with its schema, where there is none yet."""
         if topic not in self._channels:
-            descriptor = message.DESCRIPTOR
-            if descriptor.full_name not in self._schemas:
-                self._schemas[descriptor.full_name] = self._writer.register_schema(
-                    name=descriptor.full_name, encoding="protobuf", data=_schema_of(descriptor.file).SerializeToString()
-                )
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(name=schema, encoding=schema_encoding, data=data)
             self._channels[topic] = self._writer.register_channel(
-                topic=topic, message_encoding="protobuf", schema_id=self._schemas[descriptor.full_name]
+                topic=topic, message_encoding=message_encoding, schema_id=self._schemas[schema]
             )
+            self.note(CHANNELS, {name: str(number) for name, number in self._channels.items()})
         return self._channels[topic]
 
 
-def _schema_of(file: FileDescriptor) -> FileDescriptorSet:
+def schema_of(file: FileDescriptor) -> FileDescriptorSet:
     """The file of a message and every file it imports, imported ones first."""
     found: dict[str, FileDescriptor] = {}
 

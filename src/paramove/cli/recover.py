@@ -1,0 +1,90 @@
+"""`paramove recover`: a finished recording out of one whose writer was killed or whose bytes are damaged."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from paramove.cli.bus_options import JsonOption
+from paramove.recording.recovery import Recovery, RecoveryError, StillWrittenError, recover
+from paramove.recording.writer import RecordingExistsError
+from paramove.supervision import exit_codes
+from paramove.supervision.processes import printable
+
+app = typer.Typer(add_completion=False)
+
+MOST_DAMAGES = 20
+
+
+@app.command("recover")
+def recover_recording(
+    file: Annotated[Path, typer.Argument(help="a recording, RUN.mcap.part or RUN.mcap")],
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="default: RUN.mcap of RUN.mcap.part, RUN.recovered.mcap of RUN.mcap"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Rebuild a finished recording from one whose writer was killed or whose bytes are damaged.
+
+    Everything that can be read is kept; the file itself is only read, and no file is written over.
+
+    Exit codes: 0 recovered, or nothing to recover; 2 the output exists; 66 no such file; 75 it is being written;
+    78 nothing in it can be read.
+    """
+    try:
+        result = recover(file, output)
+    except StillWrittenError as error:
+        raise _ended(str(error), exit_codes.TEMPORARY) from error
+    except RecordingExistsError as error:
+        raise _ended(f"{error} with --output", exit_codes.USAGE) from error
+    except RecoveryError as error:
+        raise _ended(str(error), error.exit_code) from error
+    except OSError as error:
+        raise _ended(f"{error.filename or file}: {error.strerror}", exit_codes.PERMISSION) from error
+    if as_json:
+        typer.echo(json.dumps(_facts(result), indent=2))
+    else:
+        typer.echo("\n".join(_lines(result)))
+
+
+def _ended(sentence: str, code: int) -> typer.Exit:
+    typer.echo(printable(sentence), err=True)
+    return typer.Exit(code)
+
+
+def _facts(result: Recovery) -> dict[str, Any]:
+    return {
+        "source": str(result.source),
+        "destination": str(result.destination) if result.destination else None,
+        "messages_kept": result.kept,
+        "messages_lost": result.lost,
+        "messages_lost_is_exact": result.lost_is_exact,
+        "seconds_kept": result.seconds_kept,
+        "seconds_lost": result.seconds_lost,
+        "damages": [{"begin": one.begin, "end": one.end, "what": one.what} for one in result.damages],
+    }
+
+
+def _lines(result: Recovery) -> list[str]:
+    kept = f"{result.kept} messages, {result.seconds_kept:.3f} s"
+    if result.destination is None:
+        return [f"{result.source} is whole ({kept}): nothing to recover"]
+    at_least = "" if result.lost_is_exact else "at least "
+    lines = [
+        f"{result.destination}: kept {kept}",
+        f"lost {at_least}{result.lost} messages, {at_least}{result.seconds_lost:.3f} s",
+    ]
+    lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MOST_DAMAGES]]
+    if len(result.damages) > MOST_DAMAGES:
+        lines.append(f"  and {len(result.damages) - MOST_DAMAGES} more")
+    if not result.damages:
+        lines.append("  its writer never finished it; what it had not written yet (up to 0.25 s) is not known")
+    return [printable(line) for line in lines]
+
+
+if __name__ == "__main__":
+    app()
