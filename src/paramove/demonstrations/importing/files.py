@@ -15,6 +15,7 @@ from paramove.demonstrations.importing.conversion import ImportOptions, converte
 from paramove.demonstrations.importing.csv_file import read_csv
 from paramove.demonstrations.importing.npz import read_npz
 from paramove.demonstrations.importing.raw import RawTake
+from paramove.demonstrations.labelling import movements_by_speed
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, Take, recording_name
 
@@ -45,7 +46,12 @@ class Imported:
 
 
 def import_file(
-    path: Path, options: ImportOptions, label: Label | None = None, max_gap: float = 0.1, name: str | None = None
+    path: Path,
+    options: ImportOptions,
+    label: Label | None = None,
+    max_gap: float = 0.1,
+    name: str | None = None,
+    find: str | None = None,
 ) -> Imported:
     """Reads a file and checks its labelled movements for lost points.
 
@@ -55,6 +61,7 @@ def import_file(
         label: What a file without labels shows; its `end` may be 0 for the last frame. None: it is left unlabelled.
         max_gap: s; a point may be lost for so long in a labelled movement.
         name: Begin of the recordings' names; None: the file's.
+        find: Body point; every movement of it gets the label, instead of the whole take.
 
     Raises DemonstrationError if the file is missing, damaged or of no known kind.
     """
@@ -73,12 +80,25 @@ def import_file(
         if name is not None:
             take = replace(take, recording=recording_name(name + raw.name.removeprefix(path.stem)))
         if not take.labels and label is not None:
-            take = replace(take, labels=(replace(label, end=label.end or len(take.time)),))
+            take = replace(take, labels=_labels(take, label, find, max_gap, path))
         sound, said, wrong = _checked(take, path, max_gap)
         takes.append(sound)
         remarks += said
         refused += wrong
     return Imported(tuple(takes), raws[0].parameter_names, tuple(remarks), tuple(refused))
+
+
+def _labels(take: Take, label: Label, find: str | None, max_gap: float, path: Path) -> tuple[Label, ...]:
+    """The label for the whole take, or for each movement that is found in it."""
+    if find is None:
+        return (replace(label, end=label.end or len(take.time)),)
+    try:
+        found = movements_by_speed(take.time, take.positions, take.point_names, find, max_gap)
+    except DemonstrationError as error:
+        raise DemonstrationError(f"{path}: {error}") from error
+    if not found:
+        raise DemonstrationError(f"{path}: {find} never exceeds 15 cm/s; is the unit right?")
+    return tuple(replace(label, first=first, end=end) for first, end in found)
 
 
 def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], list[str]]:

@@ -1,0 +1,168 @@
+"""`paramove demos import`: files of motion capture become a demonstration set."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from paramove.cli.demos_options import (
+    LabelActionOption,
+    LabelSubjectOption,
+    ParametersOption,
+    ThetaOption,
+    ended,
+    numbers,
+    one_sentence,
+    words,
+)
+from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from paramove.demonstrations.importing import Imported, ImportOptions
+    from paramove.demonstrations.writing import Label
+
+PointsOption = Annotated[
+    list[str] | None,
+    typer.Option("--point", metavar="NAME=MARKER", help="index=RFIN or wrist=RWRA,RWRB (their mean); may be repeated"),
+]
+MappingOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="YAML with unit, axes, rate, points; other options come before it")
+]
+
+
+def import_files(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="C3D, BVH, CSV or NPZ")],
+    to: Annotated[Path, typer.Option(metavar="SET", help="folder of the demonstration set")],
+    unit: Annotated[Literal["m", "cm", "mm"] | None, typer.Option(help="if the file does not tell")] = None,
+    axes: Annotated[
+        str | None, typer.Option(help="z_up, y_up, or directions of x, y, z such as right,up,forward")
+    ] = None,
+    rate: Annotated[float | None, typer.Option(min=0.001, help="frames per second, if the file does not tell")] = None,
+    point: PointsOption = None,
+    mapping: MappingOption = None,
+    zeros_are_places: Annotated[
+        bool, typer.Option("--zeros-are-places", help="a point at exactly (0, 0, 0) was not lost")
+    ] = False,
+    action: LabelActionOption = None,
+    theta: ThetaOption = "",
+    parameters: ParametersOption = None,
+    subject: LabelSubjectOption = "",
+    repetition: Annotated[int | None, typer.Option(min=0, help="of the first file (default: counted on)")] = None,
+    side: Annotated[Literal["right", "left"], typer.Option(help="which arm moves")] = "right",
+    find: Annotated[
+        str | None, typer.Option("--find", metavar="POINT", help="label each movement of POINT, by its speed")
+    ] = None,
+    max_gap: Annotated[float, typer.Option(min=0.0, max=1.0, help="s; longer losses of a point are refused")] = 0.1,
+    skip_refused: Annotated[bool, typer.Option("--skip-refused", help="import the rest")] = False,
+    name: Annotated[str | None, typer.Option(help="of the recording (default: the file's)")] = None,
+    add: Annotated[bool, typer.Option("--add", help="to a set that is there already")] = False,
+) -> None:
+    """Import files of motion capture into a demonstration set.
+
+    Everything is brought to metres, x forward, y left, z up. Theta is given in the same. A file without labels is
+    labelled with --action as a whole, or with --find movement by movement; without --action it stays unlabelled.
+
+    Exit codes: 0; 2 wrong arguments; 66 a file is missing; 78 a file or a movement in it cannot be used.
+    """
+    from paramove.demonstrations.importing import import_file
+    from paramove.demonstrations.writing import Label
+
+    values = numbers(theta, "--theta")
+    given = words(parameters)
+    label = None if action is None else Label(0, 0, action, values, subject, repetition or 0, side)
+    if find is not None and label is None:
+        raise typer.BadParameter("movements that are found need an --action", param_hint="--find")
+    with one_sentence():
+        options = _options(mapping, unit, axes, rate, point, zeros_are_places)
+        results = [import_file(file, options, label, max_gap, name, find) for file in files]
+        _tell(results, skip_refused)
+        names = given if given is not None else results[0].parameter_names or _names_of(values)
+        _write(to, results, names, max_gap, repetition, add)
+
+
+def _names_of(values: tuple[float, ...]) -> tuple[str, ...]:
+    if len(values) == 3:
+        return ("target_x", "target_y", "target_z")
+    return tuple(f"parameter_{number}" for number in range(1, len(values) + 1))
+
+
+def _options(
+    mapping: Path | None,
+    unit: str | None,
+    axes: str | None,
+    rate: float | None,
+    point: list[str] | None,
+    zeros_are_places: bool,
+) -> ImportOptions:
+    """What the mapping file says, with what the command line says laid over it."""
+    from paramove.demonstrations.importing import ImportOptions, axes_matrix, read_mapping_file
+
+    options = read_mapping_file(mapping) if mapping is not None else ImportOptions()
+    points = dict(options.points or {})
+    for text in point or ():
+        name, equals, markers = text.partition("=")
+        if not (equals and name.strip() and words(markers)):
+            raise typer.BadParameter(f"expected such as index=RFIN, found {text!r}", param_hint="--point")
+        points[name.strip()] = words(markers) or ()
+    if axes is not None:
+        axes_matrix(axes)
+    return replace(
+        options,
+        unit=unit or options.unit,
+        axes=axes or options.axes,
+        rate_hz=rate or options.rate_hz,
+        points=points or None,
+        zeros_are_lost=options.zeros_are_lost and not zeros_are_places,
+    )
+
+
+def _tell(results: list[Imported], skip_refused: bool) -> None:
+    """Prints remarks; ends the command if a movement was refused, unless the rest is wanted."""
+    for result in results:
+        for remark in result.remarks:
+            typer.echo(remark)
+    refused = [line for result in results for line in result.refused]
+    if refused and not skip_refused:
+        hint = "nothing was imported; --skip-refused imports the rest, --max-gap fills longer losses"
+        raise ended("\n".join([*refused, hint]), exit_codes.CONFIGURATION)
+    for line in refused:
+        typer.echo(f"left out: {line}", err=True)
+
+
+def _write(
+    to: Path, results: list[Imported], names: tuple[str, ...], max_gap: float, repetition: int | None, add: bool
+) -> None:
+    from paramove.demonstrations.labels import FILE_NAME, load_labels
+    from paramove.demonstrations.writing import write_set
+
+    there: dict[tuple[object, ...], int] = {}
+    if add and (to / FILE_NAME).exists():
+        for segment in load_labels(to / FILE_NAME).file.segments:
+            key: tuple[object, ...] = (segment.action, tuple(segment.theta), segment.subject, segment.side)
+            there[key] = max(there.get(key, -1), segment.repetition)
+    if repetition is not None:
+        there.clear()
+    takes = []
+    for result in results:
+        for take in result.takes:
+            labels = take.labels if result.parameter_names else _counted(take.labels, there)
+            takes.append(replace(take, labels=labels))
+    write_set(to, takes, names, max_gap=max_gap, add=add)
+    count = sum(len(take.labels) for take in takes)
+    recordings = len({take.recording for take in takes})
+    typer.echo(f"{to}: {count} movements in {recordings} recording{'' if recordings == 1 else 's'}")
+    if not count:
+        typer.echo(f"nothing is labelled yet: paramove demos label {to} --recording {takes[0].recording} --help")
+
+
+def _counted(labels: tuple[Label, ...], there: dict[tuple[object, ...], int]) -> tuple[Label, ...]:
+    """Labels whose repetitions go on from those there are; `there` is brought up to date."""
+    result = []
+    for label in labels:
+        key = (label.action, label.theta, label.subject, label.side)
+        there[key] = there.get(key, label.repetition - 1) + 1
+        result.append(replace(label, repetition=there[key]))
+    return tuple(result)

@@ -1,0 +1,111 @@
+"""Labels for recordings: movements found by their speed, checked against the recording before they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.gaps import fill_gaps
+from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
+from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
+from paramove.demonstrations.timing import FAST, FINGERTIP, SLOW, speeds
+from paramove.supervision.names import nearest
+
+
+def movements_by_speed(
+    time: Floats, positions: Floats, point_names: tuple[str, ...], point: str = FINGERTIP, max_gap: float = 0.1
+) -> list[tuple[int, int]]:
+    """Movements of one point: first frame and one past the last of each.
+
+    Each begins with the first frame above 3 cm/s before the point exceeds 15 cm/s, and ends with the first frame at 3
+    cm/s or less after. A way there and a way back with a rest between them are two movements.
+
+    Raises DemonstrationError if the point is not there, or seen in fewer than two frames.
+    """
+    if point not in point_names:
+        raise DemonstrationError(f"there is no point '{point}' to find movements by; {nearest(point, point_names)}")
+    filled, _, _ = fill_gaps(time, positions, point_names, max_gap)
+    path = filled[:, point_names.index(point)]
+    seen = np.isfinite(path).all(axis=1)
+    if seen.sum() < 2:
+        raise DemonstrationError(f"{point} is seen in {seen.sum()} frames; no movement can be found by it")
+    whole = np.stack([np.interp(time, time[seen], path[seen, axis]) for axis in range(3)], axis=-1)
+    movement = Movement(time - time[0], whole[:, None, :], (point,), "", "any", np.zeros(0))
+    speed = speeds(movement, point)
+    found: list[tuple[int, int]] = []
+    begin = 0
+    for quick in np.flatnonzero(speed > FAST).tolist():
+        if quick < begin:
+            continue
+        still = np.flatnonzero(speed[begin:quick] <= SLOW)
+        after = np.flatnonzero(speed[quick:] <= SLOW)
+        first = begin + int(still[-1]) + 1 if still.size else begin
+        end = quick + int(after[0]) + 1 if after.size else len(time)
+        found.append((first, end))
+        begin = end
+    return found
+
+
+def next_repetition(there: Sequence[Segment], segment: Segment) -> int:
+    """One more than the highest of the same action, parameters, person and arm; 0 if there is none."""
+    same = [
+        one.repetition
+        for one in there
+        if (one.action, one.theta, one.subject, one.side)
+        == (segment.action, segment.theta, segment.subject, segment.side)
+    ]
+    return max(same, default=-1) + 1
+
+
+def label(folder: Path, segments: Sequence[Segment], parameter_names: Sequence[str] | None = None) -> None:
+    """Adds segments to labels.yaml of a folder, which is made where there is none.
+
+    Args:
+        folder: With the recordings.
+        segments: All are added, or none.
+        parameter_names: For a new labels.yaml; None: as it is there, or target_x, target_y, target_z for three values.
+
+    Raises DemonstrationError if a segment is not within its recording, or contradicts labels.yaml.
+    """
+    recordings: dict[str, PoseRecording] = {}
+    for segment in segments:
+        if segment.recording not in recordings:
+            recordings[segment.recording] = read_poses(folder / segment.recording)
+        _refuse(segment, recordings[segment.recording])
+    file = folder / FILE_NAME
+    if not file.exists():
+        write_labels(file, LabelsFile(parameters=list(_names(segments, parameter_names))))
+        try:
+            append_segments(file, segments)
+        except DemonstrationError:
+            file.unlink()
+            raise
+        return
+    has = load_labels(file).file.parameters
+    if parameter_names is not None and list(parameter_names) != has:
+        raise DemonstrationError(f"{file} has the parameters ({', '.join(has)}); a set has the same in all")
+    append_segments(file, segments)
+
+
+def _names(segments: Sequence[Segment], given: Sequence[str] | None) -> Sequence[str]:
+    if given is not None:
+        return given
+    count = len(segments[0].theta) if segments else 0
+    if count == 3:
+        return ("target_x", "target_y", "target_z")
+    return [f"parameter_{number}" for number in range(1, count + 1)]
+
+
+def _refuse(segment: Segment, poses: PoseRecording) -> None:
+    since = poses.time_ns - poses.time_ns[0]
+    what = f"{segment.recording}, {segment.start:g} to {segment.end:g} s"
+    if segment.end <= segment.start:
+        raise DemonstrationError(f"{what}: the end is not after the start")
+    if round(segment.end * BILLION) > since[-1] + (since[-1] // max(len(since) - 1, 1)):
+        raise DemonstrationError(f"{what}: the recording covers 0 to {since[-1] / BILLION:.6g} s")
+    inside = int(((since >= round(segment.start * BILLION)) & (since <= round(segment.end * BILLION))).sum())
+    if inside < 2:
+        raise DemonstrationError(f"{what}: {inside} frames; a movement has at least 2: make it longer")

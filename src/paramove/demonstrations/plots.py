@@ -1,0 +1,125 @@
+"""Pictures of a demonstration set: paths in space, and coordinates over time, coloured by a parameter."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from paramove.demonstrations.demonstration_set import DemonstrationSet
+from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.supervision.names import nearest
+
+DPI = 110
+FIGURE_IN = (13.0, 7.5)
+POINTS_FIRST = ("index", "wrist", "hand")
+"""Which point is drawn if none is named: the first of these that there is, else the last point."""
+COLOURS = "viridis"
+
+
+def plot_set(shown: DemonstrationSet, point: str | None = None, colour_by: str | None = None) -> Figure:
+    """Left the paths of one point in space, right its x, y, z over time; one line per movement.
+
+    Args:
+        shown: What to draw.
+        point: Name of the point; None: the fingertip where there is one.
+        colour_by: Name of a parameter, or "action"; None: the parameter that varies most, else the action.
+
+    Raises DemonstrationError for a set without movements, or a name that is not there.
+    """
+    if not len(shown):
+        raise DemonstrationError("there is no movement to draw")
+    name = point or next((one for one in POINTS_FIRST if one in shown.point_names), shown.point_names[-1])
+    values, title = _colour_values(shown, colour_by)
+    figure = Figure(figsize=FIGURE_IN, layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
+    space = figure.add_subplot(grid[:, 0], projection="3d")
+    over_time = [figure.add_subplot(grid[row, 1]) for row in range(3)]
+    norm = Normalize(float(values.min()), float(max(values.max(), values.min() + 1e-9)))
+    colours = colormaps[COLOURS](norm(values))
+    for movement, colour in zip(shown, colours, strict=True):
+        path = movement.point(name)
+        space.plot(*path.T, color=colour, linewidth=0.9, alpha=0.8)
+        for axis, axes in enumerate(over_time):
+            axes.plot(movement.time, path[:, axis], color=colour, linewidth=0.9, alpha=0.8)
+    _dress(space, over_time, shown, name)
+    if title == "action":
+        _legend(space, shown, values, colours)
+    else:
+        figure.colorbar(ScalarMappable(norm, COLOURS), ax=over_time, label=title, pad=0.02)
+    figure.suptitle(_title(shown), fontsize=11)
+    return figure
+
+
+def write_plot(figure: Figure, path: Path, about: str = "") -> None:
+    """Writes the picture as PNG, SVG or PDF, or within an HTML page that needs no other file.
+
+    Raises DemonstrationError for another ending.
+    """
+    if path.suffix.lower() in (".html", ".htm"):
+        picture = io.BytesIO()
+        figure.savefig(picture, format="png", dpi=DPI)
+        data = base64.b64encode(picture.getvalue()).decode("ascii")
+        text = (
+            "<!doctype html><html lang=en><meta charset=utf-8>"
+            f"<title>{html.escape(about)}</title><style>body{{font:15px sans-serif;margin:2em;max-width:1400px}}"
+            "img{max-width:100%}</style>"
+            f"<h1>{html.escape(about)}</h1><img alt='paths and coordinates' src='data:image/png;base64,{data}'>\n"
+        )
+        path.write_text(text, encoding="utf-8")
+    elif path.suffix.lower() in (".png", ".svg", ".pdf"):
+        figure.savefig(path, dpi=DPI)
+    else:
+        raise DemonstrationError(f"{path}: pictures end in .png, .svg, .pdf or .html")
+
+
+def _colour_values(shown: DemonstrationSet, colour_by: str | None) -> tuple[Floats, str]:
+    """A number per movement, and what it is."""
+    names = shown.parameter_names
+    if colour_by not in (None, "action", *names):
+        raise DemonstrationError(f"there is no parameter '{colour_by}'; {nearest(str(colour_by), ['action', *names])}")
+    theta = np.stack([movement.theta for movement in shown])
+    spread = np.ptp(theta, axis=0) if names else np.zeros(0)
+    if colour_by is None and names and spread.max() > 0.0:
+        colour_by = names[int(spread.argmax())]
+    if colour_by in names:
+        return theta[:, names.index(str(colour_by))], str(colour_by)
+    numbers = [shown.actions.index(movement.action) for movement in shown]
+    return np.array(numbers, dtype=np.float64), "action"
+
+
+def _dress(space: Axes, over_time: list[Axes], shown: DemonstrationSet, name: str) -> None:
+    low = np.min([movement.point(name).min(axis=0) for movement in shown], axis=0)
+    high = np.max([movement.point(name).max(axis=0) for movement in shown], axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
+    for number, axis in enumerate("xyz"):  # equal scales, so that a circle is one
+        getattr(space, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
+        getattr(space, f"set_{axis}label")(f"{axis}, m")
+        over_time[number].set_ylabel(f"{name} {axis}, m")
+        over_time[number].grid(alpha=0.3)
+    space.set_box_aspect((1.0, 1.0, 1.0))  # type: ignore[arg-type]  # in 3D it takes three
+    space.set_title(f"path of {name}, frame '{shown.frame}'", fontsize=10)
+    over_time[-1].set_xlabel("time, s")
+
+
+def _legend(space: Axes, shown: DemonstrationSet, values: Floats, colours: Floats) -> None:
+    for number, action in enumerate(shown.actions):
+        colour = colours[int(np.flatnonzero(values == number)[0])]
+        space.plot([], [], [], color=colour, label=action)
+    space.legend(loc="upper left", fontsize=8)
+
+
+def _title(shown: DemonstrationSet) -> str:
+    persons = [name for name in shown.subjects if name]
+    parts = [f"{len(shown)} movements", ", ".join(shown.actions), f"{len(persons)} persons" if len(persons) > 1 else ""]
+    return " · ".join(part for part in parts if part)
