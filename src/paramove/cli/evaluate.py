@@ -12,6 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from paramove.cli import completions
+from paramove.cli.evaluate_chapters import chapter2
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
 from paramove.cli.evaluation_io import (
@@ -28,6 +29,7 @@ app = typer.Typer(name="evaluate", help="Repeat experiments and say how well the
 app.command("kills")(kills)
 app.command("faults")(faults)
 app.command("imitation")(imitation)
+app.command("chapter2")(chapter2)
 
 RUNS = Path("runs/evaluation")
 
