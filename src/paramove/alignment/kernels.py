@@ -41,27 +41,42 @@ def distances_to(point: Floats, columns: Floats, row: Floats) -> None:
 def accumulated_a(p: Floats, columns: Floats) -> Floats:
     """d_ij of step pattern (A), Equation (B.7), for p (T_1, D) and the other sequence's columns (D, T_2). (T_1, T_2).
 
-    Corrected: the first row and column accumulate.
+    Corrected: the first row and column accumulate. Two rows are filled at a time, the second one column behind: each
+    entry of a row waits for the one before it, and the processor has work meanwhile.
     """
     length = columns.shape[1]
     total = np.empty((len(p), length))
-    row = np.empty(length)
-    distances_to(p[0], columns, row)
+    upper, lower = np.empty(length), np.empty(length)
+    distances_to(p[0], columns, upper)
     so_far = 0.0
     for j in range(length):
-        so_far += row[j]
+        so_far += upper[j]
         total[0, j] = so_far
-    for i in range(1, len(p)):
-        distances_to(p[i], columns, row)
-        above, here = total[i - 1], total[i]
-        here[0] = above[0] + row[0]
-        for j in range(1, length):
-            here[j] = row[j] + min(above[j], above[j - 1])
-        so_far = here[0]
-        for j in range(1, length):
-            so_far = min(here[j], so_far + row[j])
-            here[j] = so_far
+    for i in range(1, len(p) - 1, 2):
+        distances_to(p[i], columns, upper)
+        distances_to(p[i + 1], columns, lower)
+        _two_rows(total[i - 1], upper, lower, total[i], total[i + 1])
+    if len(p) % 2 == 0:
+        distances_to(p[-1], columns, upper)
+        _two_rows(total[-2], upper, upper, total[-1], lower)
     return total
+
+
+@compiled
+def _two_rows(above: Floats, upper: Floats, lower: Floats, first: Floats, second: Floats) -> None:
+    """Fill two rows of d_ij below `above` from the distances in these rows."""
+    length = len(above)
+    first[0] = above[0] + upper[0]
+    for j in range(1, length):
+        first[j] = upper[j] + min(above[j], above[j - 1])
+    before, left = first[0], first[0] + lower[0]
+    second[0] = left
+    for j in range(1, length):
+        here = min(first[j], before + upper[j])
+        first[j] = here
+        left = lower[j] + min(min(before, here), left)
+        second[j] = left
+        before = here
 
 
 @compiled
