@@ -13,7 +13,9 @@ from paramove.hmm.compilation import compiled, compiled_sums
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-UNDERFLOW = -745.0  # exp of less is zero
+DENSE_UNDERFLOW = -700.0
+UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
+LEAST_POSTERIOR = 1e-100
 SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
 
 
@@ -144,7 +146,7 @@ def stacked_banded(
                 gamma[i, offset + t - 1] = 0.0
             for j in range(low[t], high[t] + 1):
                 posterior = gamma[j, offset + t]
-                if posterior == 0.0:
+                if posterior < LEAST_POSTERIOR:
                     continue
                 for k in range(max(0, j - high[t - 1]), min(width - 1, j - low[t - 1]) + 1):
                     share = posterior * shares[t, j, k]
@@ -194,7 +196,7 @@ def _dense_forward(
         sums[t, :] = 0.0
         for i in range(n_states):
             difference = alpha[t - 1, i] - largest
-            scaled[t - 1, i] = np.exp(difference) if difference > UNDERFLOW else 0.0
+            scaled[t - 1, i] = np.exp(difference) if difference > DENSE_UNDERFLOW else 0.0
             if scaled[t - 1, i] > 0.0:
                 _add_multiple(scaled[t - 1, i], transitions[i], sums[t])
         for j in range(n_states):

@@ -31,7 +31,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-UNDERFLOW = -745.0  # exp of less is zero
+UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
 
 
 @compiled

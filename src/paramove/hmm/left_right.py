@@ -96,8 +96,10 @@ class LeftRightHMM:
         """Duration distributions p_i(d) in column d - 1. Shape (N, d_max)."""
         return self.parameters.durations
 
-    def fit(self, sequences: Sequence[ArrayLike]) -> Self:
+    def fit(self, sequences: Sequence[ArrayLike], initial: Parameters | None = None) -> Self:
         """Train by Baum-Welch on sequences of shape (T_k, D), lengths between N d_min and N d_max.
+
+        It begins with `initial`, by default with equal segments.
 
         Raises SequenceLengthError for an impossible length and ValueError for bad values, copies and dimensions that
         never change; the sequence or dimension is named.
@@ -109,7 +111,8 @@ class LeftRightHMM:
             except SequenceLengthError as error:
                 raise SequenceLengthError(f"sequence {index}: {error}") from error
         check_demonstrations(checked, self.options.floor_deviation)
-        initial = equal_segments(checked, self.n_states, self.d_min, self.d_max, self.options, self.covariance)
+        if initial is None:
+            initial = equal_segments(checked, self.n_states, self.d_min, self.d_max, self.options, self.covariance)
         self._parameters, self.training_ = train(initial, checked, self.options, self.covariance)
         self._evaluator = None
         return self
