@@ -15,6 +15,7 @@ from paramove.cli import completions
 from paramove.cli.evaluate_chapters import chapter2
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
+from paramove.cli.evaluate_movements import peers, real
 from paramove.cli.evaluation_io import (
     JUDGED_A_FAILURE,
     PROGRESS,
@@ -29,6 +30,8 @@ app = typer.Typer(name="evaluate", help="Repeat experiments and say how well the
 app.command("kills")(kills)
 app.command("faults")(faults)
 app.command("imitation")(imitation)
+app.command("real")(real)
+app.command("peers")(peers)
 app.command("chapter2")(chapter2)
 
 RUNS = Path("runs/evaluation")

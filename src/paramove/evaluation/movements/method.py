@@ -1,0 +1,117 @@
+"""What is compared: anything that learns from labelled movements, and can do some of five things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SYNTHESIS, THETA, CLASSES, BEGINNINGS, TYPICALITY = "synthesis", "theta", "classes", "beginnings", "typicality"
+"""What a method can do, as it says itself; what it cannot is a dash in the tables."""
+FRAMES = 100
+"""Frames that movements are resampled to wherever a method needs equal lengths."""
+
+
+class Estimate(NamedTuple):
+    """Theta (P,) and its covariance (P, P); None from methods that do not know how sure they are."""
+
+    theta: Floats
+    covariance: Floats | None
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Movements with labels.
+
+    Attributes:
+        sequences: points over time at their own pace, each (T_k, D), m.
+        theta: parameters, shape (K, P).
+        labels: name of the action of each.
+        groups: number of the fold unit (person, target) of each, shape (K,): hyper-parameters are chosen by leaving
+            whole units out, never by leaving out single repetitions.
+        rate_hz: frames per second.
+    """
+
+    sequences: list[Floats]
+    theta: Floats
+    labels: list[str]
+    groups: Ints
+    rate_hz: float
+
+    def __len__(self) -> int:
+        return len(self.sequences)
+
+    def chosen(self, where: Sequence[int] | NDArray[Any]) -> Examples:
+        """Those with the given indices, or where a mask is true."""
+        mask = np.asarray(where)
+        indices = np.flatnonzero(mask) if mask.dtype == bool else mask
+        return replace(
+            self,
+            sequences=[self.sequences[i] for i in indices],
+            theta=self.theta[indices],
+            labels=[self.labels[i] for i in indices],
+            groups=self.groups[indices],
+        )
+
+    def of(self, label: str) -> Examples:
+        """Those of one action."""
+        return self.chosen(np.array([one == label for one in self.labels]))
+
+    @property
+    def actions(self) -> list[str]:
+        """Names of the actions."""
+        return sorted(set(self.labels))
+
+
+@runtime_checkable
+class Method(Protocol):
+    """A model under comparison. One object is fitted once per fold and then asked."""
+
+    can: frozenset[str]
+
+    def fit(self, examples: Examples) -> None:
+        """Learn. Of one action where synthesis, theta and typicality are asked; of several for classification."""
+
+    def synthesize(self, theta: Floats, n: int) -> Floats:
+        """The prototype movement for theta. Shape (n, D), m."""
+
+    def estimate(self, x: Floats) -> Estimate:
+        """The parameter of a finished movement (T, D)."""
+
+    def classify(self, x: Floats, finished: bool) -> str:
+        """The action of a movement (T, D); of a beginning where not finished: how long it will be is unknown."""
+
+    def score(self, x: Floats) -> float:
+        """How typical a movement (T, D) is of the action learned: the greater the more."""
+
+
+class NotAble:
+    """Base of methods that cannot do everything: what is not overridden raises."""
+
+    can: frozenset[str] = frozenset()
+
+    def fit(self, examples: Examples) -> None:
+        """Learn from examples."""
+        raise NotImplementedError(f"{type(self).__name__} cannot learn")
+
+    def synthesize(self, theta: Floats, n: int) -> Floats:
+        """Raises NotImplementedError."""
+        raise NotImplementedError(f"{type(self).__name__} cannot synthesise")
+
+    def estimate(self, x: Floats) -> Estimate:
+        """Raises NotImplementedError."""
+        raise NotImplementedError(f"{type(self).__name__} cannot estimate parameters")
+
+    def classify(self, x: Floats, finished: bool) -> str:
+        """Raises NotImplementedError."""
+        raise NotImplementedError(f"{type(self).__name__} cannot classify")
+
+    def score(self, x: Floats) -> float:
+        """Raises NotImplementedError."""
+        raise NotImplementedError(f"{type(self).__name__} cannot tell the typical from the untypical")

@@ -1,0 +1,117 @@
+"""The peers of the comparison, each with its default and its tuned row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from typing import Any
+
+from paramove.evaluation.movements.method import BEGINNINGS, CLASSES, Method
+from paramove.evaluation.movements.per_action import ByElapsedTime, PerAction
+from paramove.evaluation.movements.sweep import Row
+from paramove.evaluation.peers.hidden_markov import CellHMMs, GaussianHMM
+from paramove.evaluation.peers.input_driven_hmm import InputDrivenHMM
+from paramove.evaluation.peers.minirocket import MiniRocket
+from paramove.evaluation.peers.nearest import NearestByWarping
+from paramove.evaluation.peers.promp import ContextualProMP
+from paramove.evaluation.peers.ridge import AlignedRidge
+from paramove.evaluation.peers.tuning import Tuned
+
+PEERS = "paramove.evaluation.peers"
+COMMON = (f"{PEERS}.tuning", "paramove.evaluation.movements.per_action")
+GAUSSIAN = (f"{PEERS}.linear_gaussian", *COMMON)
+
+Parameters = dict[str, Any]
+
+
+def raster_of(**values: list[Any]) -> list[Parameters]:
+    """All combinations of some values of hyper-parameters."""
+    return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
+
+
+def one_action(make_one: Callable[[], Method]) -> Method:
+    """A model of one action; with several a classifier of whole movements and of beginnings as well."""
+    can = make_one().can | {CLASSES}
+    return ByElapsedTime(partial(PerAction, make_one, can), can | {BEGINNINGS})
+
+
+def classifier(make: Callable[[], Method]) -> Method:
+    """A classifier, of beginnings as well."""
+    return ByElapsedTime(make, make().can | {BEGINNINGS})
+
+
+def both(
+    name: str,
+    kind: Callable[..., Method],
+    candidates: list[Parameters],
+    sources: tuple[str, ...],
+    libraries: tuple[str, ...],
+    *,
+    whole: Callable[[Callable[[], Method]], Method] = one_action,
+    **fixed: Any,
+) -> list[Row]:
+    """Default and tuned row of a kind of method with some parameters fixed."""
+
+    def default(seed: int) -> Method:
+        return whole(partial(kind, **fixed))
+
+    def tuned(seed: int) -> Method:
+        return whole(partial(Tuned, partial(kind, **fixed), candidates))
+
+    return [
+        Row(f"{name} (default)", default, repr(fixed), sources, libraries),
+        Row(f"{name} (tuned)", tuned, repr((fixed, candidates)), sources, libraries),
+    ]
+
+
+def ridge_rows() -> list[Row]:
+    """Alignment, principal components and ridge regression: the strong simple baseline."""
+    candidates = raster_of(components=[4, 8, 16], degree=[1, 2])
+    rest = (AlignedRidge, candidates, (f"{PEERS}.ridge", *GAUSSIAN), ("tslearn", "scikit-learn"))
+    return [
+        *both("DTW + PCA + quadratic ridge, diagonal", *rest),
+        *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
+        *both("PCA + quadratic ridge, full covariance", *rest, covariance="full", warped=False),
+    ]
+
+
+def promp_rows() -> list[Row]:
+    """Probabilistic movement primitives with quadratic context."""
+    candidates = raster_of(weights=[8, 15, 25], degree=[1, 2], noise_m=[0.003, 0.01, 0.03])
+    rest = (ContextualProMP, candidates, (f"{PEERS}.promp", *GAUSSIAN), ("movement-primitives", "gmr", "tslearn"))
+    return [
+        *both("ProMP, quadratic context, linear time", *rest),
+        *both("ProMP, quadratic context, DTW-aligned", *rest, warped=True),
+    ]
+
+
+def hmm_rows() -> list[Row]:
+    """Hidden Markov models: hmmlearn without parameters, dynamax with theta as its input."""
+    plain = (raster_of(n_states=[10, 20, 30]), (f"{PEERS}.hidden_markov", *COMMON), ("hmmlearn",))
+    driven = (
+        raster_of(n_states=[10, 20], floor_m=[0.003, 0.01]),
+        (f"{PEERS}.input_driven_hmm", *GAUSSIAN),
+        ("dynamax", "jax"),
+    )
+    return [
+        *both("hmmlearn, one HMM per action", GaussianHMM, *plain),
+        *both("hmmlearn, one HMM per target", CellHMMs, *plain),
+        *both("dynamax LinearRegressionHMM, linear", InputDrivenHMM, *driven, degree=1),
+        *both("dynamax LinearRegressionHMM, quadratic", InputDrivenHMM, *driven, degree=2),
+    ]
+
+
+def classifier_rows() -> list[Row]:
+    """Classification and regression of time series."""
+    rocket = (raster_of(kernels=[1_000, 10_000]), (f"{PEERS}.minirocket", *COMMON), ("sktime", "scikit-learn"))
+    nearest = (raster_of(neighbours=[1, 3, 5], radius=[10, None]), (f"{PEERS}.nearest", *COMMON), ("tslearn",))
+    return [
+        *both("MiniRocket", MiniRocket, *rocket, whole=classifier),
+        *both("kNN-DTW", NearestByWarping, *nearest, whole=classifier),
+    ]
+
+
+def peer_rows() -> list[Row]:
+    """All rows of other people's methods."""
+    return [*ridge_rows(), *promp_rows(), *classifier_rows(), *hmm_rows()]
