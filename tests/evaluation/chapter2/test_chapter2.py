@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from typer.testing import CliRunner
 
-from paramove.evaluation.chapter2 import experiment, figures, findings, report
+from paramove.cli.evaluate import app
+from paramove.evaluation.chapter2 import experiment, figures, findings
 from paramove.evaluation.chapter2.drawing import ellipse
 from paramove.evaluation.chapter2.figures import FIGURES, PLAIN_5, TIMED_5, TIMED_10, Setting
 from paramove.evaluation.chapter2.movement import PARAMETER_SETS, performance, prototype, training_set
@@ -86,12 +88,16 @@ def short() -> experiment.Experiment:
         return experiment.run_experiment(0)
 
 
-def test_report_holds_every_figure_and_needs_no_other_file(
+def test_the_command_writes_a_report_of_every_figure_that_needs_no_other_file(
     short: experiment.Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for kind in figures.LAST:
         monkeypatch.setitem(figures.LAST, kind, 20)
-    numbers = report.write_results(short, tmp_path)
+    monkeypatch.setattr(experiment, "run_experiment", lambda seed, tell: short)
+    answer = CliRunner().invoke(app, ["chapter2", "--out", str(tmp_path), "--json", str(tmp_path / "numbers.json")])
+    assert answer.exit_code == 0, answer.output
+    numbers = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))
+    assert "report: " in answer.output
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     for figure in FIGURES:
         assert f"Figure {figure.number}: " in page
