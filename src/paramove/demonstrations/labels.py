@@ -12,10 +12,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from paramove.demonstrations.movement import DemonstrationError
-from paramove.supervision.names import nearest
+from paramove.supervision.names import closest, nearest
 from paramove.supervision.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
 
 FILE_NAME = "labels.yaml"
@@ -46,6 +46,10 @@ def _number_as_text(value: object) -> object:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+def _nothing_as_none_yet(value: object) -> object:
+    return [] if value is None else value
+
+
 Word = Annotated[str, Field(min_length=1, max_length=80)]
 
 
@@ -72,7 +76,9 @@ class LabelsFile(_Checked):
     parameters: list[Word] = Field(default_factory=list, description="names of the components of theta")
     points: list[Word] | None = Field(default=None, min_length=1, description="which points, in which order; null: all")
     max_gap: float = Field(default=0.1, ge=0.0, le=1.0, description="s; longer losses of a point are not filled")
-    segments: list[Segment] = Field(default_factory=list, description="the movements")
+    segments: Annotated[list[Segment], BeforeValidator(_nothing_as_none_yet)] = Field(
+        default_factory=list, description="the movements"
+    )
 
 
 @dataclass(frozen=True)
@@ -124,7 +130,11 @@ def _validated(document: Document) -> LabelsFile:
     try:
         return LabelsFile.model_validate(document.data)
     except ValidationError as error:
-        raise LaunchFileError.of([_finding(document, found) for found in error.errors()]) from error
+        unknown = [found["loc"] for found in error.errors() if found["type"] == "extra_forbidden"]
+        # A key that is missing only because it is mistyped is told once.
+        mistyped = {(*loc[:-1], meant) for loc in unknown for meant in closest(str(loc[-1]), Segment.model_fields)}
+        told = [one for one in error.errors() if one["type"] != "missing" or tuple(one["loc"]) not in mistyped]
+        raise LaunchFileError.of([_finding(document, found) for found in told]) from error
 
 
 _EXPECTED = {
@@ -190,30 +200,56 @@ def write_labels(path: Path, content: LabelsFile) -> None:
 
 
 def append_segments(path: Path, segments: Sequence[Segment]) -> None:
-    """Adds segments to a labels.yaml; comments, order and whatever else is written there stay as they are.
+    """Adds segments to a labels.yaml; every other character of it, comments too, stays as it is.
 
     Raises DemonstrationError or LabelsError, and leaves the file alone, if it would not be a sound one afterwards.
     """
     before = _text(path)
     load_labels(path)
-    try:
-        tree = _yaml().load(before)
-    except YAMLError as error:  # what read_mapping takes and this refuses: not known of any file
-        raise DemonstrationError(f"{path} cannot be read as YAML: {error}") from error
-    if not tree.get("segments"):
-        tree["segments"] = CommentedSeq()
-    tree["segments"].extend(_segment(segment) for segment in segments)
     after = path.with_name(path.name + ".new")
-    after.write_text(_dumped(tree), encoding="utf-8")
+    after.write_text(_with_segments(before, [_in_flow(_segment(segment)) for segment in segments]), encoding="utf-8")
     try:
         load_labels(after)
     except LabelsError as error:
         after.unlink()
-        named = (LaunchFileError(one.position, one.message) for one in error.findings)
-        raise DemonstrationError(
-            f"{path} would not be sound with this segment: {'; '.join(one.message for one in named)}"
-        ) from error
+        said = "; ".join(finding.message for finding in error.findings)
+        raise DemonstrationError(f"{path} would not be sound with this segment: {said}") from error
     after.replace(path)
+
+
+def _with_segments(text: str, lines: Sequence[str]) -> str:
+    """The text with a line for each new segment at the end of its list, however the list is written."""
+    pairs = {key.value: (key, value) for key, value in _yaml().compose(text).value}
+    key, listed = pairs.get("segments", (None, None))
+    fresh = "\n".join(f"  - {line}" for line in lines)
+    if listed is None:
+        return f"{text.rstrip()}\nsegments:\n{fresh}\n"
+    if isinstance(listed, SequenceNode) and listed.flow_style and listed.value:
+        at = _end(listed.value[-1])
+        return f"{text[:at]}, {', '.join(lines)}{text[at:]}"
+    if isinstance(listed, SequenceNode) and not listed.flow_style:
+        at, indent = _end(listed.value[-1]), " " * listed.start_mark.column
+        fresh = "\n".join(f"{indent}- {line}" for line in lines)
+    else:  # `[]`, or nothing at all
+        if isinstance(listed, SequenceNode):
+            text = text[: listed.start_mark.index].rstrip(" ") + text[listed.end_mark.index :]
+        at = key.end_mark.index
+    line_end = text.find("\n", at)
+    line_end = len(text) if line_end < 0 else line_end
+    return f"{text[:line_end]}\n{fresh}{text[line_end:] or chr(10)}"
+
+
+def _end(node: Node) -> int:
+    """Where a node's own text ends: a block's end mark lies behind the comments and empty lines that follow it."""
+    if not isinstance(node, SequenceNode | MappingNode) or node.flow_style or not node.value:
+        return int(node.end_mark.index)
+    last = node.value[-1]
+    return _end(last[1] if isinstance(last, tuple) else last)
+
+
+def _in_flow(tree: CommentedMap) -> str:
+    """A mapping in one line."""
+    return _dumped(CommentedSeq([tree])).strip().removeprefix("-").strip()
 
 
 def _segment(segment: Segment) -> CommentedMap:
@@ -242,7 +278,7 @@ def _yaml() -> YAML:
     return yaml
 
 
-def _dumped(tree: CommentedMap) -> str:
+def _dumped(tree: CommentedMap | CommentedSeq) -> str:
     text = io.StringIO()
     _yaml().dump(tree, text)
     return text.getvalue().removeprefix("%YAML 1.2\n---\n")

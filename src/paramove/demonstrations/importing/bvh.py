@@ -77,7 +77,7 @@ def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
             if kind == "position":
                 place[:, "xyz".index(axis)] = values[:, column]
             else:
-                turn = turn @ Rotation.from_euler(axis, values[:, column], degrees=True).as_matrix()
+                turn = turn @ Rotation.from_euler(axis, values[:, column : column + 1], degrees=True).as_matrix()
             column += 1
         if joint.parent >= 0:
             above = turns[joint.parent]

@@ -29,7 +29,7 @@ def read_npz(path: Path) -> tuple[list[RawTake], list[str]]:
     Raises DemonstrationError for arrays that are missing or do not fit together.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
     except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
         raise DemonstrationError(f"{path} cannot be read as NPZ: {error}; arrays of objects are refused") from error
