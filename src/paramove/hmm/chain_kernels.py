@@ -8,7 +8,7 @@ alpha beta / p(X) (2.14), for what follows t does not depend on what was before,
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled, compiled_sums
+from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -16,6 +16,10 @@ Ints = NDArray[np.int64]
 DENSE_UNDERFLOW = -700.0
 UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
 LEAST_POSTERIOR = 1e-100
+LOG2_E = 1.4426950408889634
+LN2_HIGH = 0.693147180369123816490  # the upper 33 bits of ln 2, and the rest
+LN2_LOW = 1.90821492927058770002e-10
+ROUNDING = 6755399441055744.0  # 1.5 * 2^52: adding it rounds to an integer, which is then in the lowest bits
 SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
 
 
@@ -54,7 +58,7 @@ def _active(windows: Ints, offset: int, n_frames: int, low: Ints, high: Ints) ->
             high[t] = max(high[t], i)
 
 
-@compiled
+@compiled_arithmetic
 def _banded_forward(
     log_output: Floats, offset: int, n_frames: int, log_start: Floats, log_band: Floats, low: Ints, high: Ints,
     alpha: Floats, shares: Floats,
@@ -88,6 +92,87 @@ def _banded_forward(
                 alpha[t, j] += np.log(total)
                 for k in range(first, last + 1):
                     shares[t, j, k] /= total
+
+
+@compiled_arithmetic
+def _exp_of_negative(values: Floats, n: int, bits: Ints, result: Floats) -> None:
+    """e^x of the first n values, none above 0; 0 where x is below UNDERFLOW. Plain arithmetic, which is vectorised.
+
+    x = k ln 2 + r with |r| <= ln 2 / 2; the exponent of 2^k is written into the bits of a number.
+    """
+    rounded = bits.view(np.float64)
+    for j in range(n):
+        rounded[j] = max(values[j], UNDERFLOW) * LOG2_E + ROUNDING
+    for j in range(n):
+        k = rounded[j] - ROUNDING
+        r = (max(values[j], UNDERFLOW) - k * LN2_HIGH) - k * LN2_LOW
+        # Taylor series to r^13 / 13!: the next term is below 5e-18.
+        tail = 1 / 479001600 + r * (1 / 6227020800)
+        tail = 1 / 3628800 + r * (1 / 39916800 + r * tail)
+        tail = 1 / 40320 + r * (1 / 362880 + r * tail)
+        tail = 1 / 720 + r * (1 / 5040 + r * tail)
+        tail = 1 / 24 + r * (1 / 120 + r * tail)
+        tail = 1 / 2 + r * (1 / 6 + r * tail)
+        result[j] = 1.0 + r * (1.0 + r * tail)
+    for j in range(n):
+        bits[j] = (bits[j] + 1023) << 52
+    for j in range(n):
+        result[j] = result[j] * rounded[j] if values[j] >= UNDERFLOW else 0.0
+
+
+@compiled_arithmetic
+def _log_of_one_plus(values: Floats, n: int, result: Floats) -> None:
+    """ln(1 + x) of the first n values in [0, 1]: 2 artanh(x / (2 + x)), whose argument is at most 1/3."""
+    for j in range(n):
+        s = values[j] / (2.0 + values[j])
+        q = s * s
+        total = 1 / 31 + q * (1 / 33 + q * (1 / 35))
+        total = 1 / 27 + q * (1 / 29 + q * total)
+        total = 1 / 23 + q * (1 / 25 + q * total)
+        total = 1 / 19 + q * (1 / 21 + q * total)
+        total = 1 / 15 + q * (1 / 17 + q * total)
+        total = 1 / 11 + q * (1 / 13 + q * total)
+        total = 1 / 7 + q * (1 / 9 + q * total)
+        total = 1 / 3 + q * (1 / 5 + q * total)
+        result[j] = 2.0 * s * (1.0 + q * total)
+
+
+@compiled_arithmetic
+def _next_state_forward(
+    log_output: Floats, offset: int, n_frames: int, log_start: Floats, log_band: Floats, low: Ints, high: Ints,
+    alpha: Floats, shares: Floats,
+) -> None:  # fmt: skip
+    """`_banded_forward` for steps to the same and the next state alone, for all states of a frame at once."""
+    n_states = len(log_start)
+    largest, difference, small = np.empty(n_states), np.empty(n_states), np.empty(n_states)
+    logarithm, bits = np.empty(n_states), np.empty(n_states, np.int64)
+    stay, step = log_band[:, 0].copy(), log_band[:, 1].copy()
+    alpha[0, :] = -np.inf
+    for j in range(low[0], high[0] + 1):
+        alpha[0, j] = log_start[j] + log_output[j, offset]
+    for t in range(1, n_frames):
+        before, now = alpha[t - 1], alpha[t]
+        now[:] = -np.inf
+        first, n = low[t], high[t] - low[t] + 1
+        for j in range(n):
+            i = first + j
+            here = before[i] + stay[i]
+            there = before[i - 1] + step[i] if i > 0 else -np.inf
+            top = max(here, there)
+            largest[j] = top
+            # Of two impossible ones neither has a share.
+            difference[j] = min(here, there) - top if top > -np.inf else -np.inf
+            shares[t, i, 0] = 1.0 if here >= there else 0.0
+        _exp_of_negative(difference, n, bits, small)
+        _log_of_one_plus(small, n, logarithm)
+        for j in range(n):
+            i = first + j
+            greater = 1.0 / (1.0 + small[j])
+            less = small[j] * greater
+            stays = shares[t, i, 0] > 0.0
+            shares[t, i, 0] = greater if stays else less
+            shares[t, i, 1] = less if stays else greater
+            now[i] = largest[j] + logarithm[j] + log_output[i, offset + t]
 
 
 @compiled
@@ -133,7 +218,10 @@ def stacked_banded(
         if high[:n_frames].min() < 0:
             log_likelihood[s] = -np.inf
             continue
-        _banded_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, shares)
+        if width == 2:
+            _next_state_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, shares)
+        else:
+            _banded_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, shares)
         last = n_frames - 1
         value = _last_frame(alpha[last], log_exit, low[last], high[last], gamma, offset + last)
         log_likelihood[s] = value
@@ -253,33 +341,3 @@ def stacked_dense(
         starts += posterior
     counts += products * transitions
     return log_likelihood
-
-
-@compiled
-def best_path(
-    log_output: Floats, log_start: Floats, log_transitions: Floats, log_exit: Floats, width: int
-) -> tuple[float, Ints]:
-    """Log probability of the likeliest path and its states, shape (T,) (Viterbi). log_output: shape (N, T).
-
-    From state i at most `width` - 1 states further; 0 if any transition is possible.
-    """
-    n_states, n_frames = log_output.shape
-    best, choice = log_start + log_output[:, 0], np.zeros((n_frames, n_states), np.int64)
-    following = np.empty(n_states)
-    for t in range(1, n_frames):
-        for j in range(n_states):
-            first, last = (0, n_states - 1) if width == 0 else (max(0, j - width + 1), j)
-            largest = -np.inf
-            for i in range(first, last + 1):
-                value = best[i] + log_transitions[i, j]
-                if value > largest:
-                    largest = value
-                    choice[t, j] = i
-            following[j] = largest + log_output[j, t]
-        best[:] = following
-    states = np.empty(n_frames, np.int64)
-    states[-1] = np.argmax(best + log_exit)
-    value = best[states[-1]] + log_exit[states[-1]]
-    for t in range(n_frames - 1, 0, -1):
-        states[t - 1] = choice[t, states[t]]
-    return float(value), states

@@ -26,3 +26,12 @@ def compiled_sums(function: Function) -> Function:
     That lets the compiler use vector instructions. Infinities and NaN keep their meaning, unlike with full fastmath.
     """
     return cast(Function, numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})(function))
+
+
+def compiled_arithmetic(function: Function) -> Function:
+    """The same for arithmetic in a fixed order: division by zero gives infinity or NaN, as in numpy, and no error.
+
+    A test for zero at each division would keep the compiler from using vector instructions.
+    """
+    flags = {"contract"}
+    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=flags)(function))

@@ -17,7 +17,6 @@ from paramove.hmm.chain import (
     check_parameters,
     maximised,
 )
-from paramove.hmm.chain_kernels import best_path
 from paramove.hmm.covariances import Covariance, check_kind
 from paramove.hmm.filtering import ChainFilter
 from paramove.hmm.initialisation import Initialisation, check_initialisation, initial_chain
@@ -30,6 +29,7 @@ from paramove.hmm.sequences import (
     checked_sequences,
 )
 from paramove.hmm.training import iterate
+from paramove.hmm.viterbi import best_path
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,7 +11,7 @@ Index convention: `ending[i, t]` belongs to "i states are complete and t frames 
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled
+from paramove.hmm.compilation import compiled, compiled_arithmetic
 from paramove.hmm.gaussians import add_moments, log_outputs, stacked_log_outputs, stacked_moments
 
 __all__ = [
@@ -149,7 +149,7 @@ def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends
     return float(best[n_states, n_frames]), borders
 
 
-@compiled
+@compiled_arithmetic
 def _forward_shares(
     log_output: Floats, offset: int, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, shares: Floats
 ) -> None:
