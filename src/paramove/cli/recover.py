@@ -73,11 +73,10 @@ def _lines(result: Recovery) -> list[str]:
     kept = f"{result.kept} messages, {result.seconds_kept:.3f} s"
     if result.destination is None:
         return [f"{result.source} is whole ({kept}): nothing to recover"]
-    at_least = "" if result.lost_is_exact else "at least "
-    lines = [
-        f"{result.destination}: kept {kept}",
-        f"lost {at_least}{result.lost} messages, {at_least}{result.seconds_lost:.3f} s",
-    ]
+    counted = f"{result.lost} messages, {result.seconds_lost:.3f} s"
+    if not result.lost_is_exact:
+        counted = f"at least {counted}, and what these bytes held" if result.lost else "what these bytes held"
+    lines = [f"{result.destination}: kept {kept}", f"lost {counted}{':' if result.damages else ''}"]
     lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MOST_DAMAGES]]
     if len(result.damages) > MOST_DAMAGES:
         lines.append(f"  and {len(result.damages) - MOST_DAMAGES} more")

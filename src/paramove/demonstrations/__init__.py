@@ -10,6 +10,8 @@ from paramove.demonstrations.blending import (
     redirect_from_model,
     train_pointing_model,
 )
+from paramove.demonstrations.demonstration_set import DemonstrationSet, Sequences
+from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.reaching import (
     Demonstrations,
     demonstrations_at,
@@ -29,8 +31,12 @@ __all__ = [
     "SAMPLE_RATE_HZ",
     "ArmLengths",
     "BlendTiming",
+    "DemonstrationError",
+    "DemonstrationSet",
     "Demonstrations",
     "Demonstrator",
+    "Movement",
+    "Sequences",
     "Timing",
     "Variation",
     "blended",

@@ -85,7 +85,8 @@ def write_set(
         write_poses(folder / name, together, LIBRARY)
         segments += found
     if there:
-        append_segments(folder / FILE_NAME, segments)
+        if segments:
+            append_segments(folder / FILE_NAME, segments)
         return
     content = LabelsFile(
         description=description, parameters=list(parameter_names), max_gap=max_gap, segments=_in_order(takes, segments)
@@ -98,7 +99,7 @@ def _refuse(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str],
         raise DemonstrationError("there is no movement to write")
     if there and not add:
         raise DemonstrationError(f"{folder} holds a demonstration set already; choose another folder, or --add to it")
-    if there:
+    if there and any(take.labels for take in takes):
         has = load_labels(folder / FILE_NAME).file.parameters
         if list(parameter_names) != has:
             raise DemonstrationError(
