@@ -78,10 +78,11 @@ def write_set(
     """
     there = (folder / FILE_NAME).exists()
     _refuse(folder, takes, parameter_names, there, add)
-    folder.mkdir(parents=True, exist_ok=True)
+    names = dict.fromkeys(take.recording for take in takes)
+    recordings = {name: _together([take for take in takes if take.recording == name]) for name in names}
+    folder.mkdir(parents=True, exist_ok=True)  # nothing is written before everything is known to fit
     segments: list[Segment] = []
-    for name in dict.fromkeys(take.recording for take in takes):
-        together, found = _together([take for take in takes if take.recording == name])
+    for name, (together, found) in recordings.items():
         write_poses(folder / name, together, LIBRARY)
         segments += found
     if there:
@@ -105,6 +106,13 @@ def _refuse(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str],
             raise DemonstrationError(
                 f"{folder / FILE_NAME} has the parameters ({', '.join(has)}), not ({', '.join(parameter_names)}); "
                 "a set has the same in all: give --parameters, or choose another folder"
+            )
+    labelled = [take for take in takes if take.labels]
+    for take in labelled:
+        if set(take.point_names) != set(labelled[0].point_names):
+            raise DemonstrationError(
+                f"{take.recording} has the points {', '.join(take.point_names)}, {labelled[0].recording} has "
+                f"{', '.join(labelled[0].point_names)}; choose those that all have with --point or --mapping"
             )
     for name in {take.recording for take in takes}:
         for file in (folder / name, folder / f"{name}.part"):

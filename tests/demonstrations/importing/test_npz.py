@@ -1,5 +1,7 @@
 """NPZ files: one take as plain arrays, or many labelled movements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -115,3 +117,9 @@ def test_takes_of_one_name_must_fit(tmp_path):
     other = type(take)(take.recording, take.time, take.positions[:, :1], ("wrist",), take.frame)
     with pytest.raises(DemonstrationError, match="differ in points or frame"):
         write_set(tmp_path / "set", [take, other])
+    labelled = [replace(one, recording=f"{n}.mcap", labels=(Label(0, 10, "x"),)) for n, one in enumerate([take, other])]
+    with pytest.raises(
+        DemonstrationError, match=r"1\.mcap has the points wrist, 0\.mcap has wrist, index; choose those"
+    ):
+        write_set(tmp_path / "set", labelled)
+    assert not (tmp_path / "set").exists()
