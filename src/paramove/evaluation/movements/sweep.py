@@ -37,6 +37,10 @@ PROTOCOL = (
 """Source that every result depends on, beside the data: modules, and single functions of modules."""
 
 
+PATIENCE_S = 10.0
+"""How long a cluster's scheduler may take to answer."""
+
+
 class ClusterMissingError(RuntimeError):
     """No cluster can be used: the library is missing or nobody answers."""
 
@@ -169,7 +173,7 @@ def _cluster(scheduler: str | None) -> Iterator[None]:
         ) from error
     joblib = importlib.import_module("joblib")
     try:
-        client = distributed.Client(scheduler, timeout=10, set_as_default=True)
+        client = distributed.Client(scheduler, timeout=PATIENCE_S, set_as_default=True)
     except (OSError, ValueError) as error:
         raise ClusterMissingError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client, joblib.parallel_config(backend="dask"):
@@ -205,7 +209,7 @@ def code_digest(source: str) -> str:
     files = sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
     digest = hashlib.sha256()
     for file in files:  # layout and comments decide nothing
-        digest.update(f"{file.name}\0{ast.dump(ast.parse(file.read_text(encoding='utf-8')))}".encode())
+        digest.update(ast.dump(ast.parse(file.read_text(encoding="utf-8"))).encode())
     return digest.hexdigest()
 
 

@@ -13,6 +13,8 @@ from paramove.hmm import resample
 
 Floats = NDArray[np.float64]
 INNER_FOLDS = 3
+MOST_ASKED = 24
+"""About as many movements are asked in an inner fold, evenly chosen: more cost time and change few choices."""
 
 
 class Tuned(NotAble):
@@ -80,7 +82,9 @@ def inner_folds(examples: Examples) -> list[tuple[Examples, Examples]]:
     folds = []
     for k in range(count):
         left_out = np.isin(examples.groups, groups[k::count])
-        folds.append((examples.chosen(~left_out), examples.chosen(left_out)))
+        asked = np.flatnonzero(left_out)
+        step = max(1, len(asked) // MOST_ASKED)
+        folds.append((examples.chosen(~left_out), examples.chosen(asked[::step])))
     return folds
 
 
