@@ -206,3 +206,31 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(RecoveryError, match=r"there is no recording .*run\.mcap") as refused:
         recover(tmp_path / "run.mcap")
     assert refused.value.exit_code == 66
+
+
+def test_whatever_happens_to_a_file_nothing_foreign_is_kept(tmp_path: Path) -> None:
+    """Blocks are overwritten, bytes fall out, the end is missing: a subset of what was written, or a refusal."""
+    content, written, _ = finished()
+    rng = random.Random(1)
+    kept = 0
+    for trial in range(80):
+        damaged = bytearray(content)
+        at, many = rng.randrange(len(damaged)), rng.randrange(1, 2000)
+        if trial % 3 == 0:
+            damaged[at : at + many] = rng.randbytes(many)
+        elif trial % 3 == 1:
+            del damaged[at : at + many]
+        else:
+            for _ in range(many % 30):
+                damaged[rng.randrange(at + 1)] = rng.randrange(256)
+            del damaged[at + 1 :]
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        try:
+            _, found = recovered(folder, bytes(damaged))
+        except RecoveryError:
+            continue
+        kept += len(found)
+        places = [written.index(one) for one in found]
+        assert places == sorted(set(places)), f"trial {trial}"
+    assert kept > 40 * len(written)

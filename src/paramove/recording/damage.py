@@ -114,12 +114,12 @@ class Survey:
         """Where the file cannot be read."""
         return [part for part in self.parts if isinstance(part, Damage)]
 
-    def take(self, record: object) -> None:
-        """Keeps a record that explains others."""
+    def take(self, record: object, checked: bool) -> None:
+        """Keeps a record that explains others; one out of a chunk, which has a checksum, rather than another."""
         if isinstance(record, Channel):
-            self.channels[record.id] = record
+            self.channels[record.id] = record if checked else self.channels.get(record.id, record)
         elif isinstance(record, Schema):
-            self.schemas[record.id] = record
+            self.schemas[record.id] = record if checked else self.schemas.get(record.id, record)
         elif isinstance(record, Statistics):
             self.statistics = record
         elif isinstance(record, Metadata) and record.name != CHANNELS:
@@ -134,8 +134,8 @@ class Survey:
             if number in self.channels:
                 continue
             schema = -number  # no number of the file, which may be in use
+            name = topics.by_name(topic).type_name  # a KeyError tells that the record is damaged
             self.channels[number] = Channel(number, topic, "protobuf", {}, schema)
-            name = topics.by_name(topic).type_name
             self.schemas[schema] = Schema(schema, b"", "protobuf", name)
 
 
@@ -217,7 +217,7 @@ def _keep(record: object, at: int, end: int, found: Survey) -> None:
         if found.indexed.get(record.channel_id) != list(record.records):
             found.parts.append(Damage(at, end, "an index is damaged", 0))
     else:
-        found.take(record)
+        found.take(record, checked=False)
 
 
 def _is_chunk(content: Content, at: int) -> bool:
@@ -260,7 +260,7 @@ def _take_chunk(content: Content, at: int, found: Survey) -> int:
             messages.append(record)
             found.indexed.setdefault(record.channel_id, []).append((record.log_time, offset))
         else:
-            found.take(record)
+            found.take(record, checked=True)
     if messages:
         found.parts.append(Sound.of(at, messages))
     if cut:
