@@ -103,9 +103,9 @@ def em_iteration(n_states: int, d_min: int, d_max: int, n_frames: int) -> list[R
     ]
 
 
-def expanded_iteration(n_states: int, d_min: int, d_max: int, n_frames: int) -> list[Row]:
+def expanded_iteration(n_states: int, d_min: int, d_max: int, n_frames: int, count: int) -> list[Row]:
     """One iteration of the same model: durations, or d_max sub-states each, whose outputs peers cannot tie."""
-    sequences = movements(n_frames, 90)
+    sequences = movements(n_frames, count)
     durations = LeftRightHMM(n_states, d_min, d_max, options=OPTIONS).fit(sequences)
     start = (durations.means_, durations.covariances_, d_min, d_max)
     first = durations.parameters
@@ -187,8 +187,8 @@ def first_call() -> list[Row]:
 GROUPS: dict[str, Callable[[], list[Row]]] = {
     "EM iteration, 20 states (4..6), 90 x T=100, D=21": lambda: em_iteration(20, 4, 6, 100),
     "EM iteration, 80 states (2..3), 90 x T=200, D=21": lambda: em_iteration(80, 2, 3, 200),
-    "the same durations, 20 states (4..6), 90 x T=100": lambda: expanded_iteration(20, 4, 6, 100),
-    "the same durations, 80 states (2..3), 90 x T=200": lambda: expanded_iteration(80, 2, 3, 200),
+    "the same durations, 20 states (4..6), 90 x T=100": lambda: expanded_iteration(20, 4, 6, 100, 90),
+    "the same durations, 80 states (2..3), 20 x T=200": lambda: expanded_iteration(80, 2, 3, 200, 20),
     "training of thesis 4.1.1, 21 states, 10 x T=100, 10 iterations": thesis_training,
     "log-likelihood of one movement, 20 states, T=100": likelihood,
     "parametric models of reaching": parametric,

@@ -129,13 +129,14 @@ def check_demonstrations(sequences: Sequence[Floats], floor_deviation: float) ->
         alike.append(index)
     if floor_deviation > 0:
         return
-    low, high = np.array([s.min(axis=0) for s in sequences]), np.array([s.max(axis=0) for s in sequences])
-    spread, size = high.max(axis=0) - low.min(axis=0), np.maximum(np.abs(low), np.abs(high)).max(axis=0)
+    frames = np.concatenate(list(sequences))
+    low, high = frames.min(axis=0), frames.max(axis=0)
+    spread, size = high - low, np.maximum(np.abs(low), np.abs(high))
     constant = (spread <= 1e-12 * size) | (spread < LEAST_SPREAD)
     if constant.any():
         dimension = int(constant.argmax())
         raise ValueError(
-            f"dimension {dimension} has the value {low[0, dimension]:.6g} in all frames of all sequences, so its "
+            f"dimension {dimension} has the value {low[dimension]:.6g} in all frames of all sequences, so its "
             "variance is zero; leave it out, or give TrainingOptions(floor_deviation=...) in its unit"
         )
 

@@ -1,4 +1,4 @@
-"""The likeliest path of states through a chain (thesis 2.1.4)."""
+"""The likeliest path of states through a chain (Viterbi)."""
 
 import numpy as np
 from numpy.typing import NDArray
