@@ -13,7 +13,7 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.maximisation import curvature_covariance, maximum_over_cells
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.synchronisation import synchronised
 
 Floats = NDArray[np.float64]
@@ -106,11 +106,11 @@ class InterpolativePHMM(ParametricHMM):
         self.covariance_inflation = float(np.mean(squared)) / self.grid_.dimension
         return self
 
-    def _fit(self, sequences: list[Floats], theta: Floats) -> None:
-        grid = self._grid_for(theta)
-        groups = grouped(sequences, theta, grid)
+    def _fit(self, data: TrainingData) -> None:
+        grid = self._grid_for(data.theta)
+        groups = grouped(data.sequences, data.theta, grid)
         options = self._training_options()
-        everything = LeftRightHMM(self.n_states, self.d_min, self.d_max, options=options).fit(sequences)
+        everything = LeftRightHMM(self.n_states, self.d_min, self.d_max, options=options).fit(data.sequences)
         local = synchronised(everything.parameters, groups, options, self.local_iterations)
         self.training_ = everything.training_
         self._set_local(grid, local)
@@ -145,8 +145,15 @@ class InterpolativePHMM(ParametricHMM):
         """Covariance of the pose at progress tau (6.3). Shape (D, D); for many theta and tau: (M, D, D)."""
         return self._at_progress(self.covariances_, theta, tau, clamped=True)
 
-    def estimate(self, sequence: ArrayLike) -> ParameterEstimate:
-        """Maximum likelihood theta, searched per grid cell; covariance from the curvature of the log-likelihood."""
+    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
+        """Maximum likelihood theta, searched per grid cell; covariance from the curvature of the log-likelihood.
+
+        Raises ValueError for `finished=False`: a grid of local models knows nothing of beginnings.
+        """
+        if not finished:
+            raise ValueError(
+                "an InterpolativePHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings"
+            )
         checked = self._resampled(checked_sequence(sequence, self.means_.shape[-1]))
         check_length(len(checked), self.n_states, self.d_min, self.d_max)
 

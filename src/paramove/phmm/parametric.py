@@ -3,6 +3,7 @@
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -13,9 +14,11 @@ from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resampl
 from paramove.hmm.sequences import check_length, checked_sequence, checked_sequences
 from paramove.hmm.synthesis import Timing, at_progress
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class ParameterEstimate(NamedTuple):
@@ -24,6 +27,23 @@ class ParameterEstimate(NamedTuple):
     theta: Floats
     covariance: Floats
     log_likelihood: float
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """Checked demonstrations.
+
+    Attributes:
+        sequences: brought to `resampled_frames` if the model does so, (T_k, D) each.
+        recorded: the same in their own time.
+        theta: shape (K, P).
+        groups: number of the group of each, shape (K,).
+    """
+
+    sequences: list[Floats]
+    recorded: list[Floats]
+    theta: Floats
+    groups: Ints
 
 
 class ParametricHMM(ABC):
@@ -64,16 +84,19 @@ class ParametricHMM(ABC):
         """The HMM for one parameter."""
 
     @abstractmethod
-    def estimate(self, sequence: ArrayLike) -> ParameterEstimate:
-        """The parameter that makes a sequence most likely (thesis 4.1.2.3)."""
+    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
+        """The parameter that makes a sequence most likely (thesis 4.1.2.3).
+
+        With `finished=False` the sequence is the beginning of a movement, at the frame rate of the training.
+        """
 
     @abstractmethod
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for one theta (P,) or many (M, P). Shape (N, D) or (M, N, D)."""
 
     @abstractmethod
-    def _fit(self, sequences: list[Floats], theta: Floats) -> None:
-        """Train on checked sequences and theta of shape (K, P)."""
+    def _fit(self, data: TrainingData) -> None:
+        """Train on checked data."""
 
     @abstractmethod
     def _arrays(self) -> dict[str, Floats]:
@@ -83,12 +106,16 @@ class ParametricHMM(ABC):
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
         """Take over what was learned from a file. Raises ValueError for shapes that do not fit."""
 
-    def fit(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
+    def fit(self, sequences: Sequence[ArrayLike], theta: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Train on sequences (T_k, D) labelled with theta (K, P).
+
+        `groups` (K,) says which sequences belong together (such as those of one person): what is chosen by leaving out
+        is chosen by leaving out groups. Without them sequences with the same theta belong together.
 
         Raises SequenceLengthError for impossible lengths, ValueError for labels or values that do not fit.
         """
-        checked = [self._resampled(sequence) for sequence in checked_sequences(sequences)]
+        recorded = checked_sequences(sequences)
+        checked = [self._resampled(sequence) for sequence in recorded]
         labels = np.asarray(theta, dtype=np.float64)
         labels = labels[:, None] if labels.ndim == 1 else labels
         if labels.ndim != 2 or len(labels) != len(checked) or not np.isfinite(labels).all():
@@ -98,7 +125,7 @@ class ParametricHMM(ABC):
         for sequence in checked:
             check_length(len(sequence), self.n_states, self.d_min, self.d_max)
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
-        self._fit(checked, labels)
+        self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
         return self
 
     def log_likelihood(self, sequence: ArrayLike, theta: ArrayLike) -> float:

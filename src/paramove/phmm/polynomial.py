@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +17,33 @@ from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
-from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
-from paramove.phmm.regression import RegressedParameters, train_regressed
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
+from paramove.phmm.performance import Performances, beginning_features, state_averages
+from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 
 Floats = NDArray[np.float64]
 
+Residuals = Literal["independent", "correlated"]
 MOST_STEPS = 40
 STEP_TOLERANCE = 1e-7
+REALIGNMENTS = 2
+
+
+class Examination(NamedTuple):
+    """A sequence seen by one model.
+
+    Attributes:
+        estimate: of theta.
+        strangeness: how unlike the training movements it is, see `Performances.strangeness`; of a beginning the root of
+            its distance in units of the usual one.
+        log_density: of the state averages, or of the features of a beginning.
+        typicality: probability that a genuine movement is so strange or stranger.
+    """
+
+    estimate: ParameterEstimate
+    strangeness: float
+    log_density: float
+    typicality: float
 
 
 class PolynomialPHMM(ParametricHMM):
@@ -33,6 +54,9 @@ class PolynomialPHMM(ParametricHMM):
         degree: of the polynomials; 1 is the linear PHMM of Wilson and Bobick.
         smoothness: over which share of the movement the dependence on theta changes little: length of the prior that
             couples the slopes of neighbouring states, its strength found by the evidence. None: no prior, plain EM.
+        residuals: "correlated" learns how whole performances vary: `estimate` then knows that frames are not
+            independent, its covariance is honest, beginnings and untypical movements are recognised, and the means are
+            those that predict left-out groups best. "independent" is the thesis: maximum likelihood of frames.
         search_margin: how far outside the training's bounds `estimate` looks, as a share of their width.
 
     Attributes:
@@ -40,6 +64,7 @@ class PolynomialPHMM(ParametricHMM):
         coefficients_: Z, shape (N, D, F), in the unit of the sequences.
         covariances_: shape (N, D, D).
         durations_: p_i(d) in column d - 1, shape (N, d_max).
+        performances_: what was learned about whole performances; None with independent residuals.
     """
 
     def __init__(
@@ -53,6 +78,7 @@ class PolynomialPHMM(ParametricHMM):
         resampled_frames: int | None = None,
         description: MovementDescription | None = None,
         smoothness: float | None = 0.05,
+        residuals: Residuals = "correlated",
         search_margin: float = 0.25,
     ) -> None:
         super().__init__(
@@ -60,29 +86,49 @@ class PolynomialPHMM(ParametricHMM):
         )
         self.degree = degree
         self.smoothness = smoothness
+        self.residuals = residuals
         self.search_margin = search_margin
 
-    def _fit(self, sequences: list[Floats], theta: Floats) -> None:
+    def _fit(self, data: TrainingData) -> None:
         options = self._training_options()
-        monomials = Monomials.of_degree(self.degree, theta)
-        if self.smoothness is None and monomials.n_distinct(theta) < len(monomials):
+        monomials = Monomials.of_degree(self.degree, data.theta)
+        if self.residuals not in get_args(Residuals):
+            raise ValueError(f"residuals are {' or '.join(get_args(Residuals))}, found {self.residuals!r}")
+        if self.smoothness is None and monomials.n_distinct(data.theta) < len(monomials):
             raise ValueError(
-                f"{len(np.unique(theta, axis=0))} different theta do not determine the {len(monomials)} coefficients "
-                f"of degree {self.degree} in {theta.shape[1]} parameters: give more different theta, a lower degree, "
-                "or a smoothness (a prior)"
+                f"{len(np.unique(data.theta, axis=0))} different theta do not determine the {len(monomials)} "
+                f"coefficients of degree {self.degree} in {data.theta.shape[1]} parameters: give more different theta, "
+                "a lower degree, or a smoothness (a prior)"
             )
-        begin = equal_segments(sequences, self.n_states, self.d_min, self.d_max, options)
+        begin = equal_segments(data.sequences, self.n_states, self.d_min, self.d_max, options)
         coefficients = np.zeros((*begin.means.shape, len(monomials)))
         coefficients[..., 0] = begin.means
         initial = RegressedParameters(coefficients, begin.covariances, begin.durations, self.d_min)
+        features = monomials.at(data.theta)
         trained, self.training_ = train_regressed(
-            initial, sequences, monomials.at(theta), monomials.degrees, options, self.smoothness
+            initial, data.sequences, features, monomials.degrees, options, self.smoothness
         )
-        self._set_learned(monomials, trained.coefficients, trained.covariances, trained.durations)
+        performances = None
+        if self.residuals == "correlated":
+            performances = self._performances(data, trained, monomials)
+            if self.smoothness is not None:
+                coefficients = performances.complete.coefficients.reshape(trained.coefficients.shape)
+                trained = with_coefficients(trained, coefficients, data.sequences, features, options)
+        self._set_learned(monomials, trained)
+        self.performances_ = performances
 
-    def _set_learned(self, monomials: Monomials, coefficients: Floats, covariances: Floats, durations: Floats) -> None:
+    def _performances(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Performances:
+        common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
+        averages = [
+            state_averages(replace(common, means=trained.coefficients @ monomials.at(theta)), sequence)
+            for sequence, theta in zip(data.sequences, data.theta, strict=True)
+        ]
+        return Performances.fitted(np.stack(averages), data.recorded, data.theta, monomials, data.groups)
+
+    def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
         self.monomials_ = monomials
-        self.coefficients_, self.covariances_, self.durations_ = coefficients, covariances, durations
+        self.coefficients_, self.covariances_ = learned.coefficients, learned.covariances
+        self.durations_ = learned.durations
         self._white: tuple[Evaluator, Floats] | None = None
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
@@ -102,18 +148,65 @@ class PolynomialPHMM(ParametricHMM):
         value, gradient, _ = search_kernels.expectation_at(place, *self._prepared(self._checked(sequence)))
         return float(value), gradient / self.monomials_.scale
 
-    def estimate(self, sequence: ArrayLike) -> ParameterEstimate:
-        """Maximum likelihood theta by EM (3.5), generalised where the means are not linear; several starts."""
+    def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
+        """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
+
+        With independent residuals the maximum of the likelihood, by EM (3.5), generalised where means are not linear.
+        With correlated ones that is where the states are found; theta then follows from their averages. A beginning
+        (`finished=False`) has the frame rate of the training; its log-likelihood is that of `beginning_features`.
+        """
+        if self.performances_ is not None or not finished:
+            return self.examine(sequence, finished=finished).estimate
         prepared = self._prepared(self._checked(sequence))
-        widest = 1.0 + 2.0 * self.search_margin
-        bounds = np.full(len(self.monomials_.centre), widest)
-        best, value = search_kernels.best_climbed(
-            self._starts(), -bounds, bounds, *prepared, MOST_STEPS, STEP_TOLERANCE
-        )
+        best, value = self._likeliest(prepared)
         information = search_kernels.information_at(best, *prepared)
         scale = self.monomials_.scale
-        covariance = _inverse_information(information, widest) * np.outer(scale, scale)
-        return ParameterEstimate(self.monomials_.centre + scale * best, covariance, float(value))
+        covariance = _inverse_information(information, self._widest) * np.outer(scale, scale)
+        return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
+
+    def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
+        """Estimate of theta, and how typical of this movement the sequence is.
+
+        Raises ValueError for a model with independent residuals, which does not know how performances vary, and for a
+        beginning of fewer frames than are modelled.
+        """
+        if self.performances_ is None:
+            raise ValueError("this model has independent residuals: train it with residuals='correlated'")
+        if not finished:
+            checked = checked_sequence(sequence, self.covariances_.shape[-1])
+            n_frames, regression = self.performances_.beginning(len(checked))
+            features = beginning_features(checked, n_frames)
+            theta, covariance, distance = regression.estimate(features, self.search_margin)
+            density = regression.log_density(features, distance)
+            strangeness = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
+            found = ParameterEstimate(theta, covariance, density)
+            return Examination(found, strangeness, density, regression.typicality(distance))
+        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
+        checked = self._checked(recorded)
+        prepared = self._prepared(checked)
+        place, _ = self._likeliest(prepared)
+        theta = self.monomials_.centre + self.monomials_.scale * place
+        regression = self.performances_.complete
+        for _ in range(REALIGNMENTS):
+            averages = state_averages(replace(self._whitened()[0], means=self.state_means(theta)), checked)
+            theta, covariance, distance = regression.estimate(averages, self.search_margin)
+        value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, *prepared)
+        density = regression.log_density(averages, distance)
+        strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
+        found = ParameterEstimate(theta, covariance, float(value))
+        return Examination(found, strangeness, density, self.performances_.typicality(strangeness))
+
+    @property
+    def _widest(self) -> float:
+        return 1.0 + 2.0 * self.search_margin
+
+    def _likeliest(self, prepared: tuple[Any, ...]) -> tuple[Floats, float]:
+        """Scaled theta with the greatest likelihood, and its logarithm."""
+        bounds = np.full(len(self.monomials_.centre), self._widest)
+        best, value = search_kernels.best_climbed(
+            self._starts(), -bounds, bounds, MOST_STEPS, STEP_TOLERANCE, *prepared
+        )
+        return best, float(value)
 
     def _starts(self) -> Floats:
         """Where the search begins: the middle, and the corners half-way out if means are not linear. Shape (S, P)."""
@@ -126,11 +219,7 @@ class PolynomialPHMM(ParametricHMM):
 
     def _prepared(self, sequence: Floats) -> tuple[Any, ...]:
         """What the kernels need beside a place."""
-        if self._white is None:
-            evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
-            white = np.ascontiguousarray(evaluator.whitening @ self.coefficients_)
-            self._white = (evaluator, white)
-        evaluator, white = self._white
+        evaluator, white = self._whitened()
         ends = evaluator.ends(len(sequence))
         present = np.ones(len(sequence), dtype=np.bool_)
         frames = search_kernels.whitened_frames(sequence, present, evaluator.whitening, ends)
@@ -138,6 +227,13 @@ class PolynomialPHMM(ParametricHMM):
             self.monomials_.exponents, frames, present, white, evaluator.log_norm, evaluator.log_duration, self.d_min,
             ends, len(sequence),
         )  # fmt: skip
+
+    def _whitened(self) -> tuple[Evaluator, Floats]:
+        """Everything that depends neither on a sequence nor on theta: an evaluator, and the whitened coefficients."""
+        if self._white is None:
+            evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
+            self._white = evaluator, np.ascontiguousarray(evaluator.whitening @ self.coefficients_)
+        return self._white
 
     def _checked(self, sequence: ArrayLike) -> Floats:
         checked = self._resampled(checked_sequence(sequence, self.covariances_.shape[-1]))
@@ -156,13 +252,14 @@ class PolynomialPHMM(ParametricHMM):
         return [name for name in inspect.signature(PolynomialPHMM.__init__).parameters if name != "self"]
 
     def _arrays(self) -> dict[str, Floats]:
-        return {
+        arrays = {
             "coefficients": self.coefficients_,
             "covariances": self.covariances_,
             "durations": self.durations_,
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
         }
+        return arrays if self.performances_ is None else arrays | self.performances_.arrays()
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
         centre, scale = arrays["theta_centre"], arrays["theta_scale"]
@@ -181,7 +278,11 @@ class PolynomialPHMM(ParametricHMM):
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
         local = (arrays["coefficients"][None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
         check_local_models(*local, self.d_min)
-        self._set_learned(monomials, arrays["coefficients"], arrays["covariances"], arrays["durations"])
+        learned = (arrays["coefficients"], arrays["covariances"], arrays["durations"])
+        self._set_learned(monomials, RegressedParameters(*learned, self.d_min))
+        self.performances_ = None
+        if self.residuals == "correlated":
+            self.performances_ = Performances.from_arrays(arrays, monomials)
 
 
 class LinearPHMM(PolynomialPHMM):

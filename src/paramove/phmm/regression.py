@@ -151,6 +151,26 @@ def train_regressed(
     return parameters, monitor.summary(len(sequences))
 
 
+def with_coefficients(
+    parameters: RegressedParameters,
+    coefficients: Floats,
+    sequences: Sequence[Floats],
+    features: Floats,
+    options: TrainingOptions,
+) -> RegressedParameters:
+    """The family with other coefficients (N, D, F); covariances and durations follow by one more M-step."""
+    found = RegressionStatistics.gathered(parameters, sequences, features)
+    scatter = found.scatter(coefficients - parameters.coefficients)
+    target = pooled_covariance(scatter, found.weight)
+    regularisation = regularisation_at(options.max_iterations, options, root_mean_deviation(sequences), target)
+    return RegressedParameters(
+        coefficients,
+        covariances_of(scatter, found.weight, regularisation),
+        durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+        parameters.d_min,
+    )
+
+
 def _prior(
     prior: SlopePrior | None,
     parameters: RegressedParameters,

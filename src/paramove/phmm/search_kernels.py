@@ -182,8 +182,7 @@ def bounded_step(place: Floats, gradient: Floats, information: Floats, lower: Fl
                 matrix[other, p] = 0.0
             matrix[p, p] = 1.0
             right[p] = 0.0
-    step: Floats = np.linalg.solve(matrix, right)
-    return step
+    return np.linalg.solve(matrix, right).astype(np.float64)
 
 
 @compiled

@@ -1,0 +1,325 @@
+"""Polynomial regression of whole movements on theta, whose residuals are correlated in time and between points.
+
+The likelihood of an HMM takes frames for independent: it is sure of a theta long before it may be, and it does not know
+that a hand that starts too high usually ends too high. Here a movement is one vector y (all state averages), with
+y = Z phi(theta) + e, e ~ N(0, C). All that has to be chosen is chosen by leaving out groups of training movements (all
+those of one person, or of one theta): how strongly each degree of the polynomial is held back, how far correlations are
+shrunk, and how far regions of theta must be widened to hold what they promise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.stats import chi2
+
+from paramove.phmm.features import Monomials
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+STRENGTHS = 10.0 ** np.arange(-5.0, 2.0)
+"""Candidates for the ridge of each degree, as a share of the number of movements."""
+SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
+"""Candidates for the share of each variance that is taken for independent."""
+MOST_FOLDS = 10
+LEAST_SHARE = 0.02
+"""Standard deviations below this share of the mean one are lifted to it: they are known no better."""
+NEWTON_STEPS = 12
+
+
+@dataclass(frozen=True)
+class CorrelatedRegression:
+    """y = Z phi(theta) + e with e ~ N(0, C).
+
+    Attributes:
+        monomials: of theta.
+        coefficients: Z, shape (n, F).
+        root: lower triangular L with C = L L', shape (n, n).
+        inflation: factor on covariances of theta that makes regions hold what they promise.
+        distances: squared Mahalanobis distances of training movements, each left out. Shape (K,).
+        ridge: share per degree above 0. shrinkage: of the correlations.
+    """
+
+    monomials: Monomials
+    coefficients: Floats
+    root: Floats
+    inflation: float
+    distances: Floats
+    ridge: tuple[float, ...]
+    shrinkage: float
+
+    @classmethod
+    def fitted(
+        cls,
+        y: Floats,
+        theta: Floats,
+        monomials: Monomials,
+        groups: Ints,
+        ridge: tuple[float, ...] | None = None,
+        shrinkages: tuple[float, ...] = SHRINKAGES,
+    ) -> CorrelatedRegression:
+        """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
+        features, degrees = monomials.at(theta), monomials.degrees
+        ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
+        penalty = _penalties(ridge, degrees, len(y))
+        coefficients: Floats = np.linalg.solve(features.T @ features + penalty, features.T @ y).T.astype(np.float64)
+        left_out = residuals_left_out(y, features, penalty, groups)
+        deviation = np.sqrt((left_out**2).mean(axis=0))
+        deviation = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
+        start = cls(monomials, coefficients, np.eye(y.shape[1]), 1.0, np.zeros(0), ridge, 1.0)
+        folds = _folds(y / deviation, theta, monomials, penalty, groups)
+        shrinkage, inflation, distances = _chosen_shrinkage(folds, shrinkages)
+        n_groups = len(np.unique(groups))
+        inflation *= (n_groups + theta.shape[1]) / max(1, n_groups - 1)  # few groups know little of the tails
+        covariance = _shrunk(left_out / deviation, shrinkage)
+        root: Floats = deviation[:, None] * np.linalg.cholesky(covariance)
+        return replace(start, root=root, inflation=inflation, distances=distances, shrinkage=shrinkage)
+
+    def mean(self, theta: Floats) -> Floats:
+        """Z phi(theta). Shape (n,)."""
+        result: Floats = self.coefficients @ self.monomials.at(theta)
+        return result
+
+    def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats, float]:
+        """Most likely theta (P,), its widened covariance (P, P), and the squared Mahalanobis distance there.
+
+        Args:
+            y: the movement, (n,).
+            margin: how far outside the bounds of the training theta may lie, as a share of their width.
+        """
+        right, triangle, rest = self._condensed(y)
+        bound = 1.0 + 2.0 * margin
+        starts = [np.zeros(len(self.monomials.centre))]
+        if self.monomials.degrees.max() > 1:
+            starts += [np.array(corner) for corner in product((-0.5, 0.5), repeat=len(starts[0]))]
+        begin = min(starts, key=lambda place: self._misfit(place, right, triangle))
+        place, misfit = self._minimised(begin, right, triangle, bound)
+        slopes = triangle @ self._slopes(place)
+        information = slopes.T @ slopes + np.eye(len(place)) / bound**2
+        scale = self.monomials.scale
+        covariance = self.inflation * np.linalg.inv(information) * np.outer(scale, scale)
+        return self.monomials.centre + scale * place, covariance, misfit + rest
+
+    def log_density(self, y: Floats, distance: float) -> float:
+        """Logarithm of the density of y (n,) at a squared Mahalanobis distance."""
+        diagonal = np.diagonal(self.root)
+        return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(y) * np.log(2.0 * np.pi))
+
+    def typicality(self, distance: float) -> float:
+        """Probability that a genuine movement lies as far from the model or farther.
+
+        A scaled chi-square distribution with the mean and variance of the distances of unseen training movements.
+        """
+        if len(self.distances) < 2:
+            return 1.0
+        mean, variance = float(self.distances.mean()), float(self.distances.var()) + 1e-12
+        return float(chi2.sf(2.0 * mean / variance * distance, 2.0 * mean**2 / variance))
+
+    def arrays(self) -> dict[str, Floats]:
+        """Everything learned, for a file."""
+        scalars = np.array([self.inflation, self.shrinkage, *self.ridge])
+        return {"coefficients": self.coefficients, "root": self.root, "distances": self.distances, "scalars": scalars}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, Floats], prefix: str, monomials: Monomials) -> CorrelatedRegression:
+        """From what `arrays` gave, with a prefix to the names. Raises ValueError for shapes that do not fit."""
+        coefficients, root = arrays[f"{prefix}coefficients"], arrays[f"{prefix}root"]
+        distances, scalars = arrays[f"{prefix}distances"], arrays[f"{prefix}scalars"]
+        count = len(coefficients)
+        if coefficients.shape != (count, len(monomials)) or root.shape != (count, count) or distances.ndim != 1:
+            raise ValueError(
+                f"expected {prefix}coefficients of shape (n, {len(monomials)}) and root of shape (n, n), "
+                f"found {coefficients.shape} and {root.shape}"
+            )
+        if not (np.diagonal(root) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
+            raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
+        inflation, shrinkage, *ridge = (float(one) for one in scalars)
+        return cls(monomials, coefficients, root, inflation, distances, tuple(ridge), shrinkage)
+
+    def _condensed(self, y: Floats) -> tuple[Floats, Floats, float]:
+        """R and c with |L^-1 (y - Z phi)|^2 = |c - R phi|^2 + rest: the movement in as many numbers as monomials."""
+        if len(y) != len(self.coefficients):
+            raise ValueError(f"expected a movement as {len(self.coefficients)} numbers, found {len(y)}")
+        basis, triangle = self._condensing
+        white = solve_triangular(self.root, y, lower=True, check_finite=False)
+        right = basis.T @ white
+        return right, triangle, float(white @ white - right @ right)
+
+    @cached_property
+    def _condensing(self) -> tuple[Floats, Floats]:
+        """Q and R of L^-1 Z = Q R."""
+        white = solve_triangular(self.root, self.coefficients, lower=True)
+        basis, triangle = np.linalg.qr(white)
+        return basis, triangle
+
+    def _slopes(self, place: Floats) -> Floats:
+        return self.monomials.jacobian(self.monomials.centre + self.monomials.scale * place) * self.monomials.scale
+
+    def _misfit(self, place: Floats, right: Floats, triangle: Floats) -> float:
+        difference = right - triangle @ self.monomials.at(self.monomials.centre + self.monomials.scale * place)
+        return float(difference @ difference)
+
+    def _minimised(self, place: Floats, right: Floats, triangle: Floats, bound: float) -> tuple[Floats, float]:
+        """Gauss-Newton with halved steps, within the bounds."""
+        misfit = self._misfit(place, right, triangle)
+        for _ in range(NEWTON_STEPS):
+            at = self.monomials.at(self.monomials.centre + self.monomials.scale * place)
+            slopes = triangle @ self._slopes(place)
+            matrix = slopes.T @ slopes
+            matrix += 1e-9 * (np.trace(matrix) + 1e-300) * np.eye(len(place))
+            step = np.linalg.solve(matrix, slopes.T @ (right - triangle @ at))
+            for share in (1.0, 0.5, 0.2, 0.05):
+                candidate = np.clip(place + share * step, -bound, bound)
+                found = self._misfit(candidate, right, triangle)
+                if found < misfit:
+                    break
+            else:
+                break
+            gained, place, misfit = misfit - found, candidate, found
+            if gained < 1e-9 * (1.0 + misfit):
+                break
+        return place, misfit
+
+
+def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
+    """What a regression without a movement's group misses of it, for all at once. Shape (K, n)."""
+    hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
+    residuals: Floats = y - hat @ y
+    if len(np.unique(groups)) < 2:
+        widened: Floats = residuals * float(np.sqrt(len(y) / max(1.0, len(y) - np.trace(hat))))
+        return widened
+    result = np.empty_like(residuals)
+    for members in _members(groups):
+        own = np.eye(len(members)) - hat[np.ix_(members, members)]
+        own += 1e-9 * np.eye(len(members))
+        result[members] = np.linalg.solve(own, residuals[members])
+    return result
+
+
+def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints) -> tuple[float, ...]:
+    """The ridge per degree, as a share of the number of movements, that predicts left-out groups best."""
+    highest = int(degrees.max())
+    if len(np.unique(groups)) < 3:
+        return (1e-3,) * highest
+    best, least = (1e-3,) * highest, np.inf
+    for ridge in product(STRENGTHS, repeat=highest):
+        if any(low > high for low, high in pairwise(ridge)):
+            continue  # a higher degree is never held back less
+        penalty = _penalties(ridge, degrees, len(y))
+        hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
+        smoother = np.eye(len(y)) - hat
+        error = np.zeros(y.shape[1])
+        for members in _members(groups):
+            own = smoother[np.ix_(members, members)] + 1e-9 * np.eye(len(members))
+            rows = np.linalg.solve(own, smoother[members])
+            error += ((rows @ y) ** 2).sum(axis=0)
+        # Logarithms: a fingertip that is a millimetre off at the target counts as a tenth of a centimetre on the way.
+        total = float(np.log(error + 1e-12).mean())
+        if total < least - 1e-9:
+            best, least = ridge, total
+    return tuple(float(one) for one in best)
+
+
+def _penalties(ridge: tuple[float, ...], degrees: Ints, count: int) -> Floats:
+    strengths = np.array([0.0, *ridge])
+    return np.diag(count * strengths[degrees] + 1e-12)
+
+
+def _members(groups: Ints) -> Iterator[Ints]:
+    for group in np.unique(groups):
+        yield np.flatnonzero(groups == group)
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Movements that a regression has not seen: residuals (k, n) and slopes (k, n, P) by the others' coefficients.
+
+    `reference` are residuals of the others, each left out in turn; had their regression seen the tested movements, the
+    covariance would know the noise of those.
+    """
+
+    reference: Floats
+    residuals: Floats
+    slopes: Floats
+
+
+def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[_Fold]:
+    """At most `MOST_FOLDS` parts that keep groups together; of a single group, parts of its movements."""
+    different = np.unique(groups)
+    numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(y))
+    features = monomials.at(theta)
+    folds = []
+    for fold in range(min(MOST_FOLDS, int(numbers.max()) + 1)):
+        tested, others = np.flatnonzero(numbers % MOST_FOLDS == fold), np.flatnonzero(numbers % MOST_FOLDS != fold)
+        if len(others) < 2:
+            continue
+        seen = features[others]
+        coefficients = np.linalg.solve(seen.T @ seen + penalty, seen.T @ y[others]).T
+        slopes = np.stack([coefficients @ monomials.jacobian(one) * monomials.scale for one in theta[tested]])
+        reference = residuals_left_out(y[others], seen, penalty, groups[others])
+        folds.append(_Fold(reference, y[tested] - features[tested] @ coefficients.T, slopes))
+    return folds
+
+
+def _chosen_shrinkage(folds: list[_Fold], candidates: tuple[float, ...]) -> tuple[float, float, Floats]:
+    """Shrinkage with the least error of theta on unseen movements, the inflation it needs, and the distances."""
+    best, least = (candidates[-1], 1.0, np.zeros(0)), np.inf
+    for shrinkage in candidates:
+        found = [_tested(fold, shrinkage) for fold in folds]
+        if not found:
+            break
+        error, excess, distance = np.concatenate(found, axis=1)
+        total = float(np.sqrt(error + 1e-12).mean())
+        if total < least:
+            least = total
+            best = shrinkage, _inflation(excess, folds[0].slopes.shape[-1]), np.maximum(distance, 0.0)
+    return best
+
+
+def _tested(fold: _Fold, shrinkage: float) -> Floats:
+    """Squared error of theta, the same in predicted deviations, and distance, of each tested movement. Shape (3, k)."""
+    dimension = fold.slopes.shape[-1]
+    solved = _solved(fold.reference, shrinkage, np.concatenate([fold.residuals.T, *fold.slopes], axis=1))
+    count = len(fold.residuals)
+    result = np.empty((3, count))
+    for k in range(count):
+        wide = solved[:, count + k * dimension : count + (k + 1) * dimension]
+        gradient = wide.T @ fold.residuals[k]
+        missed = np.linalg.solve(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
+        excess = float(missed @ gradient)
+        result[:, k] = missed @ missed, excess, fold.residuals[k] @ solved[:, k] - excess
+    return result
+
+
+def _inflation(excess: Floats, dimension: int) -> float:
+    """What squared errors in predicted standard deviations must be divided by, in the mean and at 95 %."""
+    level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
+    tail = float(np.quantile(excess, level)) / float(chi2.ppf(0.95, dimension))
+    return max(1e-6, float(excess.mean()) / dimension, tail)
+
+
+def _shrunk(residuals: Floats, shrinkage: float) -> Floats:
+    """Second moments of standardised residuals (K, n), correlations shrunk. Shape (n, n)."""
+    moments = residuals.T @ residuals / len(residuals)
+    diagonal = np.diag(np.maximum(np.diagonal(moments), 1e-6))
+    result: Floats = (1.0 - shrinkage) * moments + shrinkage * diagonal + 1e-6 * np.eye(len(moments))
+    return result
+
+
+def _solved(residuals: Floats, shrinkage: float, right: Floats) -> Floats:
+    """C^-1 right for the shrunk second moments of (K, n) residuals; K may be much less than n (Woodbury)."""
+    diagonal = shrinkage * np.maximum((residuals**2).mean(axis=0), 1e-6) + 1e-6
+    scaled: Floats = right / diagonal[:, None]
+    if shrinkage >= 1.0:
+        return scaled
+    factor = residuals.T * np.sqrt((1.0 - shrinkage) / len(residuals))
+    inner = np.eye(len(residuals)) + factor.T @ (factor / diagonal[:, None])
+    result: Floats = scaled - (factor / diagonal[:, None]) @ np.linalg.solve(inner, factor.T @ scaled)
+    return result
