@@ -94,10 +94,12 @@ def peers(
 
     theirs = peer_rows()
     absent = {row.name: missing_libraries(row) for row in theirs}
-    notes = tuple(f"left out, not installed ({', '.join(names)}): {name}" for name, names in absent.items() if names)
+    without = sorted({library for names in absent.values() for library in names})
+    left_out = [name for name, names in absent.items() if names]
+    notes = [f"not installed: {', '.join(without)}; left out: {', '.join(left_out)}"] if left_out else []
     for note in notes:
-        _say_error(note)
-    if len(notes) == len(theirs):
+        _say_error(f"{note}. pip install 'paramove[peers]' brings them")
+    if len(left_out) == len(theirs):
         _say_error("no peer is installed: pip install 'paramove[peers]' brings them")
         raise typer.Exit(exit_codes.INPUT_MISSING)
     rows = _chosen([*our_rows(), *(row for row in theirs if not absent[row.name])], methods)
