@@ -7,7 +7,6 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import logsumexp
 
 from paramove.hmm.sequences import checked_sequence
 
@@ -39,7 +38,7 @@ class OnlineFilter(ABC):
         with np.errstate(divide="ignore"):
             joint = self._predicted()
         joint = joint + log_output.reshape((-1,) + (1,) * (joint.ndim - 1))
-        gain = float(logsumexp(joint))
+        gain = float(np.logaddexp.reduce(joint, axis=None))
         if not np.isfinite(gain):
             raise ValueError(
                 f"the model has no path for frame {self.n_frames + 1} of this movement: it allows fewer frames; "
@@ -90,7 +89,7 @@ class ChainFilter(OnlineFilter):
     def _predicted(self) -> Floats:
         if self._log_state is None:
             return self._log_start
-        result: Floats = logsumexp(self._log_state[:, None] + self._log_transitions, axis=0)
+        result: Floats = np.logaddexp.reduce(self._log_state[:, None] + self._log_transitions, axis=0)
         return result
 
     def _keep(self, log_probabilities: Floats) -> None:
@@ -123,7 +122,7 @@ class DurationFilter(OnlineFilter):
         if self._log_state is None:
             result[0, 0] = 0.0
         else:
-            result[1:, 0] = logsumexp(self._log_state[:-1] + self._log_leave[:-1], axis=1)
+            result[1:, 0] = np.logaddexp.reduce(self._log_state[:-1] + self._log_leave[:-1], axis=1)
             result[:, 1:] = self._log_state[:, :-1] + self._log_stay
         return result
 

@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from paramove.hmm.sequences import interpolate
 
@@ -88,6 +87,8 @@ def averaged(drawn: Sequence[Floats]) -> Floats:
 
 def splined(states: Ints, means: Floats, covariances: Floats, rng: np.random.Generator) -> Floats:
     """Method C: a cubic spline through one drawn output per stay in a state, at its middle. Shape (T, D)."""
+    from scipy.interpolate import CubicSpline  # half a second, which only this method should cost
+
     borders = np.flatnonzero(np.diff(states)) + 1
     begins, ends = np.append(0, borders), np.append(borders, len(states))
     controls = emitted(states[begins], means, covariances, rng)
