@@ -81,6 +81,11 @@ def test_movements_begin_where_the_source_says(table: Recordings) -> None:
         assert 10 <= one.onset <= 20
 
 
+def test_the_origin_of_beginnings_does_not_tell_where_the_segment_begins(table: Recordings) -> None:
+    for one in table.movements:
+        assert_allclose(one.from_onset.reshape(-1, 7, 3)[0, 1], 0.0, rtol=0, atol=1e-12)
+
+
 def test_onset_by_absolute_speeds() -> None:
     """Still, then 5 cm/s for 0.2 s, then 30 cm/s: the slow part belongs to the movement."""
     steps = np.concatenate([np.zeros(30), np.full(10, 0.05), np.full(20, 0.3)]) / 50.0

@@ -48,6 +48,7 @@ class RecordedMovement:
         segment: first frame and one past the last of the movement.
         grasp: the same for its part up to the grasp; None where there is none.
         onset: first frame by the absolute rule for speeds, which does not depend on the kind of movement.
+        shoulder: which point is the shoulder of the acting arm.
     """
 
     action: str
@@ -60,6 +61,7 @@ class RecordedMovement:
     segment: tuple[int, int]
     grasp: tuple[int, int] | None
     onset: int
+    shoulder: int
 
     @property
     def movement(self) -> Floats:
@@ -73,8 +75,14 @@ class RecordedMovement:
 
     @property
     def from_onset(self) -> Floats:
-        """The movement from the onset by the absolute rule to its last frame. Shape (T, D), m."""
-        return self.points[self.onset : self.segment[1]]
+        """The movement from the onset by the absolute rule to its last frame. Shape (T, D), m.
+
+        Origin where the shoulder is at this onset: where it is at the first frame of the segment would tell how far
+        both lie apart, and with that the kind of movement.
+        """
+        part = self.points[self.onset : self.segment[1]]
+        origin = part[0, 3 * self.shoulder : 3 * self.shoulder + 3]
+        return part - np.tile(origin, part.shape[1] // 3)
 
     @property
     def direction(self) -> Floats:
@@ -294,6 +302,7 @@ def _in_body_frame(
         segment=segment,
         grasp=frames(grasp) if grasp[0] >= 0 else None,
         onset=onset_of(uniform.reshape(len(uniform), -1, 3)[:, tip] / scale, segment[1], rate_hz),
+        shoulder=shoulder,
     )
 
 

@@ -1,6 +1,11 @@
-import numpy as np
+from pathlib import Path
 
-from paramove.evaluation.movements.tasks import Fold, corner_targets, raster_tasks
+import numpy as np
+import pytest
+
+from paramove.demonstrations.recorded_people import RecordingsError
+from paramove.evaluation.movements.tasks import Fold, corner_targets, raster_tasks, real_tasks
+from tests.demonstrations.made_up_recordings import write_table
 
 
 def test_all_tasks_follow_from_the_folder(tasks: dict[str, list[Fold]]) -> None:
@@ -26,6 +31,21 @@ def test_what_is_tested_is_not_trained(tasks: dict[str, list[Fold]]) -> None:
 def test_every_movement_is_tested_once(tasks: dict[str, list[Fold]]) -> None:
     assert sum(len(fold.test) for fold in tasks["pointing/direction"]) == 2 * 9 * 2 - 1
     assert sum(len(fold.test) for fold in tasks["table/actions"]) == 3 * 2 * 3 * 2
+
+
+def test_one_data_set_is_enough(tmp_path: Path) -> None:
+    write_table(tmp_path, persons=2)
+    assert set(real_tasks(tmp_path)) == {"table/across", "table/forward", "table/actions", "table/beginnings"}
+
+
+def test_a_single_person_cannot_be_left_out(tmp_path: Path) -> None:
+    write_table(tmp_path, persons=1)
+    assert real_tasks(tmp_path) == {}
+
+
+def test_no_data_set(tmp_path: Path) -> None:
+    with pytest.raises(RecordingsError, match="neither"):
+        real_tasks(tmp_path)
 
 
 def test_corners() -> None:

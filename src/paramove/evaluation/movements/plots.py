@@ -40,7 +40,8 @@ def intervals(rows: dict[str, dict[str, Any]], quantities: Sequence[Quantity], o
                     axes.plot(found.value, line, "o", c=colour, ms=4.5)
             if quantity.name == "covered":
                 axes.axvline(95.0, c="#1f7a45", lw=1.0, ls=":")
-            axes.set(title=f"{quantity.heading}{f', {quantity.unit}' if quantity.unit else ''}")
+            unit = f", {quantity.unit}" if quantity.unit else ""
+            axes.set_title(f"{quantity.heading}{unit}", fontsize=8.5)
         panels[0].set_yticks(range(len(rows)), list(rows))
         panels[0].invert_yaxis()
         return svg_of(figure)

@@ -102,7 +102,7 @@ def _table(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -> 
         cells = "".join(f"<td class=n>{_cell(rows, name, q)}</td>" for q in shown)
         cells += "".join(f"<td class=n>{_seconds(row, second)}</td>" for second in asked)
         label = f"<b>{escape(name)}</b>" if name in ours else escape(name)
-        lines.append(f"<tr><td>{label}</td>{cells}</tr>")
+        lines.append(f"<tr><td style='white-space:nowrap'>{label}</td>{cells}</tr>")
     return f"<table><tr><th>method</th>{heads}</tr>{''.join(lines)}</table>"
 
 
@@ -147,9 +147,9 @@ def _cell(rows: dict[str, dict[str, Any]], name: str, quantity: Quantity) -> str
     if found is None:
         return text
     digits = len(text.partition(".")[2])
-    interval = f"<span class=soft>[{found.low:.{digits}f}, {found.high:.{digits}f}]</span>"
+    interval = f"<br><span class=soft>[{found.low:.{digits}f}, {found.high:.{digits}f}]</span>"
     value = f"<b>{text}</b>" if name in leading(rows, quantity) else text
-    return f"{value} {interval}"
+    return f"{value}{interval}"
 
 
 def _seconds(row: dict[str, Any], name: str) -> str:

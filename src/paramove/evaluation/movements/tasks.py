@@ -23,7 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, table_targets
-from paramove.demonstrations.recorded_people import RATE_HZ, RecordedMovement, Recordings, load_recordings
+from paramove.demonstrations.recorded_people import (
+    RATE_HZ,
+    RecordedMovement,
+    Recordings,
+    RecordingsError,
+    data_folder,
+    load_recordings,
+)
 from paramove.evaluation.movements.measures import ThetaKind
 from paramove.evaluation.movements.method import Examples
 
@@ -60,15 +67,29 @@ class Fold:
 
 
 def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
-    """All tasks on recorded people, by name."""
-    pointing = load_recordings("pointing27", folder)
-    table = load_recordings("table_reach", folder)
-    tasks = {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
+    """All tasks on recorded people, by name; those of a data set that the folder does not have are left out.
+
+    Raises RecordingsError where there is no folder, no data set, or a damaged one.
+    """
+    root = data_folder(folder)
+    found = [name for name in ("pointing27", "table_reach") if (root / name / "data.npz").is_file()]
+    if not found:
+        raise RecordingsError(f"{root} has neither pointing27/data.npz nor table_reach/data.npz")
+    tasks: dict[str, list[Fold]] = {}
+    if "pointing27" in found:
+        pointing = load_recordings("pointing27", root)
+        tasks |= {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
+    if "table_reach" in found:
+        tasks |= _table_tasks(load_recordings("table_reach", root))
+    return {name: folds for name, folds in tasks.items() if folds}
+
+
+def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
     with_target = [action for action in table.actions if np.isfinite(_targets(table.of(action=action))).all()]
-    for action in with_target:
-        tasks[f"table/{action}"] = _persons(table, action)
-    tasks["table/actions"] = _kinds(table, beginnings=False)
-    tasks["table/beginnings"] = _kinds(table, beginnings=True)
+    tasks = {f"table/{action}": _persons(table, action) for action in with_target}
+    if len(table.actions) > 1:
+        tasks["table/actions"] = _kinds(table, beginnings=False)
+        tasks["table/beginnings"] = _kinds(table, beginnings=True)
     return tasks
 
 
@@ -96,7 +117,8 @@ def _directions(pointing: Recordings) -> list[Fold]:
         for target in sorted({one.target_id for one in own}):
             train = [one for one in own if one.target_id != target]
             test = [one for one in own if one.target_id == target]
-            folds.append(_pointing_fold("pointing/direction", f"{subject}/{target}", pointing, train, test))
+            if train:
+                folds.append(_pointing_fold("pointing/direction", f"{subject}/{target}", pointing, train, test))
     return folds
 
 
@@ -158,6 +180,8 @@ def _kinds(table: Recordings, *, beginnings: bool) -> list[Fold]:
     part = _FROM_ONSET if beginnings else _WHOLE
     for subject in table.subjects:
         rest = [one for one in table.movements if one.subject != subject]
+        if not rest:  # a single person cannot be left out
+            continue
         train = _table_examples(rest, table.fingertip, part)
         test = _table_examples(list(table.of(subject=subject)), table.fingertip, part)
         folds.append(Fold(name, str(subject), train, test, [], "place", table.fingertip, beginnings))
