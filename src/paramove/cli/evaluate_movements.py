@@ -127,6 +127,9 @@ def _tasks(on: Scope, data: Path | None, wanted: list[str] | None) -> dict[str, 
     except RecordingsError as error:
         _say_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    if not folds:
+        _say_error("nothing can be left out of these recordings: they are of one person, or of one target")
+        raise typer.Exit(exit_codes.INPUT_MISSING)
     chosen = {name: found for name, found in folds.items() if not wanted or any(text in name for text in wanted)}
     if not chosen:
         raise typer.BadParameter(f"tasks are {', '.join(folds)}", param_hint="--task")
