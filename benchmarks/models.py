@@ -153,7 +153,7 @@ def parametric() -> list[Row]:
     """Parametric models of reaching, 80 states of 2 to 3 frames, a cuboid of 2 x 2 x 2 places."""
     shown = reaching_grid_demonstrations(np.random.default_rng(0))
     local = InterpolativePHMM(80, 2, 3, resampled_frames=200).fit(shown.sequences, shown.theta)
-    quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6).fit(shown.sequences, shown.theta)
+    quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6, resampled_frames=100).fit(shown.sequences, shown.theta)
     theta, tau = np.repeat(shown.theta[:1], 400, axis=0), np.linspace(0.0, 1.0, 400)
     return [
         Row("train interpolative PHMM, 80 states", lambda: local.fit(shown.sequences, shown.theta)),
