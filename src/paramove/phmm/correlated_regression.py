@@ -17,7 +17,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from paramove.phmm.features import Monomials
 
@@ -69,7 +69,8 @@ class CorrelatedRegression:
         features, degrees = monomials.at(theta), monomials.degrees
         ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
         penalty = _penalties(ridge, degrees, len(y))
-        coefficients: Floats = np.linalg.solve(features.T @ features + penalty, features.T @ y).T.astype(np.float64)
+        solved = np.linalg.solve(features.T @ features + penalty, features.T @ y)
+        coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as a file gives it back
         left_out = residuals_left_out(y, features, penalty, groups)
         deviation = np.sqrt((left_out**2).mean(axis=0))
         deviation = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
@@ -112,15 +113,15 @@ class CorrelatedRegression:
         diagonal = np.diagonal(self.root)
         return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(y) * np.log(2.0 * np.pi))
 
-    def typicality(self, distance: float) -> float:
-        """Probability that a genuine movement lies as far from the model or farther.
+    def log_typicality(self, distance: float) -> float:
+        """Logarithm of the probability that a genuine movement lies as far from the model or farther.
 
-        A scaled chi-square distribution with the mean and variance of the distances of unseen training movements.
+        The logarithms of the distances of unseen training movements are taken for normally distributed.
         """
         if len(self.distances) < 2:
-            return 1.0
-        mean, variance = float(self.distances.mean()), float(self.distances.var()) + 1e-12
-        return float(chi2.sf(2.0 * mean / variance * distance, 2.0 * mean**2 / variance))
+            return 0.0
+        known = np.log(self.distances + 1e-9)
+        return float(norm.logsf((np.log(distance + 1e-9) - known.mean()) / max(float(known.std()), 1e-3)))
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""

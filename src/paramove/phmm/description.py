@@ -19,6 +19,7 @@ class MovementDescription:
         arrival: progress tau at which the target is reached, the hand still open; -1 if there is none.
         grasp: last progress tau at which the object is held; -1 if there is none.
         source: where the demonstrations come from; "" if unknown.
+        rate_hz: frame rate of the demonstrations, which beginnings of movements must have; 0 if unknown.
     """
 
     action: str = "movement"
@@ -30,6 +31,7 @@ class MovementDescription:
     arrival: float = -1.0
     grasp: float = -1.0
     source: str = ""
+    rate_hz: float = 0.0
 
     def as_record(self) -> dict[str, Any]:
         """Plain values for a file."""

@@ -57,6 +57,7 @@ class ParametricHMM(ABC):
 
     Attributes:
         parameter_bounds_: least and greatest theta of the training, shape (2, P).
+        training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
         training_: what training did.
     """
 
@@ -77,6 +78,7 @@ class ParametricHMM(ABC):
         self.resampled_frames = resampled_frames
         self.description = description
         self.parameter_bounds_: Floats | None = None
+        self.training_theta_: Floats | None = None
         self.training_: TrainingSummary | None = None
 
     @abstractmethod
@@ -125,6 +127,7 @@ class ParametricHMM(ABC):
         for sequence in checked:
             check_length(len(sequence), self.n_states, self.d_min, self.d_max)
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
+        self.training_theta_ = np.unique(labels, axis=0)
         self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
         return self
 
@@ -184,6 +187,8 @@ class ParametricHMM(ABC):
         if self.parameter_bounds_ is None:
             raise RuntimeError("this model has nothing to save yet: call fit first")
         arrays = {"parameter_bounds": self.parameter_bounds_, **self._arrays()}
+        if self.training_theta_ is not None:
+            arrays["training_theta"] = self.training_theta_
         write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
 
     @classmethod
@@ -202,6 +207,7 @@ class ParametricHMM(ABC):
             model._check_counts()
             arrays = dict(record.arrays)
             model.parameter_bounds_ = arrays.pop("parameter_bounds")
+            model.training_theta_ = arrays.pop("training_theta", None)
             model._set_arrays(arrays)
         except KeyError as error:
             found = ", ".join(sorted(record.arrays)) or "none"

@@ -98,13 +98,13 @@ class Performances:
         """
         return float(_strangeness(distance, pace_distance, self.complete.distances, self.pace.distances))
 
-    def typicality(self, strangeness: float) -> float:
-        """Probability that a genuine movement is so strange or stranger, from unseen training movements."""
+    def log_typicality(self, strangeness: float) -> float:
+        """Logarithm of the probability that a genuine movement is so strange or stranger, from unseen training ones."""
         known = np.log(_strangeness(
             self.complete.distances, self.pace.distances, self.complete.distances, self.pace.distances
         ))  # fmt: skip
         deviation = max(float(known.std()), 1e-3) if len(known) > 1 else np.inf
-        return float(norm.sf((np.log(strangeness) - known.mean()) / deviation))
+        return float(norm.logsf((np.log(strangeness) - known.mean()) / deviation))
 
     def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
         """The longest modelled beginning of at most so many frames. Raises ValueError where that is too short."""

@@ -37,13 +37,18 @@ class Examination(NamedTuple):
         strangeness: how unlike the training movements it is, see `Performances.strangeness`; of a beginning the root of
             its distance in units of the usual one.
         log_density: of the state averages, or of the features of a beginning.
-        typicality: probability that a genuine movement is so strange or stranger.
+        log_typicality: logarithm of the probability that a genuine movement is so strange or stranger.
     """
 
     estimate: ParameterEstimate
     strangeness: float
     log_density: float
-    typicality: float
+    log_typicality: float
+
+    @property
+    def typicality(self) -> float:
+        """Probability that a genuine movement is so strange or stranger; a small one is a reason to reject."""
+        return float(np.exp(self.log_typicality))
 
 
 class PolynomialPHMM(ParametricHMM):
@@ -127,8 +132,10 @@ class PolynomialPHMM(ParametricHMM):
 
     def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
         self.monomials_ = monomials
-        self.coefficients_, self.covariances_ = learned.coefficients, learned.covariances
-        self.durations_ = learned.durations
+        # Contiguous, as a file gives them back: sums in another order differ in the last bits.
+        self.coefficients_ = np.ascontiguousarray(learned.coefficients)
+        self.covariances_ = np.ascontiguousarray(learned.covariances)
+        self.durations_ = np.ascontiguousarray(learned.durations)
         self._white: tuple[Evaluator, Floats] | None = None
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
@@ -180,7 +187,7 @@ class PolynomialPHMM(ParametricHMM):
             density = regression.log_density(features, distance)
             strangeness = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
             found = ParameterEstimate(theta, covariance, density)
-            return Examination(found, strangeness, density, regression.typicality(distance))
+            return Examination(found, strangeness, density, regression.log_typicality(distance))
         recorded = checked_sequence(sequence, self.covariances_.shape[-1])
         checked = self._checked(recorded)
         prepared = self._prepared(checked)
@@ -194,7 +201,7 @@ class PolynomialPHMM(ParametricHMM):
         density = regression.log_density(averages, distance)
         strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
         found = ParameterEstimate(theta, covariance, float(value))
-        return Examination(found, strangeness, density, self.performances_.typicality(strangeness))
+        return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
 
     @property
     def _widest(self) -> float:

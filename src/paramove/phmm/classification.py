@@ -1,0 +1,216 @@
+"""Which action a movement is, where it points, and whether it is any of the known ones (thesis 4.1.2.3, 2.2.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import logsumexp
+
+from paramove.hmm.sequences import checked_sequence, checked_sequences
+from paramove.phmm.beginnings import BeginningDiscriminant, discriminants
+from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
+from paramove.phmm.performance import groups_of
+from paramove.phmm.polynomial import PolynomialPHMM, QuadraticPHMM
+from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
+
+Floats = NDArray[np.float64]
+
+INDEX_FILE = "classifier.npz"
+
+
+@dataclass(frozen=True)
+class Classification:
+    """What a movement is taken for.
+
+    Attributes:
+        action: the most probable action.
+        posterior: probability of each action.
+        estimates: of theta under each action.
+        typicality: probability that a genuine movement of this action is so strange or stranger; a small one says that
+            the movement is none of the known ones. 1 from models that do not know how performances vary.
+    """
+
+    action: str
+    posterior: dict[str, float]
+    estimates: dict[str, ParameterEstimate]
+    typicality: float
+
+
+class MovementClassifier:
+    """Movement models that compete for a movement, complete or just begun.
+
+    Args:
+        model: untrained model of every action, or a mapping from actions to untrained models. Without one:
+            `QuadraticPHMM(resampled_frames=100)`.
+
+    Attributes:
+        classes_: names of the actions, sorted.
+        models_: the trained model of each action.
+    """
+
+    def __init__(self, model: ParametricHMM | Mapping[str, ParametricHMM] | None = None) -> None:
+        self.model = model
+        self.models_: dict[str, ParametricHMM] = {}
+        self.classes_: tuple[str, ...] = ()
+        self._beginnings: tuple[BeginningDiscriminant, ...] = ()
+
+    @classmethod
+    def from_models(cls, models: Mapping[str, ParametricHMM]) -> Self:
+        """Trained models of several actions. They tell complete movements apart, but not beginnings."""
+        if not models:
+            raise ValueError("at least one model is needed, found none")
+        classifier = cls()
+        classifier.classes_ = tuple(sorted(models))
+        classifier.models_ = {action: models[action] for action in classifier.classes_}
+        return classifier
+
+    def fit(
+        self, sequences: Sequence[ArrayLike], theta: ArrayLike, labels: Sequence[str], groups: ArrayLike | None = None
+    ) -> Self:
+        """Train on sequences (T_k, D) with theta (K, P), names of the actions, and groups as in a model's `fit`.
+
+        Raises ValueError for labels whose number differs, or for which there is no model.
+        """
+        checked = checked_sequences(sequences)
+        parameters = np.asarray(theta, dtype=np.float64).reshape(len(checked), -1)
+        names = np.asarray(labels)
+        if names.shape != (len(checked),):
+            raise ValueError(f"labels has one action per sequence: expected {len(checked)}, found {names.shape}")
+        self.classes_ = tuple(sorted({str(name) for name in names}))
+        numbers = groups_of(groups, parameters)
+        self.models_ = {}
+        for action in self.classes_:
+            own = np.flatnonzero(names == action)
+            model = self._untrained(action)
+            try:
+                self.models_[action] = model.fit([checked[k] for k in own.tolist()], parameters[own], numbers[own])
+            except ValueError as error:
+                raise ValueError(f"action {action!r}: {error}") from error
+        actions = np.searchsorted(self.classes_, names)
+        self._beginnings = discriminants(checked, actions, len(self.classes_), numbers)
+        return self
+
+    def classify(self, sequence: ArrayLike, *, finished: bool = True) -> Classification:
+        """What a movement is, or, with `finished=False`, what it is going to be.
+
+        Raises ValueError for a beginning that is shorter than those modelled, or if there were no training movements.
+        """
+        checked = checked_sequence(sequence)
+        examined = {action: _examined(model, checked, finished) for action, model in self._trained().items()}
+        if finished:
+            scores = np.array([score for _, score, _ in examined.values()])
+            log_posterior = scores - logsumexp(scores)
+        else:
+            log_posterior = self._discriminant(len(checked)).log_probabilities(checked)
+        best = self.classes_[int(log_posterior.argmax())]
+        return Classification(
+            best,
+            {action: float(np.exp(value)) for action, value in zip(self.classes_, log_posterior, strict=True)},
+            {action: estimate for action, (estimate, _, _) in examined.items()},
+            examined[best][2],
+        )
+
+    def predict(self, sequences: Sequence[ArrayLike], *, finished: bool = True) -> NDArray[np.str_]:
+        """The most probable action of each sequence."""
+        return np.array([self.classify(sequence, finished=finished).action for sequence in sequences])
+
+    def score(self, sequences: Sequence[ArrayLike], labels: Sequence[str], *, finished: bool = True) -> float:
+        """Share of sequences whose action is right."""
+        return float(np.mean(self.predict(sequences, finished=finished) == np.asarray(labels)))
+
+    def save(self, folder: str | Path) -> None:
+        """Write a folder with a model file per action, each of use alone, and an index."""
+        path = Path(folder)
+        path.mkdir(parents=True, exist_ok=True)
+        for action, model in self._trained().items():
+            model.save(path / _file_name(action))
+        arrays: dict[str, Floats] = {}
+        for number, one in enumerate(self._beginnings):
+            arrays[f"means{number}"], arrays[f"root{number}"] = one.means, one.root
+            arrays[f"scalars{number}"] = np.array([one.n_frames, one.temper, *np.exp(one.log_shares)])
+        write_record(
+            path / INDEX_FILE, ModelRecord(type(self).__name__, {"actions": list(self.classes_)}, None, arrays)
+        )
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Self:
+        """Read what `save` wrote. Raises ModelFileError for missing, damaged or foreign files."""
+        path = Path(folder)
+        record = read_record(path / INDEX_FILE)
+        if record.class_name != cls.__name__:
+            raise ModelFileError(f"{path / INDEX_FILE}: expected a {cls.__name__}, found a {record.class_name}")
+        actions = record.parameters.get("actions")
+        if not isinstance(actions, tuple) or not all(isinstance(action, str) for action in actions) or not actions:
+            raise ModelFileError(f"{path / INDEX_FILE}: expected the names of actions, found {actions!r:.80}")
+        classifier = cls.from_models({action: ParametricHMM.load(path / _file_name(action)) for action in actions})
+        try:
+            classifier._beginnings = tuple(
+                _discriminant_from(record.arrays, number, len(actions)) for number in range(len(record.arrays) // 3)
+            )
+        except (KeyError, ValueError) as error:
+            raise ModelFileError(f"{path / INDEX_FILE}: {error}") from error
+        return classifier
+
+    def _untrained(self, action: str) -> ParametricHMM:
+        if isinstance(self.model, Mapping):
+            if action not in self.model:
+                raise ValueError(f"there are models for {sorted(self.model)}, found sequences of {action!r}")
+            return self.model[action]
+        if self.model is None:
+            return QuadraticPHMM(resampled_frames=100)
+        return type(self.model)(**self.model.get_params())
+
+    def _trained(self) -> dict[str, ParametricHMM]:
+        if not self.models_:
+            raise RuntimeError("this classifier is not trained yet: call fit, or load a folder")
+        return self.models_
+
+    def _discriminant(self, n_frames: int) -> BeginningDiscriminant:
+        known = [one for one in self._beginnings if one.n_frames <= n_frames]
+        if not self._beginnings:
+            raise ValueError(
+                "beginnings are told apart only by a classifier trained with `fit` on all actions together"
+            )
+        if not known:
+            least = self._beginnings[0].n_frames
+            raise ValueError(
+                f"a beginning has at least {least} frames, found {n_frames}: wait for more of the movement"
+            )
+        return known[-1]
+
+
+def _examined(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[ParameterEstimate, float, float]:
+    """Estimate of theta, score of a complete movement, and typicality.
+
+    Scores of models with correlated residuals are their typicalities: densities of movements that lie far from every
+    model (another person's) would compare how wide the models are, not how far the movement is for each.
+    """
+    if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
+        found = model.examine(sequence, finished=finished)
+        return found.estimate, found.log_typicality, found.typicality
+    estimate = model.estimate(sequence, finished=finished)
+    # Neighbouring frames say the same: the frames of a state count as one.
+    frames = model.resampled_frames if model.resampled_frames is not None else len(sequence)
+    return estimate, estimate.log_likelihood * model.n_states / frames, 1.0
+
+
+def _file_name(action: str) -> str:
+    if not action or not all(letter.isalnum() or letter in " _-." for letter in action) or action.startswith("."):
+        raise ValueError(f"the name of an action that is saved has letters, digits, ' _-.' only, found {action!r}")
+    return f"{action}.model.npz"
+
+
+def _discriminant_from(arrays: Mapping[str, Floats], number: int, n_actions: int) -> BeginningDiscriminant:
+    means, root, scalars = arrays[f"means{number}"], arrays[f"root{number}"], arrays[f"scalars{number}"]
+    if means.ndim != 2 or len(means) != n_actions or root.shape != (means.shape[1],) * 2:
+        raise ValueError(f"expected means of {n_actions} actions and a square root, found {means.shape}, {root.shape}")
+    if scalars.shape != (2 + n_actions,):
+        raise ValueError(f"expected {2 + n_actions} numbers in scalars{number}, found shape {scalars.shape}")
+    with np.errstate(divide="ignore"):
+        log_shares = np.log(scalars[2:])
+    return BeginningDiscriminant(int(scalars[0]), means, root, log_shares, float(scalars[1]))

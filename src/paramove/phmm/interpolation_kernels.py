@@ -1,0 +1,430 @@
+"""Compiled search for the parameter of a sequence under an interpolative PHMM (thesis 3.4.4).
+
+A place u in grid coordinates lies in a cell of 2^P local models. Everything that is interpolated depends on u through
+the weights of these corners alone, so the derivative of ln p follows from one number per corner, for means, covariances
+and durations alike (Fisher's identity).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.hmm.compilation import compiled, compiled_sums
+from paramove.hmm.kernels import feasible_ends, stacked_segments
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NEGLIGIBLE = 1e-9
+LOG_2PI = 1.8378770664093453
+
+
+@compiled
+def corner_weights(u: Floats, cell: Ints, knots: Floats, clamped: bool) -> tuple[Floats, Floats]:
+    """Multilinear weights of a cell's corners (3.8)-(3.10), shape (2^P,), and their slopes in u, (2^P, P).
+
+    The first dimension has the highest bit of a corner's number. Clamped weights are those of the nearest place inside.
+    """
+    dimension = len(u)
+    n_corners = 1 << dimension
+    weights, slopes = np.ones(n_corners), np.ones((n_corners, dimension))
+    for p in range(dimension):
+        low, high = knots[p, cell[p]], knots[p, cell[p] + 1]
+        share, slope = (u[p] - low) / (high - low), 1.0 / (high - low)
+        if clamped and (u[p] < 0.0 or u[p] > 1.0):
+            share, slope = min(1.0, max(0.0, share)), 0.0
+        for c in range(n_corners):
+            upper = (c >> (dimension - 1 - p)) & 1
+            factor = share if upper else 1.0 - share
+            weights[c] *= factor
+            for q in range(dimension):
+                slopes[c, q] *= (slope if upper else -slope) if q == p else factor
+    return weights, slopes
+
+
+@compiled
+def corner_numbers(cell: Ints, counts: Ints) -> Ints:
+    """Grid points at a cell's corners. Shape (2^P,)."""
+    dimension = len(cell)
+    numbers = np.zeros(1 << dimension, np.int64)
+    for c in range(len(numbers)):
+        for p in range(dimension):
+            numbers[c] = numbers[c] * counts[p] + cell[p] + ((c >> (dimension - 1 - p)) & 1)
+    return numbers
+
+
+@compiled_sums
+def _weighted(values: Floats, numbers: Ints, weights: Floats, i: int, out: Floats) -> None:
+    """Sum over the corners of weight times `values[corner, i]`, flat."""
+    out[:] = 0.0
+    for c in range(len(numbers)):
+        row, weight = values[numbers[c], i], weights[c]
+        for k in range(len(out)):
+            out[k] += weight * row[k]
+
+
+@compiled_sums
+def _factorised(matrix: Floats, dim: int) -> float:
+    """Cholesky factor in place of the lower triangle of a flat (D D,) matrix. Sum of the logarithms of its diagonal."""
+    total = 0.0
+    for row in range(dim):
+        first = row * dim
+        for column in range(row + 1):
+            second = column * dim
+            value = matrix[first + column]
+            for k in range(column):
+                value -= matrix[first + k] * matrix[second + k]
+            if column < row:
+                matrix[first + column] = value / matrix[second + column]
+            else:
+                # Interpolated covariances are positive definite; rounding must not make a root of a negative number.
+                matrix[first + column] = np.sqrt(max(value, 1e-300))
+                total += np.log(matrix[first + column])
+    return total
+
+
+@compiled_sums
+def _forward_substituted(root: Floats, dim: int, n: int, columns: Floats) -> None:
+    """L^-1 of the first n columns (D, n), in place."""
+    for row in range(dim):
+        target = columns[row]
+        for k in range(row):
+            factor, source = root[row * dim + k], columns[k]
+            for f in range(n):
+                target[f] -= factor * source[f]
+        scale = 1.0 / root[row * dim + row]
+        for f in range(n):
+            target[f] *= scale
+
+
+@compiled_sums
+def _backward_substituted(root: Floats, dim: int, n: int, columns: Floats) -> None:
+    """L'^-1 of the first n columns (D, n), in place."""
+    for row in range(dim - 1, -1, -1):
+        target = columns[row]
+        for k in range(row + 1, dim):
+            factor, source = root[k * dim + row], columns[k]
+            for f in range(n):
+                target[f] -= factor * source[f]
+        scale = 1.0 / root[row * dim + row]
+        for f in range(n):
+            target[f] *= scale
+
+
+@compiled_sums
+def _squares(columns: Floats, n: int, out: Floats) -> None:
+    for f in range(n):
+        out[f] = 0.0
+    for row in range(columns.shape[0]):
+        source = columns[row]
+        for f in range(n):
+            out[f] += source[f] * source[f]
+
+
+@compiled_sums
+def _dot(first: Floats, second: Floats) -> float:
+    total = 0.0
+    for k in range(len(first)):
+        total += first[k] * second[k]
+    return total
+
+
+@compiled
+def outputs_at(
+    columns: Floats, ends: Ints, numbers: Ints, weights: Floats, clamped: Floats, means: Floats, covariances: Floats,
+    smoothing: float,
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
+    """ln b_i(x_t) (N, T), Cholesky factors (N, D D), means (N, D), and whitened residuals (N, D, widest window)."""
+    dim, n_frames = columns.shape
+    n_states = means.shape[1]
+    widest = 0
+    for i in range(n_states):
+        widest = max(widest, ends[i + 1, 1] - ends[i, 0])
+    out = np.full((n_states, n_frames), -np.inf)
+    roots, centres = np.empty((n_states, dim * dim)), np.empty((n_states, dim))
+    white, squares = np.empty((n_states, dim, widest)), np.empty(widest)
+    for i in range(n_states):
+        begin, n = ends[i, 0], ends[i + 1, 1] - ends[i, 0]
+        _weighted(means, numbers, weights, i, centres[i])
+        _weighted(covariances, numbers, clamped, i, roots[i])
+        log_norm = -0.5 * dim * LOG_2PI - _factorised(roots[i], dim)
+        for k in range(dim):
+            for f in range(n):
+                white[i, k, f] = columns[k, begin + f] - centres[i, k]
+        _forward_substituted(roots[i], dim, n, white[i])
+        _squares(white[i], n, squares)
+        for f in range(n):
+            out[i, begin + f] = log_norm - 0.5 * smoothing * squares[f]
+    return out, roots, centres, white
+
+
+@compiled
+def value_at(
+    u: Floats, cell: Ints, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats,
+    covariances: Floats, durations: Floats, d_min: int,
+) -> float:  # fmt: skip
+    """ln p(X | lambda^u); squared distances are multiplied by `smoothing`, 1 for the model itself."""
+    ends = feasible_ends(means.shape[1], d_min, durations.shape[2], columns.shape[1])
+    numbers = corner_numbers(cell, counts)
+    weights, _ = corner_weights(u, cell, knots, False)
+    clamped, _ = corner_weights(u, cell, knots, True)
+    out, _, _, _ = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, smoothing)
+    value, _, _ = _segments(out, _log_durations(durations, numbers, clamped), d_min)
+    return value
+
+
+@compiled
+def _log_durations(durations: Floats, numbers: Ints, clamped: Floats) -> Floats:
+    n_states, d_max = durations.shape[1], durations.shape[2]
+    result = np.empty((n_states, d_max))
+    for i in range(n_states):
+        _weighted(durations, numbers, clamped, i, result[i])
+        for d in range(d_max):
+            result[i, d] = np.log(result[i, d]) if result[i, d] > 0.0 else -np.inf
+    return result
+
+
+@compiled
+def _segments(out: Floats, log_duration: Floats, d_min: int) -> tuple[float, Floats, Floats]:
+    """ln p, responsibilities (N, T) and expected duration counts (N, d_max)."""
+    n_states, n_frames = out.shape
+    gamma, counted = np.zeros((n_states, n_frames)), np.zeros(log_duration.shape)
+    offsets = np.array([0, n_frames])
+    values = stacked_segments(out, offsets, log_duration, d_min, gamma, counted)
+    return float(values[0]), gamma, counted
+
+
+@compiled
+def expectation_at(
+    u: Floats, cell: Ints, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
+    durations: Floats, d_min: int,
+) -> tuple[float, Floats, Floats]:  # fmt: skip
+    """ln p, its exact gradient in u (P,), and the information about u in the means with known states (P, P)."""
+    dimension, dim = len(u), columns.shape[0]
+    n_states, d_max = means.shape[1], durations.shape[2]
+    ends = feasible_ends(n_states, d_min, d_max, columns.shape[1])
+    numbers = corner_numbers(cell, counts)
+    weights, slopes = corner_weights(u, cell, knots, False)
+    clamped, clamped_slopes = corner_weights(u, cell, knots, True)
+    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, 1.0)
+    log_duration = _log_durations(durations, numbers, clamped)
+    value, gamma, counted = _segments(out, log_duration, d_min)
+    gradient, information = np.zeros(dimension), np.zeros((dimension, dimension))
+    if not value > -np.inf:
+        return value, gradient, information
+    from_means, from_spread = np.zeros(len(numbers)), np.zeros(len(numbers))
+    score, moved = np.empty((dim, 1)), np.empty((dim, dimension))
+    pulled, spread = np.empty((dim, white.shape[2])), np.empty((dim, dim))
+    shares = np.empty(white.shape[2])
+    flat = np.empty(dim * dim)
+    for i in range(n_states):
+        n, weight = 0, 0.0
+        for f in range(ends[i + 1, 1] - ends[i, 0]):
+            share = gamma[i, ends[i, 0] + f]
+            if share < NEGLIGIBLE:
+                continue
+            shares[n] = share
+            weight += share
+            for k in range(dim):
+                pulled[k, n] = white[i, k, f]
+            n += 1
+        for k in range(dim):
+            score[k, 0] = _dot(pulled[k, :n], shares[:n])
+        for p in range(dimension):
+            for k in range(dim):
+                moved[k, p] = 0.0
+                for c in range(len(numbers)):
+                    moved[k, p] += slopes[c, p] * means[numbers[c], i, k]
+        _forward_substituted(roots[i], dim, dimension, moved)
+        for p in range(dimension):
+            for q in range(p + 1):
+                for k in range(dim):
+                    information[p, q] += weight * moved[k, p] * moved[k, q]
+        _spread_score(roots[i], dim, pulled, shares, n, weight, spread, flat)
+        _backward_substituted(roots[i], dim, 1, score)
+        for c in range(len(numbers)):
+            from_means[c] += _dot(means[numbers[c], i], score[:, 0])
+            from_spread[c] += 0.5 * _dot(flat, covariances[numbers[c], i])
+            for d in range(d_min - 1, d_max):
+                if counted[i, d] > 0.0:
+                    from_spread[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])
+    for p in range(dimension):
+        for c in range(len(numbers)):
+            gradient[p] += slopes[c, p] * from_means[c] + clamped_slopes[c, p] * from_spread[c]
+        for q in range(p):
+            information[q, p] = information[p, q]
+    return value, gradient, information
+
+
+@compiled_sums
+def _spread_score(
+    root: Floats, dim: int, pulled: Floats, shares: Floats, n: int, weight: float, spread: Floats, flat: Floats
+) -> None:
+    """Derivative of the expected log outputs in a covariance, twice: Sigma^-1 S Sigma^-1 - gamma Sigma^-1, (D D,).
+
+    It is L'^-1 (S' - gamma I) L^-1 with S' the scatter of the whitened residuals.
+    """
+    for row in range(dim):
+        for column in range(row + 1):
+            total = 0.0
+            for f in range(n):
+                total += shares[f] * pulled[row, f] * pulled[column, f]
+            if row == column:
+                total -= weight
+            spread[row, column] = total
+            spread[column, row] = total
+    _backward_substituted(root, dim, dim, spread)
+    for row in range(dim):
+        for column in range(row):
+            kept = spread[row, column]
+            spread[row, column] = spread[column, row]
+            spread[column, row] = kept
+    _backward_substituted(root, dim, dim, spread)
+    for row in range(dim):
+        for column in range(dim):
+            flat[row * dim + column] = spread[row, column]
+
+
+@compiled
+def _cell_of(number: int, counts: Ints) -> Ints:
+    """Lower corner of a cell; cells are numbered with the last dimension fastest."""
+    cell = np.empty(len(counts), np.int64)
+    for p in range(len(counts) - 1, -1, -1):
+        cell[p] = number % (counts[p] - 1)
+        number //= counts[p] - 1
+    return cell
+
+
+@compiled
+def cell_bounds(cell: Ints, knots: Floats, counts: Ints, margin: float) -> tuple[Floats, Floats]:
+    """Least and greatest coordinates of a cell; the outer cells are wider by `margin`. Shapes (P,)."""
+    lower, upper = np.empty(len(cell)), np.empty(len(cell))
+    for p in range(len(cell)):
+        lower[p] = knots[p, cell[p]] - (margin if cell[p] == 0 else 0.0)
+        upper[p] = knots[p, cell[p] + 1] + (margin if cell[p] == counts[p] - 2 else 0.0)
+    return lower, upper
+
+
+@compiled
+def _step(place: Floats, gradient: Floats, curvature: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Newton step of the components that the gradient does not hold at a bound. Shape (P,)."""
+    matrix, right = curvature.copy(), gradient.copy()
+    ridge = 1e-9 * np.trace(curvature) / len(place) + 1e-300
+    for p in range(len(place)):
+        matrix[p, p] += ridge
+        if (place[p] <= lower[p] and gradient[p] < 0.0) or (place[p] >= upper[p] and gradient[p] > 0.0):
+            matrix[p, :] = 0.0
+            matrix[:, p] = 0.0
+            matrix[p, p] = 1.0
+            right[p] = 0.0
+    return np.linalg.solve(matrix, right).astype(np.float64)
+
+
+@compiled
+def _renewed(curvature: Floats, moved: Floats, fallen: Floats) -> Floats:
+    """BFGS update of minus the Hessian after a move (P,) along which minus the gradient grew by `fallen` (P,)."""
+    along = curvature @ moved
+    bent, seen = moved @ along, moved @ fallen
+    if bent <= 0.0 or seen <= 0.05 * bent:
+        return curvature
+    return curvature + np.outer(fallen, fallen) / seen - np.outer(along, along) / bent
+
+
+@compiled
+def climbed(
+    start: Floats, cell: Ints, margin: float, most_steps: int, tolerance: float, columns: Floats, knots: Floats,
+    counts: Ints, means: Floats, covariances: Floats, durations: Floats, d_min: int,
+) -> tuple[Floats, float]:  # fmt: skip
+    """Greatest ln p within a cell that is reached from `start`: the place (P,) and its value.
+
+    Newton steps with the information of the means to begin with, then with what the gradients tell, halved while the
+    likelihood would fall.
+    """
+    lower, upper = cell_bounds(cell, knots, counts, margin)
+    place = np.minimum(np.maximum(start, lower), upper)
+    value, gradient, curvature = expectation_at(
+        place, cell, columns, knots, counts, means, covariances, durations, d_min
+    )
+    for _ in range(most_steps):
+        if not value > -np.inf:
+            break
+        step = _step(place, gradient, curvature, lower, upper)
+        share, gain = 1.0, -np.inf
+        for _ in range(8):
+            candidate = np.minimum(np.maximum(place + share * step, lower), upper)
+            found, slope, information = expectation_at(
+                candidate, cell, columns, knots, counts, means, covariances, durations, d_min
+            )
+            gain = found - value
+            if gain >= 0.0:
+                break
+            share *= 0.3
+        if not gain >= 0.0:
+            break
+        curvature = _renewed(curvature, candidate - place, gradient - slope)
+        place, value, gradient = candidate, found, slope
+        if gain < tolerance:
+            break
+    return place, value
+
+
+@compiled
+def _neighbour(place: Floats, cell: Ints, knots: Floats, counts: Ints, tried: NDArray[np.bool_]) -> int:
+    """Number of a cell that has not been tried and that touches the place; -1 if there is none."""
+    dimension, n_cells = len(cell), len(tried)
+    for number in range(n_cells):
+        if tried[number]:
+            continue
+        other = _cell_of(number, counts)
+        touching = True
+        for p in range(dimension):
+            low, high = knots[p, other[p]], knots[p, other[p] + 1]
+            width = 1e-7 * (high - low)
+            below = place[p] < low - width and other[p] > 0
+            above = place[p] > high + width and other[p] < counts[p] - 2
+            touching = touching and not below and not above
+        if touching:
+            return number
+    return -1
+
+
+@compiled
+def likeliest(
+    margin: float, smoothing: float, most_steps: int, tolerance: float, columns: Floats, knots: Floats, counts: Ints,
+    means: Floats, covariances: Floats, durations: Floats, d_min: int,
+) -> tuple[Floats, float, Ints]:  # fmt: skip
+    """The place (P,) with the greatest ln p, its value, and the cell it lies in.
+
+    The cell to begin with is that whose middle is likeliest with widened covariances (paper 5.3). Between cells the
+    likelihood has kinks (corrected 4.2.5): where a search ends at a border, it goes on in the cells that touch there.
+    """
+    n_cells, dimension = 1, len(counts)
+    for p in range(dimension):
+        n_cells *= counts[p] - 1
+    first, promise = 0, -np.inf
+    middle = np.empty(dimension)
+    for number in range(n_cells if n_cells > 1 else 0):
+        cell = _cell_of(number, counts)
+        for p in range(dimension):
+            middle[p] = 0.5 * (knots[p, cell[p]] + knots[p, cell[p] + 1])
+        found = value_at(middle, cell, smoothing, columns, knots, counts, means, covariances, durations, d_min)
+        if found > promise:
+            first, promise = number, found
+    tried = np.zeros(n_cells, np.bool_)
+    tried[first] = True
+    best_cell = _cell_of(first, counts)
+    for p in range(dimension):
+        middle[p] = 0.5 * (knots[p, best_cell[p]] + knots[p, best_cell[p] + 1])
+    best, value = climbed(
+        middle, best_cell, margin, most_steps, tolerance, columns, knots, counts, means, covariances, durations, d_min
+    )
+    while True:
+        number = _neighbour(best, best_cell, knots, counts, tried)
+        if number < 0:
+            return best, value, best_cell
+        tried[number] = True
+        cell = _cell_of(number, counts)
+        place, found = climbed(
+            best, cell, margin, most_steps, tolerance, columns, knots, counts, means, covariances, durations, d_min
+        )
+        if found > value:
+            best, value, best_cell = place, found, cell
