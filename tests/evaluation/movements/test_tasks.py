@@ -17,6 +17,9 @@ def test_all_tasks_follow_from_the_folder(tasks: dict[str, list[Fold]]) -> None:
         "table/forward": 3,
         "table/actions": 3,
         "table/beginnings": 3,
+        "table/first 100 ms": 3,
+        "table/first 200 ms": 3,
+        "table/first 400 ms": 3,
     }
 
 
@@ -35,7 +38,9 @@ def test_every_movement_is_tested_once(tasks: dict[str, list[Fold]]) -> None:
 
 def test_one_data_set_is_enough(tmp_path: Path) -> None:
     write_table(tmp_path, persons=2)
-    assert set(real_tasks(tmp_path)) == {"table/across", "table/forward", "table/actions", "table/beginnings"}
+    names = set(real_tasks(tmp_path))
+    assert names >= {"table/across", "table/forward", "table/actions", "table/beginnings"}
+    assert not any(name.startswith("pointing") for name in names)
 
 
 def test_a_single_person_cannot_be_left_out(tmp_path: Path) -> None:
@@ -54,6 +59,11 @@ def test_corners() -> None:
         for k, (d, y, z) in enumerate((d, y, z) for d in (1, 2) for y in (0, 1, 2) for z in (0, 1, 2))
     }
     assert corner_targets({k: place.astype(float) for k, place in places.items()}) == {0, 2, 6, 8, 9, 11, 15, 17}
+
+
+def test_the_first_milliseconds_are_equally_long_for_all(tasks: dict[str, list[Fold]]) -> None:
+    for fold in tasks["table/first 200 ms"]:
+        assert {len(x) for x in (*fold.train.sequences, *fold.test.sequences)} == {10}
 
 
 def test_theta_is_finite_also_without_targets(tasks: dict[str, list[Fold]]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from paramove.evaluation.movements import plots
 from paramove.evaluation.movements.summary import QUANTITIES, SECONDS, Measured, Quantity
+from paramove.evaluation.movements.tasks import FIRST_MS
 from paramove.evaluation.report import STYLE
 
 THETA_UNITS = {"pointing": "°", "table": "cm", "raster": "cm"}
@@ -20,6 +21,11 @@ TEXTS = {
     "table/actions": "Kinds of movement at the table, one person left out; finished movements.",
     "table/beginnings": "Kinds of movement at the table while they go on, one person left out. All are cut at their "
     "beginning by one absolute rule for speeds, and nobody is told how long a movement will be.",
+    **{
+        f"table/first {milliseconds} ms": f"Kinds of movement at the table after the first {milliseconds} ms, one "
+        "person left out. Learned from as much of the others' movements."
+        for milliseconds in FIRST_MS
+    },
     "raster/actions": "Kinds of movement of the synthetic demonstrator; finished movements.",
     "raster/beginnings": "Kinds of movement of the synthetic demonstrator while they go on.",
 }

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from paramove.evaluation.movements.method import Method
 from paramove.evaluation.movements.tasks import Fold
@@ -68,6 +68,17 @@ class Row:
     ours: bool = False
 
 
+class Work(Protocol):
+    """What can be run and stored."""
+
+    @property
+    def label(self) -> str:
+        """As the progress shows it."""
+
+    def run(self) -> dict[str, Any]:
+        """The result: plain JSON with "values"."""
+
+
 @dataclass(frozen=True)
 class Job:
     """A row on a fold with a seed."""
@@ -75,6 +86,11 @@ class Job:
     row: Row
     fold: Fold
     seed: int
+
+    @property
+    def label(self) -> str:
+        """As the progress shows it."""
+        return f"{self.row.name}: {self.fold.task} {self.fold.name}"
 
     def key(self, data: str) -> str:
         """Name of the result's file; `data` is the digest of the fold."""
@@ -112,9 +128,23 @@ def run_jobs(
     Interrupted, everything that is finished stays in `cache`. With `scheduler` (host:port of a Dask scheduler) the
     cluster computes. Raises ClusterMissingError without one.
     """
-    cache.mkdir(parents=True, exist_ok=True)
     digests = {id(fold): fold_digest(fold) for fold in {id(job.fold): job.fold for job in jobs}.values()}
-    files = [cache / f"{job.key(digests[id(job.fold)])}.json" for job in jobs]
+    keys = [job.key(digests[id(job.fold)]) for job in jobs]
+    return run_stored(jobs, keys, cache, workers=workers, scheduler=scheduler, finished=finished)
+
+
+def run_stored(
+    work: Sequence[Work],
+    keys: Sequence[str],
+    cache: Path,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    finished: Callable[[int, int, str], None] = lambda done, total, name: None,
+) -> list[dict[str, Any]]:
+    """As `run_jobs`, for any work whose result is plain JSON with "values"; a key names the file of each result."""
+    cache.mkdir(parents=True, exist_ok=True)
+    files = [cache / f"{key}.json" for key in keys]
     results: dict[int, dict[str, Any]] = {}
     missing: list[int] = []
     for index, file in enumerate(files):
@@ -123,16 +153,16 @@ def run_jobs(
             missing.append(index)
         else:
             results[index] = stored
-    finished(len(results), len(jobs), "")
-    for index, result in _computed([(i, jobs[i]) for i in missing], workers, scheduler):
+    finished(len(results), len(work), "")
+    for index, result in _computed([(i, work[i]) for i in missing], workers, scheduler):
         _store(files[index], result)
         results[index] = result
-        finished(len(results), len(jobs), f"{jobs[index].row.name}: {jobs[index].fold.task} {jobs[index].fold.name}")
-    return [results[index] for index in range(len(jobs))]
+        finished(len(results), len(work), work[index].label)
+    return [results[index] for index in range(len(work))]
 
 
 def _computed(
-    jobs: Sequence[tuple[int, Job]], workers: int, scheduler: str | None
+    jobs: Sequence[tuple[int, Work]], workers: int, scheduler: str | None
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     if not jobs:
         return
@@ -148,7 +178,7 @@ def _computed(
         yield from parallel(joblib.delayed(_numbered)(index, job) for index, job in jobs)
 
 
-def _numbered(index: int, job: Job) -> tuple[int, dict[str, Any]]:
+def _numbered(index: int, job: Work) -> tuple[int, dict[str, Any]]:
     _one_thread()
     return index, job.run()
 

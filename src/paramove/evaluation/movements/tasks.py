@@ -8,6 +8,7 @@ A fold leaves out a whole direction, person or raster, never single repetitions 
 - `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
 - `table/actions`: the kinds of movement, one person left out; whole movements.
 - `table/beginnings`: the same while they go on, all cut at their beginning by one absolute rule.
+- `table/first 100 ms` and more: the same, everybody sees that much from the beginning.
 - `raster/<action>`, `raster/actions`, `raster/beginnings`: the synthetic demonstrator; 3 x 3 targets 10 times against
   7 x 5 targets 4 times; a fold is a seed.
 """
@@ -33,9 +34,11 @@ from paramove.demonstrations.recorded_people import (
 )
 from paramove.evaluation.movements.measures import ThetaKind
 from paramove.evaluation.movements.method import Examples
+from paramove.evaluation.movements.per_action import first_frames
 
 Floats = NDArray[np.float64]
 RASTER_ACTIONS = ("reaching", "pointing")
+FIRST_MS = (100, 200, 400)
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,11 @@ def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
     with_target = [action for action in table.actions if np.isfinite(_targets(table.of(action=action))).all()]
     tasks = {f"table/{action}": _persons(table, action) for action in with_target}
     if len(table.actions) > 1:
-        tasks["table/actions"] = _kinds(table, beginnings=False)
-        tasks["table/beginnings"] = _kinds(table, beginnings=True)
+        tasks["table/actions"] = _kinds(table, "table/actions", _WHOLE)
+        tasks["table/beginnings"] = _kinds(table, "table/beginnings", _FROM_ONSET, beginnings=True)
+        for milliseconds in FIRST_MS:
+            name = f"table/first {milliseconds} ms"
+            tasks[name] = _kinds(table, name, _first(milliseconds))
     return tasks
 
 
@@ -174,10 +180,8 @@ def _persons(table: Recordings, action: str) -> list[Fold]:
     return folds
 
 
-def _kinds(table: Recordings, *, beginnings: bool) -> list[Fold]:
+def _kinds(table: Recordings, name: str, part: Part, *, beginnings: bool = False) -> list[Fold]:
     folds = []
-    name = "table/beginnings" if beginnings else "table/actions"
-    part = _FROM_ONSET if beginnings else _WHOLE
     for subject in table.subjects:
         rest = [one for one in table.movements if one.subject != subject]
         if not rest:  # a single person cannot be left out
@@ -188,14 +192,17 @@ def _kinds(table: Recordings, *, beginnings: bool) -> list[Fold]:
     return folds
 
 
+Part = Callable[[RecordedMovement], Floats]
 _WHOLE = attrgetter("movement")
 _TO_GRASP = attrgetter("to_grasp")
 _FROM_ONSET = attrgetter("from_onset")
 
 
-def _table_examples(
-    movements: list[RecordedMovement], tip: int, part: Callable[[RecordedMovement], Floats]
-) -> Examples:
+def _first(milliseconds: int) -> Part:
+    return lambda one: first_frames(one.from_onset, round(milliseconds / 1000.0 * RATE_HZ))
+
+
+def _table_examples(movements: list[RecordedMovement], tip: int, part: Part) -> Examples:
     """Theta is the target; a movement without one gets the place where its fingertip starts."""
     sequences = [part(one) for one in movements]
     starts = np.array([x[0, 3 * tip : 3 * tip + 3] for x in sequences]).reshape(-1, 3)
