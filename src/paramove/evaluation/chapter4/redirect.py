@@ -28,14 +28,15 @@ Floats = NDArray[np.float64]
 STATES, D_MIN, D_MAX, FRAMES = 32, 2, 3, 80
 THESIS_PAIR = (0.25, 0.80, 0.80, 0.30)
 """Places of figure 4.17."""
+FEWEST = "9 pairs, demonstrated"
 MODELS: dict[str, Callable[[], ParametricHMM]] = {
     "linear": lambda: LinearPHMM(STATES, D_MIN, D_MAX, resampled_frames=FRAMES),
     "quadratic": lambda: QuadraticPHMM(STATES, D_MIN, D_MAX, resampled_frames=FRAMES),
 }
 
 
-def redirect_experiment(seed: int, tests: int = 40) -> list[dict[str, Any]]:
-    """One row per training set and model: errors in cm, and synthesised jerk as a multiple of training's.
+def redirect_experiment(seed: int, tests: int = 40, only: str = "") -> list[dict[str, Any]]:
+    """One row per training set (all whose name has `only`) and model: errors in cm, and jerk as multiple of training's.
 
     `error`: (4.3) against the blended movement; `start_miss`, `end_miss`: least distance of the fingertip from each
     place in its half of the movement; each with mean and greatest over the test pairs. The first test pair is that of
@@ -45,16 +46,17 @@ def redirect_experiment(seed: int, tests: int = 40) -> list[dict[str, Any]]:
     pointing = train_pointing_model(seed)
     pairs = np.vstack([THESIS_PAIR, rng.uniform(0.0, 1.0, (tests - 1, 4))])
     truth = redirect_from_model(pointing, pairs, FRAMES).sequences
-    training = {
-        "16 corner pairs, from the model": redirect_from_model(pointing, corner_pairs(), FRAMES),
-        "12 corner pairs, from the model": redirect_from_model(pointing, corner_pairs(staying=False), FRAMES),
-        "9 pairs, from the model": redirect_from_model(pointing, nine_pairs(), FRAMES),
-        "16 corner pairs, demonstrated": redirect_demonstrations(corner_pairs(), rng, n_samples=FRAMES),
-        "9 pairs, demonstrated": redirect_demonstrations(nine_pairs(), rng, n_samples=FRAMES),
+    training: dict[str, Callable[[], Demonstrations]] = {
+        "16 corner pairs, from the model": lambda: redirect_from_model(pointing, corner_pairs(), FRAMES),
+        "12 corner pairs, from the model": lambda: redirect_from_model(pointing, corner_pairs(staying=False), FRAMES),
+        "9 pairs, from the model": lambda: redirect_from_model(pointing, nine_pairs(), FRAMES),
+        "16 corner pairs, demonstrated": lambda: redirect_demonstrations(corner_pairs(), rng, n_samples=FRAMES),
+        FEWEST: lambda: redirect_demonstrations(nine_pairs(), rng, n_samples=FRAMES),
     }
+    shown = {name: show() for name, show in training.items() if only in name}
     return [
-        {"seed": seed, "training": name, "model": kind, **_errors(make(), shown, pairs, truth)}
-        for name, shown in training.items()
+        {"seed": seed, "training": name, "model": kind, **_errors(make(), movements, pairs, truth)}
+        for name, movements in shown.items()
         for kind, make in MODELS.items()
     ]
 
