@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,12 @@ from paramove.phmm.features import Monomials
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-STRENGTHS = 10.0 ** np.arange(-5.0, 2.0)
+STRENGTHS = 10.0 ** np.arange(-4.5, 1.1, 0.5)
 """Candidates for the ridge of each degree, as a share of the number of movements."""
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""
 MOST_FOLDS = 10
+MOST_ROUNDS = 4
 LEAST_SHARE = 0.02
 """Standard deviations below this share of the mean one are lifted to it: they are known no better."""
 NEWTON_STEPS = 12
@@ -82,6 +83,12 @@ class CorrelatedRegression:
         covariance = _shrunk(left_out / deviation, shrinkage)
         root: Floats = deviation[:, None] * np.linalg.cholesky(covariance)
         return replace(start, root=root, inflation=inflation, distances=distances, shrinkage=shrinkage)
+
+    def smoothed(self, features: Floats, values: Floats) -> Floats:
+        """Coefficients (m, F) of other values (K, m) of the same movements, with the same ridge."""
+        penalty = _penalties(self.ridge, self.monomials.degrees, len(values))
+        solved = np.linalg.solve(features.T @ features + penalty, features.T @ values)
+        return np.ascontiguousarray(solved.T, dtype=np.float64)
 
     def mean(self, theta: Floats) -> Floats:
         """Z phi(theta). Shape (n,)."""
@@ -205,27 +212,36 @@ def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Int
 
 
 def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints) -> tuple[float, ...]:
-    """The ridge per degree, as a share of the number of movements, that predicts left-out groups best."""
-    highest = int(degrees.max())
+    """The ridge per degree, as a share of the number of movements, that predicts left-out groups best.
+
+    One degree after the other, until none changes; a higher degree is never held back less than a lower one.
+    """
+    ridge = tuple(float(STRENGTHS[min(3 + 2 * degree, len(STRENGTHS) - 1)]) for degree in range(int(degrees.max())))
     if len(np.unique(groups)) < 3:
-        return (1e-3,) * highest
-    best, least = (1e-3,) * highest, np.inf
-    for ridge in product(STRENGTHS, repeat=highest):
-        if any(low > high for low, high in pairwise(ridge)):
-            continue  # a higher degree is never held back less
-        penalty = _penalties(ridge, degrees, len(y))
-        hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
-        smoother = np.eye(len(y)) - hat
-        error = np.zeros(y.shape[1])
-        for members in _members(groups):
-            own = smoother[np.ix_(members, members)] + 1e-9 * np.eye(len(members))
-            rows = np.linalg.solve(own, smoother[members])
-            error += ((rows @ y) ** 2).sum(axis=0)
-        # Logarithms: a fingertip that is a millimetre off at the target counts as a tenth of a centimetre on the way.
-        total = float(np.log(error + 1e-12).mean())
-        if total < least - 1e-9:
-            best, least = ridge, total
-    return tuple(float(one) for one in best)
+        return ridge
+    known: dict[tuple[float, ...], float] = {}
+
+    def error(candidate: tuple[float, ...]) -> float:
+        if candidate not in known:
+            penalty = _penalties(candidate, degrees, len(y))
+            squared = (residuals_left_out(y, features, penalty, groups) ** 2).sum(axis=0)
+            # Logarithms: a fingertip that is a millimetre off at the target counts as one that is a centimetre off
+            # on the way.
+            known[candidate] = float(np.log(squared + 1e-12).mean())
+        return known[candidate]
+
+    for _ in range(MOST_ROUNDS):
+        before = ridge
+        for place in range(len(ridge)):
+            allowed: list[tuple[float, ...]] = [
+                (*ridge[:place], float(strength), *ridge[place + 1 :])
+                for strength in STRENGTHS
+                if strength >= max(ridge[:place], default=0.0) and strength <= min(ridge[place + 1 :], default=np.inf)
+            ]
+            ridge = min(allowed, key=error)
+        if ridge == before:
+            break
+    return ridge
 
 
 def _penalties(ridge: tuple[float, ...], degrees: Ints, count: int) -> Floats:

@@ -21,6 +21,7 @@ Ints = NDArray[np.int64]
 FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""
 BEGINNING_POINTS = 5
+MOVEMENT_PARTS = 10
 BEGINNING_SHRINKAGES = (0.1, 0.3)
 PACE_PARTS, PACE_SHRINKAGE, PACE_SHARE = 10, 0.1, 0.3
 
@@ -60,10 +61,10 @@ class Pace:
 
 @dataclass(frozen=True)
 class Performances:
-    """Correlated regressions of complete movements (state averages) and of beginnings of n frames.
+    """Correlated regressions of complete movements (in parts) and of beginnings of n frames.
 
     Attributes:
-        complete: of the averages of the frames in each state, (N D,).
+        complete: of `part_averages`.
         beginnings: number of frames, increasing, with the regression of `beginning_features`.
         pace: of complete movements.
     """
@@ -74,10 +75,10 @@ class Performances:
 
     @classmethod
     def fitted(
-        cls, averages: Floats, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints
+        cls, parts: Floats, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints
     ) -> Performances:
-        """From the state averages (K, N D) and the movements as they were recorded, in their own time."""
-        complete = CorrelatedRegression.fitted(averages, theta, monomials, groups)
+        """From `part_averages` (K, n) and the movements as they were recorded, in their own time."""
+        complete = CorrelatedRegression.fitted(parts, theta, monomials, groups)
         lengths = np.array([len(sequence) for sequence in sequences])
         beginnings = []
         for n_frames in beginning_lengths(lengths):
@@ -94,7 +95,7 @@ class Performances:
         """How unlike the training a complete movement is; genuine ones have about 1.3.
 
         Args:
-            distance: of its state averages from the model at the best theta. pace_distance: of its pace.
+            distance: of its parts from the model at the best theta. pace_distance: of its pace.
         """
         return float(_strangeness(distance, pace_distance, self.complete.distances, self.pace.distances))
 
@@ -155,10 +156,22 @@ def pace_features(sequence: Floats) -> Floats:
     return result
 
 
-def state_averages(evaluator: Evaluator, sequence: Floats) -> Floats:
-    """Mean of the frames in each state, by their responsibilities. Shape (N D,)."""
+def state_averages(evaluator: Evaluator, sequence: Floats) -> tuple[Floats, Floats]:
+    """Mean of the frames in each state, by their responsibilities, (N, D), and how many frames those are, (N,)."""
     gamma = evaluator.expectation(sequence)[1]
-    result: Floats = (gamma.T @ sequence) / gamma.sum(axis=0)[:, None]
+    weights = gamma.sum(axis=0)
+    return (gamma.T @ sequence) / weights[:, None], weights
+
+
+def part_averages(averages: Floats, weights: Floats) -> Floats:
+    """Mean of the frames in each of at most ten parts of the movement, each of several states. Shape (10 D,).
+
+    Correlations between many states would have to be learned from few movements, and they say the same many times.
+    """
+    n_parts = min(MOVEMENT_PARTS, len(averages))
+    begins = np.arange(n_parts) * len(averages) // n_parts
+    sums = np.add.reduceat(averages * weights[:, None], begins, axis=0)
+    result: Floats = sums / np.add.reduceat(weights, begins)[:, None]
     return result.ravel()
 
 

@@ -18,7 +18,7 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance import Performances, beginning_features, state_averages
+from paramove.phmm.performance import Performances, beginning_features, part_averages, state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ class Examination(NamedTuple):
         estimate: of theta.
         strangeness: how unlike the training movements it is, see `Performances.strangeness`; of a beginning the root of
             its distance in units of the usual one.
-        log_density: of the state averages, or of the features of a beginning.
+        log_density: of `part_averages`, or of the features of a beginning.
         log_typicality: logarithm of the probability that a genuine movement is so strange or stranger.
     """
 
@@ -115,20 +115,25 @@ class PolynomialPHMM(ParametricHMM):
         )
         performances = None
         if self.residuals == "correlated":
-            performances = self._performances(data, trained, monomials)
+            averages, performances = self._performances(data, trained, monomials)
             if self.smoothness is not None:
-                coefficients = performances.complete.coefficients.reshape(trained.coefficients.shape)
+                coefficients = performances.complete.smoothed(features, averages).reshape(coefficients.shape)
                 trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances
 
-    def _performances(self, data: TrainingData, trained: RegressedParameters, monomials: Monomials) -> Performances:
+    def _performances(
+        self, data: TrainingData, trained: RegressedParameters, monomials: Monomials
+    ) -> tuple[Floats, Performances]:
+        """State averages (K, N D), and what they and the recorded movements say about performances."""
         common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
-        averages = [
+        found = [
             state_averages(replace(common, means=trained.coefficients @ monomials.at(theta)), sequence)
             for sequence, theta in zip(data.sequences, data.theta, strict=True)
         ]
-        return Performances.fitted(np.stack(averages), data.recorded, data.theta, monomials, data.groups)
+        parts = np.stack([part_averages(*one) for one in found])
+        averages = np.stack([one.ravel() for one, _ in found])
+        return averages, Performances.fitted(parts, data.recorded, data.theta, monomials, data.groups)
 
     def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
         self.monomials_ = monomials
@@ -195,10 +200,11 @@ class PolynomialPHMM(ParametricHMM):
         theta = self.monomials_.centre + self.monomials_.scale * place
         regression = self.performances_.complete
         for _ in range(REALIGNMENTS):
-            averages = state_averages(replace(self._whitened()[0], means=self.state_means(theta)), checked)
-            theta, covariance, distance = regression.estimate(averages, self.search_margin)
+            evaluator = replace(self._whitened()[0], means=self.state_means(theta))
+            parts = part_averages(*state_averages(evaluator, checked))
+            theta, covariance, distance = regression.estimate(parts, self.search_margin)
         value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, *prepared)
-        density = regression.log_density(averages, distance)
+        density = regression.log_density(parts, distance)
         strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
         found = ParameterEstimate(theta, covariance, float(value))
         return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
