@@ -203,8 +203,10 @@ class GaussianHMM:
         with np.errstate(divide="ignore"):
             return np.where(leaving > 1e-12, 1.0 / leaving, np.inf)
 
-    def synthesize(self, n_samples: int | None = None, timing: synthesis.Timing = "uniform") -> Floats:
-        """The prototype movement (method D): means in order, linearly interpolated. Shape (n_samples, D).
+    def synthesize(
+        self, n_samples: int | None = None, timing: synthesis.Timing = "uniform", path: synthesis.Path = "linear"
+    ) -> Floats:
+        """The prototype movement (method D): means in order, see `synthesis.prototype`. Shape (n_samples, D).
 
         A last state that is never left counts as long as the mean of the others. Raises ValueError for an ergodic
         chain, whose states have no order.
@@ -214,7 +216,7 @@ class GaussianHMM:
         lengths = self.expected_durations()
         endless = ~np.isfinite(lengths)
         lengths[endless] = lengths[~endless].mean() if not endless.all() else 2.0
-        return synthesis.prototype(self.means_, lengths, n_samples, timing)
+        return synthesis.prototype(self.means_, lengths, n_samples, timing, path)
 
     def sample(self, rng: np.random.Generator, n_frames: int | None = None) -> Floats:
         """One sequence drawn from the model (method A), to the finish state or of `n_frames`. Shape (T, D).

@@ -147,9 +147,11 @@ class LeftRightHMM:
         """Expected number of frames of each state (2.28). Shape (N,)."""
         return synthesis.expected_durations(self.durations_)
 
-    def synthesize(self, n_samples: int | None = None, timing: synthesis.Timing = "uniform") -> Floats:
-        """The prototype movement (method D): means in order, linearly interpolated. Shape (n_samples, D)."""
-        return synthesis.prototype(self.means_, self.expected_durations(), n_samples, timing)
+    def synthesize(
+        self, n_samples: int | None = None, timing: synthesis.Timing = "uniform", path: synthesis.Path = "linear"
+    ) -> Floats:
+        """The prototype movement (method D): means in order, see `synthesis.prototype`. Shape (n_samples, D)."""
+        return synthesis.prototype(self.means_, self.expected_durations(), n_samples, timing, path)
 
     def sample(self, rng: np.random.Generator) -> Floats:
         """One sequence drawn from the model (method A). Shape (T, D)."""

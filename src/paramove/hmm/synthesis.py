@@ -1,7 +1,7 @@
 """Synthesis of movements from state means and durations (thesis 2.2.4)."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from paramove.hmm.sequences import interpolate
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Timing = Literal["uniform", "expected"]
+Path = Literal["linear", "smooth"]
 LONGEST_PATH = 1_000_000
 
 
@@ -20,25 +21,39 @@ def expected_durations(durations: Floats) -> Floats:
     return result
 
 
-def prototype(means: Floats, lengths: Floats, n_samples: int | None, timing: Timing) -> Floats:
-    """Method D: the state means in order, linearly interpolated. Shape (n_samples, D).
+def prototype(means: Floats, lengths: Floats, n_samples: int | None, timing: Timing, path: Path = "linear") -> Floats:
+    """Method D: the state means in order. Shape (n_samples, D).
 
-    timing "uniform" spends the same time between any two means; "expected" puts each mean at the middle of its expected
-    duration (2.28), given by `lengths` (N,). Without n_samples: one sample per expected frame.
+    Args:
+        means: shape (N, D). lengths: expected number of frames of each state (2.28), (N,).
+        n_samples: without it one sample per expected frame.
+        timing: "uniform" spends the same time in each state, "expected" its expected duration.
+        path: "linear" interpolates between the means, from the first to the last (thesis). "smooth" gives the curve
+            whose mean over the time of each state is the state's mean: means are averages over a state's frames, so
+            straight lines between them cut every corner and end before the movement does.
     """
     if n_samples is None:
         n_samples = max(2, round(float(lengths.sum())))
     if n_samples < 2:
         raise ValueError(f"a movement has at least 2 samples, found {n_samples}")
-    states = np.arange(len(means), dtype=np.float64)
-    if timing == "uniform":
-        positions = np.linspace(0.0, len(means) - 1.0, n_samples)
-    elif timing == "expected":
-        centres = np.cumsum(lengths) - 0.5 * lengths
-        positions = np.interp(np.linspace(centres[0], centres[-1], n_samples), centres, states)
-    else:
-        raise ValueError(f"timing is 'uniform' or 'expected', found {timing!r}")
-    return interpolate(means, positions)
+    if timing not in get_args(Timing) or path not in get_args(Path):
+        raise ValueError(f"timing is 'uniform' or 'expected' and path 'linear' or 'smooth', found {timing!r}, {path!r}")
+    spent = lengths if timing == "expected" else np.ones(len(means))
+    if path == "smooth" and len(means) > 1:
+        return _smooth(means, spent, n_samples)
+    centres = np.cumsum(spent) - 0.5 * spent
+    times = np.linspace(centres[0], centres[-1], n_samples)
+    return interpolate(means, np.interp(times, centres, np.arange(len(means), dtype=np.float64)))
+
+
+def _smooth(means: Floats, spent: Floats, n_samples: int) -> Floats:
+    """Derivative of a cubic spline through the cumulated means: its mean over each state's time is the state's."""
+    from scipy.interpolate import CubicSpline
+
+    borders = np.concatenate([[0.0], np.cumsum(spent)])
+    cumulated = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means * spent[:, None], axis=0)])
+    result: Floats = CubicSpline(borders, cumulated)(np.linspace(0.0, borders[-1], n_samples), 1)
+    return result
 
 
 def drawn_durations(durations: Floats, rng: np.random.Generator) -> Ints:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
 from paramove.hmm.sequences import check_length, checked_sequence, checked_sequences
+from paramove.hmm.synthesis import Path as PathKind
 from paramove.hmm.synthesis import Timing, at_progress
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.performance import groups_of
@@ -142,14 +143,18 @@ class ParametricHMM(ABC):
 
     def synthesize(
         self, theta: ArrayLike, n_samples: int | None = None, *, duration: float | None = None,
-        sample_rate: float = 60.0, timing: Timing = "uniform"
+        sample_rate: float = 60.0, timing: Timing = "uniform", path: PathKind = "smooth"
     ) -> Floats:  # fmt: skip
-        """The prototype movement for theta (thesis 4.1.2.2), by number of samples or by duration in s. Shape (n, D)."""
+        """The prototype movement for theta (thesis 4.1.2.2), by number of samples or by duration in s. Shape (n, D).
+
+        path "linear" interpolates the means as the thesis does; "smooth" does not cut corners, see
+        `paramove.hmm.synthesis.prototype`.
+        """
         if duration is not None:
             if n_samples is not None:
                 raise ValueError("give n_samples or duration, not both")
             n_samples = max(2, round(duration * sample_rate) + 1)
-        return self.at(theta).synthesize(n_samples, timing)
+        return self.at(theta).synthesize(n_samples, timing, path)
 
     def progress_mean(self, theta: ArrayLike, tau: float | Floats) -> Floats:
         """Mean pose at progress tau in [0, 1] (6.2). Shape (D,); for many theta (M, P) and tau (M,): (M, D)."""
