@@ -173,9 +173,14 @@ def _computed(
     joblib = importlib.import_module("joblib")
     with _cluster(scheduler):
         parallel = joblib.Parallel(
-            n_jobs=-1 if scheduler else workers, return_as="generator_unordered", pre_dispatch="3 * n_jobs"
+            n_jobs=-1 if scheduler else workers,
+            return_as="generator_unordered",
+            pre_dispatch="3 * n_jobs",
+            max_nbytes=None,
         )
         yield from parallel(joblib.delayed(_numbered)(index, job) for index, job in jobs)
+    if scheduler is None:  # else the interpreter's end finds their semaphores and warns
+        importlib.import_module("joblib.externals.loky").get_reusable_executor().shutdown(wait=True)
 
 
 def _numbered(index: int, job: Work) -> tuple[int, dict[str, Any]]:
