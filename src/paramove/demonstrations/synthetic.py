@@ -181,7 +181,8 @@ def minimum_jerk(progress: Floats, start: float, end: float) -> Floats:
 def at_target(progress: Floats, timing: Timing) -> Floats:
     """How near the hand is to the target, 0 at rest, 1 at the target. Shape (T,)."""
     out = minimum_jerk(progress, timing.depart, timing.arrive)
-    result: Floats = out * (1.0 - minimum_jerk(progress, timing.leave, timing.home))
+    # The polynomial may exceed 1 by rounding, and roots are taken of what is returned.
+    result: Floats = np.maximum(out * (1.0 - minimum_jerk(progress, timing.leave, timing.home)), 0.0)
     return result
 
 

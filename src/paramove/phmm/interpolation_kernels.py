@@ -1,4 +1,4 @@
-"""Compiled search for the parameter of a sequence under an interpolative PHMM (thesis 3.4.4).
+"""Compiled likelihood of an interpolative PHMM and its exact derivative in the place on the grid (thesis 3.4).
 
 A place u in grid coordinates lies in a cell of 2^P local models. Everything that is interpolated depends on u through
 the weights of these corners alone, so the derivative of ln p follows from one number per corner, for means, covariances
@@ -195,17 +195,20 @@ def _segments(out: Floats, log_duration: Floats, d_min: int) -> tuple[float, Flo
 
 @compiled
 def expectation_at(
-    u: Floats, cell: Ints, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
-    durations: Floats, d_min: int,
+    u: Floats, cell: Ints, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats,
+    covariances: Floats, durations: Floats, d_min: int,
 ) -> tuple[float, Floats, Floats]:  # fmt: skip
-    """ln p, its exact gradient in u (P,), and the information about u in the means with known states (P, P)."""
+    """ln p, its exact gradient in u (P,), and the information about u in the means with known states (P, P).
+
+    Squared distances are multiplied by `smoothing`, 1 for the model itself.
+    """
     dimension, dim = len(u), columns.shape[0]
     n_states, d_max = means.shape[1], durations.shape[2]
     ends = feasible_ends(n_states, d_min, d_max, columns.shape[1])
     numbers = corner_numbers(cell, counts)
     weights, slopes = corner_weights(u, cell, knots, False)
     clamped, clamped_slopes = corner_weights(u, cell, knots, True)
-    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, 1.0)
+    out, roots, _, white = outputs_at(columns, ends, numbers, weights, clamped, means, covariances, smoothing)
     log_duration = _log_durations(durations, numbers, clamped)
     value, gamma, counted = _segments(out, log_duration, d_min)
     gradient, information = np.zeros(dimension), np.zeros((dimension, dimension))
@@ -228,7 +231,7 @@ def expectation_at(
                 pulled[k, n] = white[i, k, f]
             n += 1
         for k in range(dim):
-            score[k, 0] = _dot(pulled[k, :n], shares[:n])
+            score[k, 0] = smoothing * _dot(pulled[k, :n], shares[:n])
         for p in range(dimension):
             for k in range(dim):
                 moved[k, p] = 0.0
@@ -238,12 +241,12 @@ def expectation_at(
         for p in range(dimension):
             for q in range(p + 1):
                 for k in range(dim):
-                    information[p, q] += weight * moved[k, p] * moved[k, q]
-        _spread_score(roots[i], dim, pulled, shares, n, weight, spread, flat)
+                    information[p, q] += smoothing * weight * moved[k, p] * moved[k, q]
+        _spread_score(roots[i], dim, pulled, shares, n, weight / smoothing, spread, flat)
         _backward_substituted(roots[i], dim, 1, score)
         for c in range(len(numbers)):
             from_means[c] += _dot(means[numbers[c], i], score[:, 0])
-            from_spread[c] += 0.5 * _dot(flat, covariances[numbers[c], i])
+            from_spread[c] += 0.5 * smoothing * _dot(flat, covariances[numbers[c], i])
             for d in range(d_min - 1, d_max):
                 if counted[i, d] > 0.0:
                     from_spread[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])
@@ -282,149 +285,3 @@ def _spread_score(
     for row in range(dim):
         for column in range(dim):
             flat[row * dim + column] = spread[row, column]
-
-
-@compiled
-def _cell_of(number: int, counts: Ints) -> Ints:
-    """Lower corner of a cell; cells are numbered with the last dimension fastest."""
-    cell = np.empty(len(counts), np.int64)
-    for p in range(len(counts) - 1, -1, -1):
-        cell[p] = number % (counts[p] - 1)
-        number //= counts[p] - 1
-    return cell
-
-
-@compiled
-def cell_bounds(cell: Ints, knots: Floats, counts: Ints, margin: float) -> tuple[Floats, Floats]:
-    """Least and greatest coordinates of a cell; the outer cells are wider by `margin`. Shapes (P,)."""
-    lower, upper = np.empty(len(cell)), np.empty(len(cell))
-    for p in range(len(cell)):
-        lower[p] = knots[p, cell[p]] - (margin if cell[p] == 0 else 0.0)
-        upper[p] = knots[p, cell[p] + 1] + (margin if cell[p] == counts[p] - 2 else 0.0)
-    return lower, upper
-
-
-@compiled
-def _step(place: Floats, gradient: Floats, curvature: Floats, lower: Floats, upper: Floats) -> Floats:
-    """Newton step of the components that the gradient does not hold at a bound. Shape (P,)."""
-    matrix, right = curvature.copy(), gradient.copy()
-    ridge = 1e-9 * np.trace(curvature) / len(place) + 1e-300
-    for p in range(len(place)):
-        matrix[p, p] += ridge
-        if (place[p] <= lower[p] and gradient[p] < 0.0) or (place[p] >= upper[p] and gradient[p] > 0.0):
-            matrix[p, :] = 0.0
-            matrix[:, p] = 0.0
-            matrix[p, p] = 1.0
-            right[p] = 0.0
-    return np.linalg.solve(matrix, right).astype(np.float64)
-
-
-@compiled
-def _renewed(curvature: Floats, moved: Floats, fallen: Floats) -> Floats:
-    """BFGS update of minus the Hessian after a move (P,) along which minus the gradient grew by `fallen` (P,)."""
-    along = curvature @ moved
-    bent, seen = moved @ along, moved @ fallen
-    if bent <= 0.0 or seen <= 0.05 * bent:
-        return curvature
-    return curvature + np.outer(fallen, fallen) / seen - np.outer(along, along) / bent
-
-
-@compiled
-def climbed(
-    start: Floats, cell: Ints, margin: float, most_steps: int, tolerance: float, columns: Floats, knots: Floats,
-    counts: Ints, means: Floats, covariances: Floats, durations: Floats, d_min: int,
-) -> tuple[Floats, float]:  # fmt: skip
-    """Greatest ln p within a cell that is reached from `start`: the place (P,) and its value.
-
-    Newton steps with the information of the means to begin with, then with what the gradients tell, halved while the
-    likelihood would fall.
-    """
-    lower, upper = cell_bounds(cell, knots, counts, margin)
-    place = np.minimum(np.maximum(start, lower), upper)
-    value, gradient, curvature = expectation_at(
-        place, cell, columns, knots, counts, means, covariances, durations, d_min
-    )
-    for _ in range(most_steps):
-        if not value > -np.inf:
-            break
-        step = _step(place, gradient, curvature, lower, upper)
-        share, gain = 1.0, -np.inf
-        for _ in range(8):
-            candidate = np.minimum(np.maximum(place + share * step, lower), upper)
-            found, slope, information = expectation_at(
-                candidate, cell, columns, knots, counts, means, covariances, durations, d_min
-            )
-            gain = found - value
-            if gain >= 0.0:
-                break
-            share *= 0.3
-        if not gain >= 0.0:
-            break
-        curvature = _renewed(curvature, candidate - place, gradient - slope)
-        place, value, gradient = candidate, found, slope
-        if gain < tolerance:
-            break
-    return place, value
-
-
-@compiled
-def _neighbour(place: Floats, cell: Ints, knots: Floats, counts: Ints, tried: NDArray[np.bool_]) -> int:
-    """Number of a cell that has not been tried and that touches the place; -1 if there is none."""
-    dimension, n_cells = len(cell), len(tried)
-    for number in range(n_cells):
-        if tried[number]:
-            continue
-        other = _cell_of(number, counts)
-        touching = True
-        for p in range(dimension):
-            low, high = knots[p, other[p]], knots[p, other[p] + 1]
-            width = 1e-7 * (high - low)
-            below = place[p] < low - width and other[p] > 0
-            above = place[p] > high + width and other[p] < counts[p] - 2
-            touching = touching and not below and not above
-        if touching:
-            return number
-    return -1
-
-
-@compiled
-def likeliest(
-    margin: float, smoothing: float, most_steps: int, tolerance: float, columns: Floats, knots: Floats, counts: Ints,
-    means: Floats, covariances: Floats, durations: Floats, d_min: int,
-) -> tuple[Floats, float, Ints]:  # fmt: skip
-    """The place (P,) with the greatest ln p, its value, and the cell it lies in.
-
-    The cell to begin with is that whose middle is likeliest with widened covariances (paper 5.3). Between cells the
-    likelihood has kinks (corrected 4.2.5): where a search ends at a border, it goes on in the cells that touch there.
-    """
-    n_cells, dimension = 1, len(counts)
-    for p in range(dimension):
-        n_cells *= counts[p] - 1
-    first, promise = 0, -np.inf
-    middle = np.empty(dimension)
-    for number in range(n_cells if n_cells > 1 else 0):
-        cell = _cell_of(number, counts)
-        for p in range(dimension):
-            middle[p] = 0.5 * (knots[p, cell[p]] + knots[p, cell[p] + 1])
-        found = value_at(middle, cell, smoothing, columns, knots, counts, means, covariances, durations, d_min)
-        if found > promise:
-            first, promise = number, found
-    tried = np.zeros(n_cells, np.bool_)
-    tried[first] = True
-    best_cell = _cell_of(first, counts)
-    for p in range(dimension):
-        middle[p] = 0.5 * (knots[p, best_cell[p]] + knots[p, best_cell[p] + 1])
-    best, value = climbed(
-        middle, best_cell, margin, most_steps, tolerance, columns, knots, counts, means, covariances, durations, d_min
-    )
-    while True:
-        number = _neighbour(best, best_cell, knots, counts, tried)
-        if number < 0:
-            return best, value, best_cell
-        tried[number] = True
-        cell = _cell_of(number, counts)
-        place, found = climbed(
-            best, cell, margin, most_steps, tolerance, columns, knots, counts, means, covariances, durations, d_min
-        )
-        if found > value:
-            best, value, best_cell = place, found, cell

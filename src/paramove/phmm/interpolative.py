@@ -9,15 +9,21 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
+from paramove.phmm import interpolation_kernels, interpolation_search
+from paramove.phmm.bending import bending
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
-from paramove.phmm.maximisation import curvature_covariance, maximum_over_cells
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
+from paramove.phmm.performance import state_averages
+from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity, left_out_of_groups
 from paramove.phmm.synchronisation import synchronised
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+SMOOTHING = 0.3
+"""Factor on squared distances where the search begins: covariances are widened as much (paper 5.3)."""
 
 
 class InterpolativePHMM(ParametricHMM):
@@ -32,14 +38,18 @@ class InterpolativePHMM(ParametricHMM):
         shape: grid lines per dimension; with `corners` only. Without them the grid is found from theta.
         local_iterations: EM steps of the local models, the first with the global responsibilities.
         search_margin: how far outside the grid `estimate` looks, as a share of the grid.
-        covariance_inflation: factor on the covariance of `estimate`; above 1 since frames are not independent.
+        covariance_inflation: further factor on the covariance of `estimate`, see `calibrate`.
 
     Attributes:
         grid_: the ParameterGrid.
         means_: shape (G, N, D), grid points with the last dimension fastest.
         covariances_: shape (G, N, D, D).
         durations_: shape (G, N, d_max).
+        spread_: how whole training performances vary; None for a model made of given local HMMs.
     """
+
+    spread_: PerformanceSpread | None = None
+    _prepared: tuple[Any, ...] | None = None
 
     def __init__(
         self,
@@ -91,8 +101,8 @@ class InterpolativePHMM(ParametricHMM):
     def calibrate(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
         """Set `covariance_inflation` so that covariances of `estimate` match its errors on labelled sequences.
 
-        The likelihood takes frames for independent, which makes its curvature far too sure. Use sequences that did not
-        train the model. Raises ValueError for fewer than two.
+        Needed for a model made of given local HMMs; one that was trained knows how performances vary, but not what it
+        was never shown. Use sequences that did not train the model. Raises ValueError for fewer than two.
         """
         labels = np.atleast_2d(np.asarray(theta, dtype=np.float64))
         if len(sequences) < 2:
@@ -114,6 +124,22 @@ class InterpolativePHMM(ParametricHMM):
         local = synchronised(everything.parameters, groups, options, self.local_iterations)
         self.training_ = everything.training_
         self._set_local(grid, local)
+        self.spread_ = self._performance_spread(data.sequences, data.theta)
+
+    def _performance_spread(self, sequences: Sequence[Floats], theta: Floats) -> PerformanceSpread:
+        numbers = self.grid_.nearest(theta)[0]
+        evaluators = [Evaluator.of(one) for one in self.local_models()]
+        averages = [
+            state_averages(evaluators[g], x)[0].ravel() for g, x in zip(numbers.tolist(), sequences, strict=True)
+        ]
+        residuals = np.stack(averages) - self.means_[numbers].reshape(len(numbers), -1)
+        counts = self._kernel_arrays()[1]
+        sensitivities = []
+        for g, sequence in zip(numbers.tolist(), sequences, strict=True):
+            cell = np.minimum(np.unravel_index(g, self.grid_.shape), counts - 2)
+            place = self.grid_.coordinates(self.grid_.points()[g])
+            sensitivities.append(self._sensitivity(place, cell, len(sequence)))
+        return PerformanceSpread.fitted(left_out_of_groups(residuals, numbers), sensitivities, self.grid_.size)
 
     def _grid_for(self, theta: Floats) -> ParameterGrid:
         if self.corners is None:
@@ -125,6 +151,8 @@ class InterpolativePHMM(ParametricHMM):
         self.means_ = np.stack([one.means for one in local])
         self.covariances_ = np.stack([one.covariances for one in local])
         self.durations_ = np.stack([one.durations for one in local])
+        self.spread_ = None
+        self._prepared = None
 
     def at(self, theta: ArrayLike) -> LeftRightHMM:
         """The interpolated HMM for theta (P,)."""
@@ -146,7 +174,9 @@ class InterpolativePHMM(ParametricHMM):
         return self._at_progress(self.covariances_, theta, tau, clamped=True)
 
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """Maximum likelihood theta, searched per grid cell; covariance from the curvature of the log-likelihood.
+        """Maximum likelihood theta; its covariance from how whole training performances differ from their local model.
+
+        A model made of given local HMMs knows no performances: its covariance is the inverse information, far too sure.
 
         Raises ValueError for `finished=False`: a grid of local models knows nothing of beginnings.
         """
@@ -154,22 +184,60 @@ class InterpolativePHMM(ParametricHMM):
             raise ValueError(
                 "an InterpolativePHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings"
             )
-        checked = self._resampled(checked_sequence(sequence, self.means_.shape[-1]))
+        checked = self._resampled(checked_sequence(sequence, self._learned_dimensions()))
         check_length(len(checked), self.n_states, self.d_min, self.d_max)
-
-        def log_likelihood(coordinates: Floats) -> float:
-            return Evaluator.of(self._interpolated(coordinates)).log_likelihood(checked)
-
-        best, value = maximum_over_cells(log_likelihood, self.grid_.knots, self.search_margin, most_cells=4)
-        covariance = curvature_covariance(log_likelihood, best, widest=1.0 + 2.0 * self.search_margin)
+        best, value, cell = interpolation_search.likeliest(
+            self.search_margin, SMOOTHING, np.ascontiguousarray(checked.T), *self._kernel_arrays()
+        )
+        widest = 1.0 + 2.0 * self.search_margin
+        if self.spread_ is not None:
+            sensitivity = self._sensitivity(best, cell, len(checked))
+            bends = bending(self.grid_, self.means_, best, sensitivity.gain)
+            covariance = self.spread_.covariance(sensitivity, widest, bends)
+        else:
+            covariance = self._curvature_covariance(checked, best, cell, widest)
         edges = self.grid_.edges
         spread = self.covariance_inflation * (edges.T @ covariance @ edges)
-        return ParameterEstimate(self.grid_.theta(best), spread, value)
+        return ParameterEstimate(self.grid_.theta(best), spread, float(value))
+
+    def _learned_dimensions(self) -> int:
+        self._check_trained()
+        return int(self.means_.shape[-1])
+
+    def _kernel_arrays(self) -> tuple[Any, ...]:
+        """Grid lines (P, most), their numbers (P,), and the local models as the kernels take them."""
+        if self._prepared is None:
+            grid = self.grid_
+            knots = np.zeros((grid.dimension, max(grid.shape)))
+            for row, line in zip(knots, grid.knots, strict=True):
+                row[: len(line)] = line
+            flat = np.ascontiguousarray(self.covariances_.reshape(*self.covariances_.shape[:2], -1))
+            means, durations = np.ascontiguousarray(self.means_), np.ascontiguousarray(self.durations_)
+            self._prepared = knots, np.array(grid.shape, dtype=np.int64), means, flat, durations, self.d_min
+        return self._prepared
+
+    def _sensitivity(self, coordinates: Floats, cell: Ints, n_frames: int) -> Sensitivity:
+        knots, counts, *_ = self._kernel_arrays()
+        numbers = interpolation_kernels.corner_numbers(cell, counts)
+        slopes = interpolation_kernels.corner_weights(coordinates, cell, knots, False)[1]
+        moved = np.einsum("cp,cnd->ndp", slopes, self.means_[numbers])
+        return Sensitivity.of(self._interpolated(coordinates), moved, n_frames)
+
+    def _curvature_covariance(self, sequence: Floats, place: Floats, cell: Ints, widest: float) -> Floats:
+        """Inverse information of the likelihood: far too sure, but all that is known without performances."""
+        columns, arrays = np.ascontiguousarray(sequence.T), self._kernel_arrays()
+        information = interpolation_kernels.expectation_at(place, cell, 1.0, columns, *arrays)[2]
+        values, vectors = np.linalg.eigh(information)
+        result: Floats = (vectors / np.maximum(values, 1.0 / widest**2)) @ vectors.T
+        return result
+
+    def _check_trained(self) -> None:
+        if not hasattr(self, "grid_"):
+            raise RuntimeError("this model is not trained yet: call fit, or load a file")
 
     def _coordinates(self, theta: ArrayLike) -> Floats:
         values = np.asarray(theta, dtype=np.float64)
-        if not hasattr(self, "grid_"):
-            raise RuntimeError("this model is not trained yet: call fit, or load a file")
+        self._check_trained()
         if values.shape[-1:] != (self.grid_.dimension,) or values.ndim > 2 or not np.isfinite(values).all():
             raise ValueError(
                 f"theta has {self.grid_.dimension} finite components, found shape {values.shape}: {values}"
@@ -204,7 +272,8 @@ class InterpolativePHMM(ParametricHMM):
     def _arrays(self) -> dict[str, Floats]:
         knots = {f"knots_{number}": line for number, line in enumerate(self.grid_.knots)}
         grid = {"grid_origin": self.grid_.origin, "grid_edges": self.grid_.edges, **knots}
-        return {"means": self.means_, "covariances": self.covariances_, "durations": self.durations_, **grid}
+        local = {"means": self.means_, "covariances": self.covariances_, "durations": self.durations_}
+        return local | grid | (self.spread_.arrays() if self.spread_ is not None else {})
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
         knots = tuple(arrays[f"knots_{number}"] for number in range(len(arrays["grid_origin"])))
@@ -219,6 +288,9 @@ class InterpolativePHMM(ParametricHMM):
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
         check_local_models(self.means_, self.covariances_, self.durations_, self.d_min)
+        self._prepared = None
+        known = "spread_factor" in arrays  # models made of given local HMMs know no performances
+        self.spread_ = PerformanceSpread.from_arrays(arrays, self.n_states * dim) if known else None
 
 
 def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list[list[Floats]]:

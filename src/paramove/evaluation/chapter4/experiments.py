@@ -49,7 +49,17 @@ SOURCES = (
 )
 INTERPOLATIVE = tuple(
     f"paramove.phmm.{name}"
-    for name in ("grid", "interpolative", "local_models", "maximisation", "parametric", "synchronisation")
+    for name in (
+        "bending",
+        "grid",
+        "interpolation_kernels",
+        "interpolation_search",
+        "interpolative",
+        "local_models",
+        "parametric",
+        "performance_spread",
+        "synchronisation",
+    )
 )
 """Source that an interpolative model depends on: it is slow, and does not change with the polynomial ones."""
 
