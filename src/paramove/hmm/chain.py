@@ -146,7 +146,7 @@ class ChainEvaluator:
 
     def log_outputs(self, stack: Stack) -> Floats:
         """ln b_i of the frames in the windows; other entries have no meaning. Shape (N, frames)."""
-        means = self.parameters.means
+        means = self.parameters.means[None]
         return stacked_log_outputs(
             stack.columns, self.windows(stack), means, self.whitening, self.log_norm, self.diagonal
         )
@@ -216,7 +216,9 @@ class ChainStatistics(Moments):
                     "leave it out or train with duration_pseudocount > 0"
                 )
             moments = moments.plus(
-                *stacked_moments(stack.columns, evaluator.windows(stack), gamma, parameters.means, kind == "diagonal")
+                *stacked_moments(
+                    stack.columns, evaluator.windows(stack), gamma, parameters.means[None], kind == "diagonal"
+                )
             )
             counts = Counts(
                 counts.starts + found.starts, counts.transitions + found.transitions, counts.exits + found.exits

@@ -110,17 +110,29 @@ class Evaluator:
         return float(values[0]), gamma.T, counts
 
     def stacked_expectation(
-        self, stack: Stack, gamma: Floats, counts: Floats, diagonal: bool = False, before: int = 0
+        self,
+        stack: Stack,
+        gamma: Floats,
+        counts: Floats,
+        diagonal: bool = False,
+        before: int = 0,
+        means: Floats | None = None,
     ) -> Floats:
         """Log-likelihood of each sequence, shape (K,).
 
-        Writes the responsibilities within the feasible windows to gamma (N, frames), adds to counts (N, d_max).
+        Writes the responsibilities within the feasible windows to gamma (N, frames), adds to counts (N, d_max). Sequences
+        may have means of their own, (K, N, D).
         Raises ValueError naming a sequence whose likelihood is zero, since there are no responsibilities then; `before`
         sequences are in other stacks.
         """
         windows = self.windows(stack)
         outputs = kernels.stacked_log_outputs(
-            stack.columns, windows, self.means, self.whitening, self.log_norm, diagonal
+            stack.columns,
+            windows,
+            self.means[None] if means is None else means,
+            self.whitening,
+            self.log_norm,
+            diagonal,
         )
         values = kernels.stacked_segments(outputs, stack.offsets, self.log_duration, self.d_min, gamma, counts)
         if not np.isfinite(values).all():
@@ -203,7 +215,9 @@ class Statistics(Moments):
         for stack in stacks:
             values = evaluator.stacked_expectation(stack, gamma, durations, diagonal, before)
             moments = moments.plus(
-                *kernels.stacked_moments(stack.columns, evaluator.windows(stack), gamma, evaluator.means, diagonal)
+                *kernels.stacked_moments(
+                    stack.columns, evaluator.windows(stack), gamma, evaluator.means[None], diagonal
+                )
             )
             log_likelihood += float(values.sum())
             before += len(values)

@@ -143,9 +143,10 @@ def stacked_log_outputs(
     Args:
         columns: all frames of all sequences, one column each, shape (D, frames).
         windows: first column, and the one after the last, for each sequence and state, shape (K, N, 2).
-        means, whitening, log_norm: the states. diagonal: whether the whitening matrices are.
+        means: of the states, the same for all sequences (1, N, D) or of each (K, N, D).
+        whitening, log_norm: of the states. diagonal: whether the whitening matrices are.
     """
-    dim, n_states = columns.shape[0], means.shape[0]
+    dim, n_states = columns.shape[0], means.shape[1]
     out = np.empty((n_states, columns.shape[1]))
     difference = np.zeros(((dim + TILE - 1) // TILE * TILE, BLOCK))
     products, squared, place = np.empty((TILE, BLOCK)), np.empty(BLOCK), np.empty(BLOCK, np.int64)
@@ -153,6 +154,7 @@ def stacked_log_outputs(
         matrix = whitening[i] if dim % TILE == 0 else _padded(whitening[i])
         filled = 0
         for s in range(windows.shape[0]):
+            own = min(s, means.shape[0] - 1)
             begin = windows[s, i, 0]
             while begin < windows[s, i, 1]:
                 n = min(BLOCK - filled, windows[s, i, 1] - begin)
@@ -160,7 +162,7 @@ def stacked_log_outputs(
                     source, target, mean = (
                         columns[k, begin : begin + n],
                         difference[k, filled : filled + n],
-                        means[i, k],
+                        means[own, i, k],
                     )
                     for f in range(n):
                         target[f] = source[f] - mean
@@ -203,7 +205,7 @@ def stacked_moments(
     shape (N, frames), the rest is as in `stacked_log_outputs`. Shapes (N,), (N, D), (N, D, D); the last holds the
     diagonals alone if `diagonal`.
     """
-    dim, n_states = columns.shape[0], reference.shape[0]
+    dim, n_states = columns.shape[0], reference.shape[1]
     size = (dim + TILE - 1) // TILE * TILE
     weight, first, second = np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim))
     difference, scaled, shares = np.zeros((size, BLOCK)), np.zeros((size, BLOCK)), np.empty(BLOCK)
@@ -212,6 +214,7 @@ def stacked_moments(
         total[:] = 0.0
         filled = 0
         for s in range(windows.shape[0]):
+            own = min(s, reference.shape[0] - 1)
             t, end = windows[s, i, 0], windows[s, i, 1]
             while t < end:
                 if gamma[i, t] < NEGLIGIBLE:
@@ -227,7 +230,7 @@ def stacked_moments(
                     source, target, mean = (
                         columns[k, t : t + run],
                         difference[k, filled : filled + run],
-                        reference[i, k],
+                        reference[own, i, k],
                     )
                     for f in range(run):
                         target[f] = source[f] - mean

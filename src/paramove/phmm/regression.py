@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from paramove.hmm import kernels
 from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
 from paramove.hmm.options import TrainingOptions, TrainingSummary
+from paramove.hmm.sequences import Stack
 from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
 from paramove.phmm.slope_prior import SlopePrior
 
@@ -64,30 +65,34 @@ class RegressionStatistics:
 
     @classmethod
     def gathered(
-        cls, parameters: RegressedParameters, sequences: Sequence[Floats], features: Floats
+        cls, parameters: RegressedParameters, stacks: Sequence[Stack], features: Floats
     ) -> RegressionStatistics:
-        """E-step with the features (K, F) of the sequences."""
-        common = Evaluator.of(parameters.at(features[0]))
-        n_states, dim, _ = parameters.coefficients.shape
-        weights, firsts = np.zeros((len(sequences), n_states)), np.zeros((len(sequences), n_states, dim))
-        squared = np.zeros((n_states, dim, dim))
-        durations = np.zeros_like(parameters.durations)
-        log_likelihood = 0.0
-        means = np.einsum("ndf,kf->knd", parameters.coefficients, features)
-        for k, sequence in enumerate(sequences):
-            evaluator = replace(common, means=means[k])
-            value, gamma, counts = evaluator.expectation(sequence)
-            log_likelihood += value
-            durations += counts
-            ends = evaluator.ends(len(sequence))
-            kernels.add_moments(sequence, gamma, ends, means[k], weights[k], firsts[k], squared)
-        squared = squared + np.swapaxes(np.tril(squared, -1), 1, 2)
-        outer = np.einsum("kf,kg->kfg", features, features)
+        """E-step with the features (K, F) of the sequences in the stacks.
+
+        Moments of residuals and features together, [r; phi][r; phi]', hold all sums: features are rows whose reference
+        is zero.
+        """
+        evaluator = Evaluator.of(parameters.at(features[0]))
+        n_states, dim, n_features = parameters.coefficients.shape
+        means = np.zeros((len(features), n_states, dim + n_features))
+        np.einsum("ndf,kf->knd", parameters.coefficients, features, out=means[..., :dim])
+        total, durations = np.zeros((n_states, dim + n_features, dim + n_features)), np.zeros_like(parameters.durations)
+        weight, log_likelihood, before = np.zeros(n_states), 0.0, 0
+        gamma = np.empty((n_states, max(stack.n_frames for stack in stacks)))
+        for stack in stacks:
+            own = slice(before, before + len(stack.lengths))
+            values = evaluator.stacked_expectation(
+                stack, gamma, durations, before=before, means=np.ascontiguousarray(means[own, :, :dim])
+            )
+            joined = np.concatenate([stack.columns, np.repeat(features[own], stack.lengths, axis=0).T])
+            some, _, second = kernels.stacked_moments(joined, evaluator.windows(stack), gamma, means[own], False)
+            weight, total, log_likelihood = weight + some, total + second, log_likelihood + float(values.sum())
+            before += len(values)
         return cls(
-            np.tensordot(weights.T, outer, axes=1),
-            np.einsum("knd,kf->ndf", firsts, features, optimize=True),
-            squared,
-            weights.sum(axis=0),
+            np.ascontiguousarray(total[:, dim:, dim:]),
+            np.ascontiguousarray(total[:, :dim, dim:]),
+            np.ascontiguousarray(total[:, :dim, :dim]),
+            weight,
             durations,
             log_likelihood,
         )
@@ -125,8 +130,9 @@ def train_regressed(
     scale = root_mean_deviation(sequences)
     settled = max(options.annealing_iterations, EVIDENCE_ITERATIONS if smoothness is not None else 0)
     parameters, prior, target = initial, None, None
+    stacks = Stack.parts(sequences, len(initial.coefficients))
     for iteration in range(options.max_iterations):
-        found = RegressionStatistics.gathered(parameters, sequences, features)
+        found = RegressionStatistics.gathered(parameters, stacks, features)
         if smoothness is not None and iteration <= settled:
             prior = _prior(prior, parameters, found, degrees, smoothness, n_frames / len(sequences))
         change = _change(parameters, found, prior)
@@ -159,7 +165,7 @@ def with_coefficients(
     options: TrainingOptions,
 ) -> RegressedParameters:
     """The family with other coefficients (N, D, F); covariances and durations follow by one more M-step."""
-    found = RegressionStatistics.gathered(parameters, sequences, features)
+    found = RegressionStatistics.gathered(parameters, Stack.parts(sequences, len(coefficients)), features)
     scatter = found.scatter(coefficients - parameters.coefficients)
     target = pooled_covariance(scatter, found.weight)
     regularisation = regularisation_at(options.max_iterations, options, root_mean_deviation(sequences), target)
