@@ -76,7 +76,7 @@ def import_files(
     if find is not None and label is None:
         raise typer.BadParameter("movements that are found need an --action", param_hint="--find")
     with one_sentence():
-        options = _options(mapping, unit, axes, rate, point, zeros_are_places)
+        options = import_options(mapping, unit, axes, rate, point, zeros_are_places)
         results = [import_file(file, options, label, max_gap, name, find) for file in files]
         _tell(results, skip_refused)
         names = given if given is not None else results[0].parameter_names or _names_of(values)
@@ -89,7 +89,7 @@ def _names_of(values: tuple[float, ...]) -> tuple[str, ...]:
     return tuple(f"parameter_{number}" for number in range(1, len(values) + 1))
 
 
-def _options(
+def import_options(
     mapping: Path | None,
     unit: str | None,
     axes: str | None,

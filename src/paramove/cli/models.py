@@ -1,0 +1,259 @@
+"""`paramove models`: movement models listed, shown, drawn and compared."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from paramove.cli.bus_options import JsonOption
+from paramove.cli.demos_options import PointOption, ended, table_of
+from paramove.cli.model_options import ModelArgument, loaded, model_files, one_sentence
+from paramove.input_error import InputError
+from paramove.supervision import exit_codes
+from paramove.supervision.processes import printable
+
+if TYPE_CHECKING:
+    from paramove.phmm import ParametricHMM
+
+app = typer.Typer(name="models", help="List, show, plot and compare movement models.", no_args_is_help=True)
+
+DEPTH = 3
+"""How far below the folder `list` looks."""
+
+
+@app.command("list")
+def list_models(
+    folder: Annotated[Path, typer.Argument(help="where to look, three levels deep")] = Path(),
+    as_json: JsonOption = False,
+) -> None:
+    """List the movement models in a folder.
+
+    Exit codes: 0; 66 there is none; 78 one is damaged, which is told.
+    """
+    from paramove.phmm import ParametricHMM
+    from paramove.phmm.classification import INDEX_FILE
+
+    rows, wrong = [], []
+    found = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + "*.npz")})
+    for file in (file for file in found if file.name != INDEX_FILE and _is_model(file)):
+        try:
+            rows.append(_row(file, ParametricHMM.load(file)))
+        except InputError as error:
+            wrong.append(str(error))
+    if not rows and not wrong:
+        raise ended(f"no movement model in {folder}; `paramove train` makes one", exit_codes.INPUT_MISSING)
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+    else:
+        table_of(rows)
+    if wrong:
+        raise ended("\n".join(wrong), exit_codes.CONFIGURATION)
+
+
+def _is_model(file: Path) -> bool:
+    """Whether an .npz calls itself a model; others, such as recordings, are passed over."""
+    import zipfile
+
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return {"format_version.npy", "header.npy"} <= set(archive.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return True  # damaged: to be told
+
+
+def _row(file: Path, model: ParametricHMM) -> dict[str, Any]:
+    from paramove.evaluation.models.drawing import parameter_names
+    from paramove.evaluation.models.kinds import kind_of
+
+    about = model.description
+    return {
+        "file": str(file),
+        "action": about.action if about else "",
+        "model": kind_of(model),
+        "parameters": list(parameter_names(model)),
+        "points": len(about.point_names) if about else 0,
+        "states": model.n_states,
+        "sequences": model.training_.n_sequences if model.training_ else None,
+    }
+
+
+@app.command()
+def show(file: ModelArgument, as_json: JsonOption = False) -> None:
+    """Show what a model file holds, and how it was trained.
+
+    Exit codes: 0; 66 there is no such file; 78 it is damaged or no model.
+    """
+    with one_sentence():
+        facts = _facts(file, loaded(file))
+    if as_json:
+        typer.echo(json.dumps(facts, indent=2, ensure_ascii=False))
+        return
+    for name, value in _lines(facts):
+        typer.echo(f"{name + ':':<23}{printable(value)}")
+
+
+def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
+    from paramove.evaluation.models.drawing import bounds, dimension, parameter_names
+    from paramove.evaluation.models.kinds import kind_of
+    from paramove.evaluation.models.pictures import state_seconds
+    from paramove.evaluation.models.training import checksum, told_of
+    from paramove.phmm import MovementDescription
+
+    about = model.description or MovementDescription()
+    low_high = bounds(model)
+    seconds, _, unit = state_seconds(model, low_high.mean(axis=0))
+    if file.is_dir():
+        file = model_files(file)[0]
+    summary = model.training_
+    return {
+        "file": str(file),
+        "sha256": checksum(file),
+        "model": kind_of(model),
+        "action": about.action,
+        "points": list(about.point_names),
+        "components": dimension(model),
+        "unit": about.unit,
+        "frame": about.frame,
+        "parameters": {
+            name: [float(low), float(high)]
+            for name, low, high in zip(parameter_names(model), *low_high, strict=True)
+        },
+        "states": model.n_states,
+        "frames_per_state": [model.d_min, model.d_max],
+        "resampled_frames": model.resampled_frames,
+        "state_durations": seconds.tolist(),
+        "state_durations_unit": unit,
+        "duration_s": about.duration or None,
+        "rate_hz": about.rate_hz or None,
+        "source": about.source or None,
+        "training": None if summary is None else {
+            "sequences": summary.n_sequences,
+            "frames": summary.n_frames,
+            "iterations": len(summary.log_likelihoods),
+            "converged": summary.converged,
+            "log_likelihood_per_frame": summary.log_likelihoods[-1] / summary.n_frames,
+        },
+        "left_out": (told_of(file) or {}).get("left_out"),
+    }  # fmt: skip
+
+
+def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    from paramove.evaluation.models.drawing import with_unit
+    from paramove.evaluation.models.report import left_out_sentences
+
+    low_high = [f"{with_unit(name)}: {low:.4g} to {high:.4g}" for name, (low, high) in facts["parameters"].items()]
+    least, most = facts["frames_per_state"]
+    frames = facts["resampled_frames"]
+    times = facts["state_durations"]
+    rows = [
+        ("file", facts["file"]),
+        ("sha256", facts["sha256"]),
+        ("model", facts["model"]),
+        ("action", facts["action"]),
+        ("points", ", ".join(facts["points"]) or f"not named; {facts['components']} components"),
+        ("unit, frame", f"{facts['unit']}, {facts['frame']}"),
+        ("parameters", "; ".join(low_high)),
+        ("states", f"{facts['states']} of {least} to {most} frames"
+         + (f"; every movement is brought to {frames} frames" if frames else "")),
+        ("time in a state", f"{min(times):.3g} to {max(times):.3g} {facts['state_durations_unit']}"),
+    ]  # fmt: skip
+    if facts["duration_s"]:
+        rate = f", recorded at {facts['rate_hz']:g} Hz" if facts["rate_hz"] else ""
+        rows.append(("movements last", f"{facts['duration_s']:.3g} s{rate}"))
+    rows.append(("source", facts["source"] or "–"))
+    training = facts["training"]
+    if training:
+        how = "converged" if training["converged"] else "not yet converged"
+        rows.append((
+            "training",
+            f"{training['sequences']} sequences, {training['iterations']} iterations, {how}, log-likelihood "
+            f"{training['log_likelihood_per_frame']:.2f} per frame",
+        ))  # fmt: skip
+    return rows + (left_out_sentences(facts["left_out"]) if facts["left_out"] else [])
+
+
+@app.command()
+def plot(
+    file: ModelArgument,
+    output: Annotated[Path, typer.Option(metavar="FILE", help="a .png, .svg, .pdf or .html")] = Path("model.png"),
+    point: PointOption = None,
+) -> None:
+    """Draw what a model knows: its movements for a raster of theta, their scatter, durations, where theta is visible.
+
+    Exit codes: 0; 66 there is no such file; 78 it is damaged, or has no such point.
+    """
+    from paramove.demonstrations.plots import write_plot
+    from paramove.evaluation.models.pictures import plot_model, title_of
+
+    with one_sentence():
+        model = loaded(file)
+        write_plot(plot_model(model, point), output, title_of(model))
+    typer.echo(str(output))
+
+
+@app.command()
+def compare(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE FILE...", help="files of movement models")],
+    on: Annotated[
+        Path | None, typer.Option("--on", metavar="SET", help="which explains these demonstrations better")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare models: what they were told, how far apart their movements are, and how well they explain a set.
+
+    Exit codes: 0; 2 fewer than two; 66 a file is missing; 78 one is damaged, or they have other points or parameters.
+    """
+    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.evaluation.models.comparing import on_set, table_of_distances
+
+    if len(files) < 2:
+        raise typer.BadParameter("give at least two files", param_hint="FILE FILE...")
+    with one_sentence():
+        models = [loaded(file) for file in files]
+        facts = [_facts(file, model) for file, model in zip(files, models, strict=True)]
+        distances = table_of_distances(models)
+        shown = None if on is None else DemonstrationSet.load(on)
+        explained = None if shown is None else [on_set(model, shown) for model in models]
+    if as_json:
+        text = {"models": facts, "distances": distances, "on": explained}
+        typer.echo(json.dumps(text, indent=2, ensure_ascii=False))
+        return
+    _tell(files, facts, distances, explained)
+
+
+def _tell(
+    files: list[Path],
+    facts: list[dict[str, Any]],
+    distances: list[list[dict[str, float]]],
+    explained: list[dict[str, Any]] | None,
+) -> None:
+    letters = [chr(ord("A") + number) if number < 26 else str(number) for number in range(len(files))]
+    lines = [dict(_lines(one)) for one in facts]
+    shown = [name for name in lines[0] if name not in ("sha256", "file") and all(name in line for line in lines)]
+    for letter, file in zip(letters, files, strict=True):
+        typer.echo(f"{letter}: {file}")
+    typer.echo()
+    same = [name for name in shown if len({line[name] for line in lines}) == 1]
+    for name in shown:
+        for letter, line in zip(["same"] if name in same else letters, lines, strict=False):
+            typer.echo(f"{name:<22}{letter:<6}{printable(line[name])}")
+    typer.echo("\ndistance of their movements over the theta of both: root mean square (greatest), cm")
+    table_of([
+        {"": letter} | {
+            other: "–" if one is two else f"{100 * cell['rms_m']:.2f} ({100 * cell['greatest_m']:.1f})"
+            for two, (other, cell) in enumerate(zip(letters, row, strict=True))
+        }
+        for one, (letter, row) in enumerate(zip(letters, distances, strict=True))
+    ])  # fmt: skip
+    if explained is not None:
+        typer.echo("\non the set")
+        table_of([
+            {"": letter, "movements": one["movements"], "log-likelihood per frame": one["log_likelihood_per_frame"]}
+            | {f"{name}, RMS error": value for name, value in one["theta_rms"].items()}
+            | {"regions that hold the label, %": 100 * one["theta_covered"],
+               "synthesis, cm": 100 * one["synthesis_median_m"]}
+            for letter, one in zip(letters, explained, strict=True)
+        ])  # fmt: skip

@@ -1,0 +1,158 @@
+"""`paramove recognize`: which action a movement is, with which parameters, and how surely."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import track
+
+from paramove.cli import demos_import
+from paramove.cli.bus_options import JsonOption
+from paramove.cli.demos_options import ended, table_of
+from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_sentence
+from paramove.supervision.processes import printable
+
+if TYPE_CHECKING:
+    from paramove.evaluation.models.examining import Recognition
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def recognize(
+    source: Annotated[
+        Path, typer.Argument(metavar="FILE|SET", help="recording .mcap, C3D, BVH, CSV, NPZ, or a demonstration set")
+    ],
+    model: ModelsOption,
+    unfinished: Annotated[
+        bool, typer.Option("--unfinished", help="it is the beginning of a movement: say what it will be")
+    ] = False,
+    find: Annotated[
+        str | None, typer.Option("--find", metavar="POINT", help="each movement of POINT, by its speed")
+    ] = None,
+    mapping: demos_import.MappingOption = None,
+    unit: Annotated[str | None, typer.Option(help="m, cm or mm, if the file does not tell")] = None,
+    axes: Annotated[str | None, typer.Option(help="as in `paramove demos import`")] = None,
+    rate: Annotated[float | None, typer.Option(min=0.001, help="frames per second, if the file does not tell")] = None,
+    point: demos_import.PointsOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say which action a movement is and with which parameters; of several models, which explains it best.
+
+    Theta comes with the region that holds it in 95 % of the cases. A movement that is less typical than 1 % is said to
+    be none of the known ones.
+
+    Exit codes: 0, also where nothing known was seen; 66 a file is missing; 78 a file or the movement cannot be used.
+    """
+    from paramove.cli.movement_files import movements_of
+    from paramove.evaluation.models.examining import Examiner
+
+    if unit not in (None, "m", "cm", "mm"):
+        raise typer.BadParameter(f"expected m, cm or mm, found {unit!r}", param_hint="--unit")
+    with one_sentence():
+        examiner = Examiner(classifier_of(model))
+        options = demos_import.import_options(mapping, unit, axes, rate, point, False)
+        movements = movements_of(source, options, find)
+        console = Console(stderr=True, highlight=False, emoji=False)
+        many = len(movements) > 20
+        try:
+            found = [
+                examiner.examine(movement, finished=not unfinished)
+                for movement in track(movements, "movements", console=console, transient=True, disable=not many)
+            ]
+        except KeyboardInterrupt:
+            raise ended("interrupted", INTERRUPTED) from None
+        if plot is not None:
+            from paramove.demonstrations.plots import write_plot
+            from paramove.evaluation.models.recognition_pictures import plot_recognition
+
+            write_plot(plot_recognition(examiner.models, found), plot, f"{source.name}: {len(found)} movements")
+    _tell(found, as_json)
+    if plot is not None and not as_json:
+        typer.echo(str(plot))
+
+
+def _tell(found: list[Recognition], as_json: bool) -> None:
+    from paramove.evaluation.models.examining import confusion
+
+    facts = [one.facts() for one in found]
+    table = confusion(found)
+    if as_json:
+        typer.echo(json.dumps({"movements": facts, "confusion": table or None}, indent=2, ensure_ascii=False))
+    elif len(facts) == 1:
+        for name, value in _lines(facts[0], found[0]):
+            typer.echo(f"{name + ':':<16}{printable(value)}")
+    else:
+        table_of([_row(number, one) for number, one in enumerate(facts)])
+        _summary(found, table)
+
+
+def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
+    """One movement, in words."""
+    from paramove.evaluation.models.drawing import with_unit
+    from paramove.evaluation.models.examining import percent
+
+    others = sorted(facts["posterior"].items(), key=lambda item: -item[1])
+    rows = [("movement", f"{facts['movement']} ({facts['seconds']:.3g} s)")]
+    if found.known and len(others) == 1:
+        rows.append(("action", f"{found.action}, the only one that was asked"))
+    elif found.known:
+        rows.append(("action", ", ".join(f"{name} {percent(share)}" for name, share in others[:4])))
+    else:
+        rows.append(("action", f"none of the known ones; the nearest is {found.action}"))
+    rows += [
+        (with_unit(name), f"{value:.4g} ± {facts['theta_region_95'][name]:.2g} (95 %)")
+        for name, value in facts["theta"].items()
+    ]
+    if found.outside:
+        rows.append(("beware", f"{', '.join(found.outside)} outside what the model was trained with"))
+    typical = "this model cannot tell" if found.typicality is None else percent(found.typicality)
+    rows += [("typicality", typical), ("log-likelihood", f"{facts['log_likelihood']:.1f}")]
+    if "labelled_action" in facts:
+        rows.append(("labelled", facts["labelled_action"]))
+    if found.labelled is not None:
+        told = ", ".join(f"{value:.4g}" for value in found.labelled)
+        inside = "inside" if facts["labelled_theta_in_region"] else "outside"
+        rows.append(("labelled theta", f"{told}: {inside} the region"))
+    return rows
+
+
+def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
+    """One of many movements, as a line of the table."""
+    from paramove.evaluation.models.examining import percent
+
+    row: dict[str, Any] = {"": number, "action": facts["action"] or "none"}
+    row["posterior"] = percent(facts["posterior"][facts["most_probable_action"]])
+    for name, value in facts["theta"].items():
+        row[name] = f"{value:.3f} ± {facts['theta_region_95'][name]:.2g}"
+    row["typicality"] = None if facts["typicality"] is None else percent(facts["typicality"])
+    row["log-likelihood"] = facts["log_likelihood"]
+    if "labelled_action" in facts:
+        row["labelled"] = facts["labelled_action"]
+    if "labelled_theta" in facts:
+        row["theta"] = ", ".join(f"{value:.3f}" for value in facts["labelled_theta"])
+    return row
+
+
+def _summary(found: list[Recognition], table: dict[str, dict[str, int]]) -> None:
+    import numpy as np
+
+    if table:
+        taken = [*sorted({name for row in table.values() for name in row} - {"none"}), "none"]
+        typer.echo("\nlabelled (row), taken for (column)")
+        table_of([{"": name} | {other: row.get(other, 0) for other in taken} for name, row in sorted(table.items())])
+        right = sum(row.get(name, 0) for name, row in table.items())
+        typer.echo(f"{right} of {sum(sum(row.values()) for row in table.values())} right")
+    labelled = [one for one in found if one.labelled is not None and one.action == one.movement.action]
+    if labelled:
+        errors = np.stack([one.estimate.theta - one.labelled for one in labelled if one.labelled is not None])
+        rms = np.sqrt((errors**2).mean(axis=0))
+        inside = sum(bool(one.facts()["labelled_theta_in_region"]) for one in labelled)
+        names = labelled[0].parameter_names
+        told = ", ".join(f"{name} {value:.3g}" for name, value in zip(names, rms, strict=True))
+        typer.echo(f"error of theta, RMS: {told}; {inside} of {len(labelled)} labels lie in the 95 % region")

@@ -1,0 +1,152 @@
+"""`paramove train`: movement models from demonstrations."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import Progress, TaskID
+
+from paramove.cli.bus_options import JsonOption
+from paramove.cli.demos_options import SetArgument, ended, words
+from paramove.cli.evaluation_io import PROGRESS
+from paramove.cli.model_options import INTERRUPTED, one_sentence
+from paramove.input_error import InputError
+from paramove.supervision.processes import printable
+
+if TYPE_CHECKING:
+    from paramove.evaluation.models.examples import Examples
+    from paramove.evaluation.models.training import Make, Trained
+
+app = typer.Typer(add_completion=False)
+
+FOLDER = Path("models")
+Kind = StrEnum("Kind", ["best", "linear", "quadratic", "cubic", "neural", "interpolative"])
+LeaveOut = Literal["theta", "subject", "none"]
+
+
+@app.command()
+def train(
+    folder: SetArgument,
+    model: Annotated[Kind, typer.Option(help="how poses depend on theta; best: what is recommended now")] = Kind.best,
+    action: Annotated[str | None, typer.Option(help="only this one (default: all, and a classifier)")] = None,
+    parameters: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="those that are learned (default: all that vary)")
+    ] = None,
+    states: Annotated[int, typer.Option(min=1, max=500, help="number of states")] = 20,
+    d_min: Annotated[int | None, typer.Option("--d-min", min=1, help="least frames in a state")] = None,
+    d_max: Annotated[int | None, typer.Option("--d-max", min=1, help="most frames in a state")] = None,
+    frames: Annotated[int, typer.Option(min=5, max=2000, help="every movement is brought to so many")] = 100,
+    residuals: Annotated[
+        Literal["correlated", "independent"] | None,
+        typer.Option(help="whether whole performances are modelled, or frames as in the thesis"),
+    ] = None,
+    body: Annotated[bool, typer.Option("--body", help="seen from the person, left arms mirrored")] = False,
+    leave_out: Annotated[LeaveOut, typer.Option(help="train again without each, and ask about it")] = "theta",
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help=".npz, or a folder (default: models/ACTION.npz, models/SET)"),
+    ] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE", help="write a page .html about the training")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Train a movement model from a demonstration set; of several actions one each, and a classifier of all.
+
+    The same command again gives the same model and replaces the file. Ctrl-C leaves no half of one.
+
+    Exit codes: 0; 2 wrong arguments; 66 there is no set; 78 nothing can be learned from it; 130 interrupted.
+    """
+    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.evaluation.models.examples import examples_of
+    from paramove.evaluation.models.kinds import untrained
+
+    console = Console(stderr=True, highlight=False, emoji=False, markup=False)
+    with one_sentence():
+        shown = DemonstrationSet.load(folder)
+        examples = examples_of(
+            shown, action=action, parameters=words(parameters), body=body, source=folder.resolve().name
+        )
+        for remark in examples.remarks:
+            console.print(printable(remark), soft_wrap=True)
+        goal = _goal(out, folder, examples)
+        make: dict[str, Make] = {
+            name: partial(
+                untrained, str(model), description=examples.description(name), n_states=states, d_min=d_min,
+                d_max=d_max, frames=frames, residuals=residuals,
+            )
+            for name in examples.actions
+        }  # fmt: skip
+        trained = _trained(examples, make, goal, leave_out, console)
+        if report is not None:
+            from paramove.evaluation.models.report import write_training_report
+
+            report.parent.mkdir(parents=True, exist_ok=True)
+            write_training_report(trained, report, examples.remarks)
+    _tell(trained, report, as_json)
+
+
+def _goal(out: Path | None, folder: Path, examples: Examples) -> Path:
+    """The file of one model, or the folder of a classifier."""
+    several = len(examples.actions) > 1
+    if several and out is not None and out.suffix == ".npz":
+        raise typer.BadParameter(
+            f"several actions ({', '.join(examples.actions)}) go into a folder; or choose one with --action",
+            param_hint="--out",
+        )
+    if several:
+        return out or FOLDER / folder.resolve().name
+    name = f"{examples.actions[0]}.npz"
+    if out is None:
+        return FOLDER / name
+    return out if out.suffix == ".npz" else out / name
+
+
+def _trained(
+    examples: Examples, make: dict[str, Make], goal: Path, leave_out: LeaveOut, console: Console
+) -> list[Trained]:
+    """Trains, writes, and then checks, so that an interrupted check leaves a model."""
+    from paramove.evaluation.models.training import train_and_write, with_check
+
+    written = "nothing was written"
+    try:
+        with console.status("training: " + ", ".join(examples.actions)):
+            trained = train_and_write(examples, make, goal)
+        written = f"written is {goal}, but not how well it does on what it has not seen"
+        if leave_out == "none":
+            return trained
+        with Progress(*PROGRESS, console=console, transient=True) as progress:
+            result = []
+            for one in trained:
+                shown = progress.add_task(f"without each {leave_out}: {one.action}", total=None)
+
+                def told(done: int, total: int, task: TaskID = shown) -> None:
+                    progress.update(task, completed=done, total=total)
+
+                result.append(with_check(one, make[one.action], leave_out, told))
+            return result
+    except KeyboardInterrupt:
+        raise ended(f"interrupted: {written}", INTERRUPTED) from None
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"nothing can be learned so: {error}") from error
+
+
+def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:
+    from paramove.evaluation.models.report import sentences
+
+    facts = [one.facts() for one in trained]
+    if as_json:
+        typer.echo(json.dumps(facts, indent=2, ensure_ascii=False))
+        return
+    for one in facts:
+        typer.echo(printable(one["action"]))
+        for name, value in sentences(one):
+            typer.echo(f"  {name:<22}{printable(value)}")
+    if report is not None:
+        typer.echo(f"report: {report}")

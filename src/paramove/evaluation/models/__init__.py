@@ -1,0 +1,1 @@
+"""Movement models trained from demonstration sets, checked by leaving out, drawn, compared and asked."""

@@ -1,0 +1,150 @@
+"""What a demonstration set gives to a model: sequences at one frame rate, the parameters that vary, a description."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations import DemonstrationError, DemonstrationSet
+from paramove.demonstrations.movement import AXIS_ENDINGS
+from paramove.phmm import MovementDescription
+from paramove.supervision.names import nearest
+
+Floats = NDArray[np.float64]
+
+VARIES = 0.1
+"""A coordinate of a place whose range is a smaller share of the widest coordinate's is taken for constant."""
+PERSONS_FOR_GROUPS = 3
+"""From so many persons on, what training chooses by leaving out is chosen by leaving out persons."""
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Movements as a model learns them.
+
+    Attributes:
+        sequences: stacked positions, each (T_k, D), m, at `rate_hz`.
+        theta: shape (K, P).
+        labels: actions, K.
+        subjects: persons, K.
+        parameter_names: of the P components.
+        point_names: of the D / 3 points.
+        frame: coordinate frame.
+        rate_hz: frames a second.
+        source: where the movements come from.
+        remarks: what was left out, for people.
+    """
+
+    sequences: list[Floats]
+    theta: Floats
+    labels: list[str]
+    subjects: list[str]
+    parameter_names: tuple[str, ...]
+    point_names: tuple[str, ...]
+    frame: str
+    rate_hz: float
+    source: str
+    remarks: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.sequences)
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """Names of the actions, sorted."""
+        return tuple(sorted(set(self.labels)))
+
+    @property
+    def groups(self) -> list[str] | None:
+        """The person of each movement if there are several persons; None: movements of one theta belong together."""
+        return self.subjects if len(set(self.subjects)) >= PERSONS_FOR_GROUPS else None
+
+    def of(self, numbers: Sequence[int]) -> Examples:
+        """Those movements alone."""
+        return replace(
+            self,
+            sequences=[self.sequences[number] for number in numbers],
+            theta=self.theta[list(numbers)],
+            labels=[self.labels[number] for number in numbers],
+            subjects=[self.subjects[number] for number in numbers],
+        )
+
+    def of_action(self, action: str) -> Examples:
+        """The movements of one action."""
+        return self.of([number for number, label in enumerate(self.labels) if label == action])
+
+    def description(self, action: str) -> MovementDescription:
+        """What a model of one action keeps of these examples."""
+        seconds = [(len(x) - 1) / self.rate_hz for x, label in zip(self.sequences, self.labels, strict=True)
+                   if label == action]  # fmt: skip
+        return MovementDescription(
+            action=action, point_names=self.point_names, unit="m", frame=self.frame,
+            parameter_names=self.parameter_names, duration=float(np.mean(seconds)), source=self.source,
+            rate_hz=self.rate_hz,
+        )  # fmt: skip
+
+
+def examples_of(
+    shown: DemonstrationSet, *, action: str | None = None, parameters: Sequence[str] | None = None,
+    body: bool = False, source: str = ""
+) -> Examples:  # fmt: skip
+    """The movements of a set, or of one action of it.
+
+    Args:
+        shown: the set.
+        action: only this one.
+        parameters: names of those that are learned; None: all that vary.
+        body: everything seen from the person, left arms as right ones.
+        source: of the set, for the description.
+
+    Raises DemonstrationError if there is no such action or parameter, or if no parameter varies.
+    """
+    chosen = shown.select(action)
+    if body:
+        chosen = chosen.in_body_frame().with_right_arms()
+    rate_hz = float(f"{np.median([movement.rate_hz for movement in chosen]):.4g}")
+    chosen = chosen.resampled(rate_hz)
+    found = chosen.sequences()
+    columns, remarks = _learned(found.theta, chosen.parameter_names, parameters)
+    return Examples(
+        sequences=found.sequences, theta=found.theta[:, columns], labels=found.labels, subjects=found.subjects,
+        parameter_names=tuple(chosen.parameter_names[column] for column in columns), point_names=chosen.point_names,
+        frame=chosen.frame, rate_hz=rate_hz, source=shown.description or source, remarks=(*shown.remarks, *remarks),
+    )  # fmt: skip
+
+
+def _learned(theta: Floats, names: tuple[str, ...], wanted: Sequence[str] | None) -> tuple[list[int], list[str]]:
+    """Which components of theta are learned, and what is said about the others."""
+    for name in wanted or ():
+        if name not in names:
+            raise DemonstrationError(f"there is no parameter '{name}' in the set; {nearest(name, names)}")
+    if wanted:
+        return [names.index(name) for name in wanted], []
+    spread = np.ptp(theta, axis=0)
+    places = [is_place(name) for name in names]
+    widest = max((float(width) for width, place in zip(spread, places, strict=True) if place), default=0.0)
+    columns, remarks = [], []
+    for number, (name, width, place) in enumerate(zip(names, spread.tolist(), places, strict=True)):
+        if width > (VARIES * widest if place else 0.0):
+            columns.append(number)
+        elif width > 0.0:
+            remarks.append(
+                f"{name} varies by only {width:.2g} m, little beside {widest:.2g} m: it is left out; "
+                "--parameters names those that are learned"
+            )
+        else:
+            remarks.append(f"{name} is {theta[0, number]:g} in all movements: it is left out")
+    if not columns:
+        raise DemonstrationError(
+            f"all {len(theta)} movements have the same parameters ({', '.join(names) or 'none'}); a parametric model "
+            "learns how a movement changes with them: give movements of different theta"
+        )
+    return columns, remarks
+
+
+def is_place(name: str) -> bool:
+    """Whether a parameter is a coordinate of a place, in metres: its name ends in _x, _y or _z."""
+    return name.endswith(AXIS_ENDINGS)

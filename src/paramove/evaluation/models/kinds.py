@@ -1,0 +1,73 @@
+"""Which movement models can be trained by name, and with which states."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from paramove import phmm
+from paramove.phmm import MovementDescription, ParametricHMM
+
+CLASSES = {
+    "best": "QuadraticPHMM",
+    "linear": "LinearPHMM",
+    "quadratic": "QuadraticPHMM",
+    "cubic": "CubicPHMM",
+    "neural": "NeuralPHMM",
+    "interpolative": "InterpolativePHMM",
+}
+"""Name -> class. "best" is what is recommended now: quadratic means with correlated residuals."""
+DEFAULT_STATES = 20
+
+
+def untrained(
+    kind: str,
+    *,
+    description: MovementDescription | None = None,
+    n_states: int = DEFAULT_STATES,
+    d_min: int | None = None,
+    d_max: int | None = None,
+    frames: int = 100,
+    residuals: str | None = None,
+) -> ParametricHMM:
+    """A model of one of the CLASSES, to be trained.
+
+    Args:
+        kind: its name.
+        description: what it is about.
+        n_states: number of states.
+        d_min, d_max: frames in a state; None: one less and one more than the mean, `frames / n_states`.
+        frames: every movement is brought to so many.
+        residuals: "correlated" or "independent" of polynomial models; None: their default.
+
+    Raises ValueError for a kind that is unknown or has no such residuals, and for states that do not fit the frames.
+    """
+    if kind not in CLASSES or not hasattr(phmm, CLASSES[kind]):
+        there = [name for name, one in CLASSES.items() if hasattr(phmm, one)]
+        raise ValueError(f"there is no model '{kind}'; there are {', '.join(there)}")
+    mean = frames / n_states
+    if mean < 1.0:
+        raise ValueError(f"{frames} frames are fewer than {n_states} states: give more --frames or fewer --states")
+    least = d_min if d_min is not None else max(1, math.floor(mean) - 1)
+    most = d_max if d_max is not None else math.ceil(mean) + 1
+    if not least <= mean <= most:
+        raise ValueError(
+            f"{frames} frames in {n_states} states are {mean:g} a state, but d_min is {least} and d_max is {most}: "
+            "the mean lies between them"
+        )
+    kind_class: Any = getattr(phmm, CLASSES[kind])
+    more = {} if residuals is None else {"residuals": residuals}
+    if more and "residuals" not in kind_class._parameter_names():
+        raise ValueError(f"a model '{kind}' has no choice of residuals; linear, quadratic and cubic ones have")
+    made: ParametricHMM = kind_class(n_states, least, most, resampled_frames=frames, description=description, **more)
+    return made
+
+
+def kind_of(model: ParametricHMM) -> str:
+    """The model in words: class and, where it has them, degree and residuals."""
+    words = [type(model).__name__]
+    if hasattr(model, "degree"):
+        words.append(f"degree {model.degree}")
+    if hasattr(model, "residuals"):
+        words.append(f"{model.residuals} residuals")
+    return ", ".join(words)

@@ -1,0 +1,109 @@
+"""`paramove models`: lists, shows, draws and compares."""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.conftest import call
+
+
+def good(*arguments):
+    done = call("models", *arguments)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def refused(code, *arguments):
+    done = call("models", *arguments)
+    assert (done.exit_code, done.stdout) == (code, ""), done.output
+    assert "Traceback" not in done.stderr
+    return " ".join(done.stderr.split())
+
+
+def test_list(trained):
+    rows = json.loads(good("list", trained.model.parent, "--json"))
+    assert [(row["file"], row["action"], row["sequences"]) for row in rows] == [
+        (str(trained.models / "pointing.model.npz"), "pointing", 27),
+        (str(trained.models / "reaching.model.npz"), "reaching", 27),
+        (str(trained.model), "reaching", 27),
+    ]
+    assert "target_x, target_y" in good("list", trained.model.parent)
+
+
+def test_list_of_nothing_and_of_damage(tmp_path, trained):
+    assert "`paramove train` makes one" in refused(66, "list", tmp_path)
+    np.savez(tmp_path / "recording.npz", positions=np.zeros(3))
+    assert "`paramove train` makes one" in refused(66, "list", tmp_path)
+    (tmp_path / "bad.npz").write_bytes(trained.model.read_bytes()[:2000])
+    assert "bad.npz: expected a model file" in " ".join(call("models", "list", tmp_path).stderr.split())
+
+
+def test_show(trained):
+    text = good("show", trained.model)
+    for words in (
+        hashlib.sha256(trained.model.read_bytes()).hexdigest(),
+        "QuadraticPHMM, degree 2, correlated residuals",
+        "sternum, shoulder, elbow, wrist, knuckle, index, thumb",
+        "m, demonstrator_table",
+        "target_x, m: -0.07 to 0.23; target_y, m: -0.58 to 0.22",
+        "recorded at 60 Hz",
+        "27 sequences",
+    ):
+        assert words in text
+    facts = json.loads(good("show", trained.model, "--json"))
+    assert facts["states"] == len(facts["state_durations"]) == 20
+    np.testing.assert_allclose(sum(facts["state_durations"]), facts["duration_s"], rtol=1e-6)
+    assert facts["left_out"] is None
+
+
+def test_show_tells_what_was_left_out_of_this_very_file(trained, tmp_path):
+    file = tmp_path / "a.npz"
+    quick = ("--states", 10, "--frames", 50)
+    assert call("train", trained.table, "--model", "linear", "--out", file, *quick).exit_code == 0
+    assert "9 trainings" in good("show", file)
+    file.write_bytes(trained.model.read_bytes())  # another model under the same name
+    assert "9 trainings" not in good("show", file)
+
+
+def test_show_of_a_folder_with_several(trained, tmp_path):
+    assert "give one model file" in refused(78, "show", trained.models)
+    assert "there is no model file" in refused(66, "show", tmp_path / "none.npz")
+
+
+@pytest.mark.parametrize("ending", ["png", "html"])
+def test_plot(trained, tmp_path, ending):
+    file = tmp_path / f"a.{ending}"
+    assert good("plot", trained.model, "--output", file, "--point", "wrist").strip() == str(file)
+    if ending == "png":
+        with Image.open(file) as picture:
+            assert len(picture.convert("L").getcolors()) > 100
+    else:
+        assert "data:image/png;base64," in file.read_text()
+    assert "did you mean 'wrist'?" in refused(78, "plot", trained.model, "--point", "wrst")
+
+
+def test_compare(trained, tmp_path):
+    linear = tmp_path / "linear.npz"
+    quick = ("--states", 10, "--frames", 50, "--leave-out", "none")
+    assert call("train", trained.table, "--model", "linear", "--out", linear, *quick).exit_code == 0
+    text = good("compare", trained.model, linear, "--on", trained.table)
+    assert "same  sternum, shoulder" in text
+    found = json.loads(good("compare", trained.model, linear, "--on", trained.table, "--json"))
+    (zero, between), (back, _) = found["distances"]
+    assert zero == {"rms_m": 0.0, "greatest_m": 0.0}
+    assert between == back
+    assert 0.002 < between["rms_m"] < between["greatest_m"] < 0.3
+    quadratic, lines = found["on"]
+    assert quadratic["log_likelihood_per_frame"] > lines["log_likelihood_per_frame"]
+    assert quadratic["synthesis_median_m"] < lines["synthesis_median_m"]
+
+
+def test_compare_refuses_what_cannot_be_compared(trained, tmp_path):
+    assert "at least two" in refused(2, "compare", trained.model)
+    other = tmp_path / "other.npz"
+    quick = ("--states", 10, "--frames", 50, "--leave-out", "none", "--parameters", "target_y")
+    assert call("train", trained.table, "--out", other, *quick).exit_code == 0
+    assert "other points or parameters" in refused(78, "compare", trained.model, other)

@@ -1,0 +1,136 @@
+"""`paramove train`: what it says, writes and refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from paramove.phmm import InterpolativePHMM, LinearPHMM, MovementClassifier, ParametricHMM, QuadraticPHMM
+from tests.cli.conftest import call
+
+QUICK = ("--states", 10, "--frames", 50)
+
+
+def good(*arguments):
+    done = call("train", *arguments)
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def refused(code, *arguments):
+    done = call("train", *arguments)
+    assert (done.exit_code, done.stdout) == (code, ""), done.output
+    assert "Traceback" not in done.stderr
+    return " ".join(done.stderr.split())
+
+
+def test_says_what_it_did(trained, tmp_path):
+    done = good(trained.table, "--out", tmp_path / "model.npz", "--report", tmp_path / "page.html", *QUICK)
+    assert "target_z is 0.07 in all movements: it is left out" in done.stderr
+    for words in (
+        "QuadraticPHMM, degree 2, correlated residuals",
+        "27, 9 thetas,",
+        "target_x, m: -0.07 to 0.23; target_y, m: -0.58 to 0.22",
+        "10 of 4 to 6 frames; every movement brought to 50 frames",
+        "9 trainings, 27 movements asked, 12 of them outside the other thetas",
+        "% of the 95 % regions hold the label",
+        "after time warping",
+    ):
+        assert words in done.stdout
+    page = (tmp_path / "page.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert "The worst of them" in page
+
+
+def test_numbers(trained, tmp_path):
+    (facts,) = json.loads(good(trained.table, "--out", tmp_path / "model.npz", "--json", *QUICK).stdout)
+    assert facts["action"] == "reaching"
+    assert facts["sequences"] == facts["left_out"]["movements"] == 27
+    assert facts["left_out"]["theta_median_m"] < 0.02
+    assert facts["left_out"]["theta_covered"] > 0.8
+    assert 0.01 < facts["left_out"]["synthesis_median_m"] < 0.08
+    model = ParametricHMM.load(tmp_path / "model.npz")
+    assert type(model) is QuadraticPHMM
+    assert (model.n_states, model.d_min, model.d_max, model.resampled_frames) == (10, 4, 6, 50)
+    about = model.description
+    assert (about.action, about.parameter_names, about.rate_hz) == ("reaching", ("target_x", "target_y"), 60.0)
+    assert about.source == "synthetic demonstrator, seed 0"
+
+
+def test_the_same_again_gives_the_same_file(trained, tmp_path):
+    once, again = tmp_path / "once.npz", tmp_path / "again.npz"
+    for file in (once, again, again):
+        good(trained.table, "--out", file, "--leave-out", "none", *QUICK)
+    assert once.read_bytes() == again.read_bytes()
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        *("again.npz", "again.training.json", "once.npz", "once.training.json")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"), [("linear", LinearPHMM), ("interpolative", InterpolativePHMM), ("best", QuadraticPHMM)]
+)
+def test_kinds(trained, tmp_path, kind, expected):
+    good(trained.table, "--model", kind, "--out", tmp_path / "a.npz", "--leave-out", "none", *QUICK)
+    assert type(ParametricHMM.load(tmp_path / "a.npz")) is expected
+
+
+def test_residuals_of_the_thesis(trained, tmp_path):
+    good(trained.table, "--residuals", "independent", "--out", tmp_path / "a.npz", "--leave-out", "none", *QUICK)
+    assert ParametricHMM.load(tmp_path / "a.npz").performances_ is None
+
+
+def test_several_actions_make_a_classifier(trained):
+    assert sorted(file.name for file in trained.models.iterdir()) == [
+        *("classifier.npz", "pointing.model.npz", "pointing.model.training.json"),
+        *("reaching.model.npz", "reaching.model.training.json"),
+    ]
+    assert MovementClassifier.load(trained.models).classes_ == ("pointing", "reaching")
+
+
+def test_one_action_of_several_into_a_folder(trained, tmp_path):
+    good(trained.both, "--action", "pointing", "--out", tmp_path / "new", "--leave-out", "none", *QUICK)
+    assert ParametricHMM.load(tmp_path / "new" / "pointing.npz").description.action == "pointing"
+
+
+def test_seen_from_the_person(trained, tmp_path):
+    good(trained.table, "--body", "--out", tmp_path / "a.npz", "--leave-out", "none", *QUICK)
+    about = ParametricHMM.load(tmp_path / "a.npz").description
+    assert about.frame == "body"
+    assert about.parameter_names == ("target_x", "target_y")  # z varies by what the shoulder's place does
+
+
+def test_refusals(trained, tmp_path):
+    assert "make one with `paramove demos import`" in refused(66, tmp_path)
+    assert "there are the actions reaching" in refused(78, trained.table, "--action", "waving")
+    assert "did you mean 'target_x'?" in refused(78, trained.table, "--parameters", "targetx")
+    assert "choose one with --action" in refused(2, trained.both, "--out", tmp_path / "a.npz")
+    assert "fewer than 20 states" in refused(78, trained.table, "--frames", 10)
+    assert "there is only one subject: nothing can be left out" in refused(
+        78, trained.table, "--leave-out", "subject", "--out", tmp_path / "a.npz", *QUICK
+    )
+
+
+def test_one_theta_teaches_no_dependence(tmp_path):
+    assert call("demos", "synthesize", tmp_path / "one", "--columns", 1, "--rows", 1).exit_code == 0
+    said = refused(78, tmp_path / "one", "--out", tmp_path / "a.npz")
+    assert "all 4 movements have the same parameters" in said
+    assert not (tmp_path / "a.npz").exists()
+
+
+def test_an_interrupted_training_leaves_nothing(trained, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(QuadraticPHMM, "fit", interrupted)
+    assert "nothing was written" in refused(130, trained.table, "--out", tmp_path / "a.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_check_leaves_the_model(trained, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("paramove.evaluation.models.training.leave_out", interrupted)
+    assert "but not how well it does" in refused(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
+    assert np.isfinite(ParametricHMM.load(tmp_path / "a.npz").state_means([0.1, 0.0])).all()
