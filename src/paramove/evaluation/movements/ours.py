@@ -20,59 +20,62 @@ from paramove.evaluation.movements.method import (
     Method,
     NotAble,
 )
-from paramove.evaluation.movements.per_action import ByElapsedTime, PerAction
 from paramove.evaluation.movements.sweep import Row
-from paramove.phmm import LinearPHMM, ParametricHMM, QuadraticPHMM
+from paramove.phmm import LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
 
 Floats = NDArray[np.float64]
-SOURCES = (
-    "paramove.evaluation.movements.ours",
-    "paramove.evaluation.movements.per_action",
-    "paramove.phmm",
-    "paramove.hmm",
-)
+SOURCES = ("paramove.evaluation.movements.ours", "paramove.phmm", "paramove.hmm")
 
 
-class ModelOfOneAction(NotAble):
-    """A parametric HMM."""
+class Models(NotAble):
+    """A parametric HMM per action; with several actions they compete."""
 
-    can = frozenset({SYNTHESIS, THETA, TYPICALITY})
+    can = frozenset({SYNTHESIS, THETA, TYPICALITY, CLASSES})
 
     def __init__(self, make: Callable[[], ParametricHMM]) -> None:
         self.make = make
+        model = make()
+        if isinstance(model, PolynomialPHMM) and model.residuals == "correlated":
+            self.can = Models.can | {BEGINNINGS}
 
     def fit(self, examples: Examples) -> None:
-        """Learn from movements of one action."""
-        self.model = self.make().fit(examples.sequences, examples.theta)
+        """Learn from movements of one or several actions; nothing is chosen by parts of a person's movements."""
+        labels = np.array(examples.labels)
+        self.classifier = MovementClassifier(self.make())
+        self.classifier.fit(examples.sequences, examples.theta, list(labels), examples.groups)
+        self.model = self.classifier.models_[self.classifier.classes_[0]]
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The prototype."""
         return self.model.synthesize(theta, n)
 
     def estimate(self, x: Floats) -> Estimate:
-        """Maximum likelihood theta and its covariance."""
+        """The likeliest theta and its covariance."""
         found = self.model.estimate(x)
         return Estimate(found.theta, found.covariance)
 
+    def classify(self, x: Floats, finished: bool) -> str:
+        """The most probable action."""
+        return self.classifier.classify(x, finished=finished).action
+
     def score(self, x: Floats) -> float:
-        """Log-likelihood at the best theta."""
+        """How little strange the movement is; of models that do not know, the log-likelihood at the likeliest theta."""
+        if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
+            return -self.model.examine(x).strangeness
         return self.model.estimate(x).log_likelihood
-
-
-def complete(make: Callable[[], ParametricHMM]) -> Method:
-    """A model of one action, with several a classifier of whole movements and of beginnings."""
-    can = ModelOfOneAction.can | {CLASSES}
-    return ByElapsedTime(partial(PerAction, partial(ModelOfOneAction, make), can), can | {BEGINNINGS})
 
 
 def our_rows() -> list[Row]:
     """All rows of this project."""
     kinds: dict[str, Callable[[], ParametricHMM]] = {
-        "paramove, linear PHMM": partial(LinearPHMM, resampled_frames=FRAMES),
         "paramove, quadratic PHMM": partial(QuadraticPHMM, resampled_frames=FRAMES),
+        "paramove, linear PHMM": partial(LinearPHMM, resampled_frames=FRAMES),
+        "paramove, quadratic PHMM as in the thesis": partial(
+            QuadraticPHMM, resampled_frames=FRAMES, residuals="independent"
+        ),
     }
     return [Row(name, _maker(make), repr(make), SOURCES, ours=True) for name, make in kinds.items()]
 
 
 def _maker(make: Callable[[], ParametricHMM]) -> Callable[[int], Method]:
-    return lambda seed: complete(make)
+    return lambda seed: Models(make)
