@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paramove.imitation.conversion import ArmPoses, RobotMovement
+from paramove.imitation.conversion import RobotMovement
+from paramove.imitation.reaching_movement import ArmPoses
 from paramove.phmm import InterpolativePHMM, MovementDescription
 from tests.imitation.reaching import movement, reaching_model, solver
 

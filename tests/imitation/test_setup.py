@@ -53,6 +53,6 @@ def test_movement_is_trained_where_nothing_can_be_kept(
     asked: list[object] = []
     monkeypatch.setattr(setup, "user_cache_path", lambda name: tmp_path / "taken" / name)
     monkeypatch.setattr(setup, "train_reaching_model", lambda seed, cache=None: asked.append((seed, cache)))
-    MovementSource(seed=3).model()
+    MovementSource(seed=3).trained()
     assert asked == [(3, None)]
     assert "cannot be kept in" in caplog.text

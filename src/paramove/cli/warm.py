@@ -51,7 +51,7 @@ def _train() -> bool:
 
     cache: Path = user_cache_path("paramove")
     before = {path: path.stat().st_mtime_ns for path in cache.glob("reaching_*.npz")}
-    MovementSource().model()
+    MovementSource().trained()
     return {path: path.stat().st_mtime_ns for path in cache.glob("reaching_*.npz")} != before
 
 

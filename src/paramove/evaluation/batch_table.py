@@ -28,10 +28,15 @@ COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
 )
 """Heading, keys in run.json, and how the column is summed up."""
 
+HULL_COLUMNS: tuple[tuple[str, str], ...] = (("inside\nhull", "inside"), ("outside\nhull", "outside"))
+"""Heading, and which fetches: "succeeded/tried", by where they fetch."""
+
 LEGEND = (
     "unw. cont.: contacts with anything but the handled object; penetr.: deepest penetration; homogr., max: the "
     "robot's own calibration; comm.: commanded gripper to its target; phys.: gripper to the commanded one, both the "
-    "largest while grasping and placing; yellow: not within its goal"
+    "largest while grasping and placing; inside, outside hull: relocations that succeeded of those tried, by whether "
+    "the object is fetched within the convex hull of the targets that the movement model was trained with; yellow: not "
+    "within its goal"
 )
 NEEDED_SHARE = 0.9
 TABLE_WIDTH = 140
@@ -53,7 +58,26 @@ def totals_of(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for _, keys, way in COLUMNS:
         values = [value for result in results if (value := value_of(result, keys)) is not None]
         found[f"{'.'.join(keys)} ({way})"] = _summed_up(values, way) if values else None
-    return found
+    return found | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
+
+
+def _hull_total(results: Sequence[dict[str, Any]], where: str) -> dict[str, int]:
+    """Of all runs, and of runs with such relocations: in how many there were any, and in how many all succeeded."""
+    counts = [found for result in results if (found := hull_counts(result, where)) is not None]
+    some = [found for found in counts if found["tried"] + found["refused"] > 0]
+    total = {key: sum(found[key] for found in counts) for key in ("tried", "succeeded", "refused")}
+    whole = sum(found["succeeded"] == found["tried"] > 0 for found in some)
+    return total | {"runs": len(some), "runs_all_succeeded": whole}
+
+
+def hull_counts(result: dict[str, Any], where: str) -> dict[str, int] | None:
+    """Counts of the relocations that fetch there; None in results of earlier releases."""
+    found = result.get("training_hull", {}).get("from", {}).get(where)
+    return found if isinstance(found, dict) else None
+
+
+def _share(counts: dict[str, int] | None) -> str:
+    return "–" if counts is None else f"{counts['succeeded']}/{counts['tried']}"
 
 
 def _summed_up(values: Sequence[float], way: str) -> float:
@@ -73,6 +97,8 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
     totals = totals_of(results)
     table.add_column("seed", justify="right", footer="all")
     table.add_column("success", footer=f"{totals['succeeded']}/{totals['runs']}")
+    for heading, where in HULL_COLUMNS:
+        table.add_column(heading, justify="right", footer=_share(totals["training_hull.from"][where]))
     for heading, keys, way in COLUMNS:
         foot = totals[f"{'.'.join(keys)} ({way})"]
         footer = f"{shown(foot)}\n{way}" if foot is not None else "–"
@@ -80,7 +106,8 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
     for result in sorted(results, key=lambda item: int(item["seed"])):
         verdict = "[green]yes[/]" if result.get("success") else "[red]no[/]"
         cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in COLUMNS]
-        table.add_row(str(result["seed"]), verdict, *cells)
+        hulls = [_share(hull_counts(result, where)) for _, where in HULL_COLUMNS]
+        table.add_row(str(result["seed"]), verdict, *hulls, *cells)
     return table
 
 

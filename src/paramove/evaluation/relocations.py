@@ -18,6 +18,7 @@ from paramove.msgs.rule_pb2 import ApplicationStage
 FloatArray = NDArray[np.float64]
 
 _LAST = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
+_HULLS: dict[int, str] = {RelocationStatus.HULL_INSIDE: "inside", RelocationStatus.HULL_OUTSIDE: "outside"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,8 @@ class Relocation:
         reason: What the synthesizer said of it.
         held: Whether the object was felt in the hand when it was to be carried.
         elbow_turn_rad: Largest turn of the elbow.
+        from_hull, to_hull: Whether the goal's places lie "inside" or "outside" the convex hull of the targets that the
+            movement model was trained with; None where there is no such place or it is not known.
     """
 
     goal: Any
@@ -42,6 +45,8 @@ class Relocation:
     reason: str
     held: bool
     elbow_turn_rad: float
+    from_hull: str | None = None
+    to_hull: str | None = None
 
     @property
     def fetches(self) -> bool:
@@ -142,7 +147,14 @@ def _relocation(goal: Any, stage: str, begun_s: float, statuses: list[Any], end_
         reason=last.message.reason if last is not None else "",
         held=any(status.phase == "carry" and status.holding for status in executing),
         elbow_turn_rad=max((r.message.elbow_turn_rad for r in statuses), default=0.0),
+        from_hull=_hull_of(statuses, "from_hull"),
+        to_hull=_hull_of(statuses, "to_hull"),
     )
+
+
+def _hull_of(statuses: list[Any], name: str) -> str | None:
+    found = [_HULLS[value] for r in statuses if (value := getattr(r.message, name)) in _HULLS]
+    return found[-1] if found else None
 
 
 def motions_of(run: RecordedRun) -> list[Motion]:

@@ -19,6 +19,7 @@ from paramove.evaluation.recorded_run import RecordedRun
 from paramove.evaluation.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
 from paramove.evaluation.spread import spread
 from paramove.evaluation.traffic import speakers
+from paramove.evaluation.training_hull import by_hull
 from paramove.msgs.rule_pb2 import Speech
 from paramove.robots.description import RobotDescription
 
@@ -104,6 +105,7 @@ class RunEvaluation:
             "grasps_first_try": sum(map(_at_first_try, applied)),
             "calibration_grasps": len(calibrated),
             "calibration_grasps_first_try": sum(map(_at_first_try, calibrated)),
+            "training_hull": by_hull(self.relocations),
             "grasp_list": [self._grasp(grasp) for grasp in self.grasps],
             "retries": sum(grasp.goal.attempt > 1 for grasp in self.grasps),
             "refused_goals": [
@@ -185,6 +187,8 @@ class RunEvaluation:
             "reason": grasp.reason,
             "held": grasp.held,
             "elbow_turn_deg": float(np.rad2deg(grasp.elbow_turn_rad)),
+            "from_hull": grasp.from_hull,
+            "to_hull": grasp.to_hull,
             "from": grasp.source[:2].tolist(),
             "from_error_mm": 1e3 * float(np.linalg.norm(grasp.source[:2] - stood)),
             "to": grasp.target[:2].tolist(),

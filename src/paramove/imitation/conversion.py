@@ -12,57 +12,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.imitation.body_points import arm_of, points_of
 from paramove.imitation.elbow_interpolation import interpolated_elbow
+from paramove.imitation.reaching_movement import ArmPoses, ReachingMovement
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 
 FloatArray = NDArray[np.float64]
 ElbowInterpolation = Literal["carried", "linear"]
 
-_POINTS = ("shoulder", "elbow", "knuckle", "index", "thumb")
 _NEWTON_STEPS = 3
 
 
 @dataclass(frozen=True)
-class ArmPoses:
-    """A sequence of K arm poses in the robot's shoulder frame, m.
-
-    Attributes:
-        elbow: q of 5.2.3, [K, 3].
-        gripper: r, [K, 3].
-        finger_to_thumb: o, [K, 3].
-    """
-
-    elbow: FloatArray
-    gripper: FloatArray
-    finger_to_thumb: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.gripper)
-
-    def __getitem__(self, states: slice) -> ArmPoses:
-        return ArmPoses(self.elbow[states], self.gripper[states], self.finger_to_thumb[states])
-
-    @classmethod
-    def joined(cls, parts: list[ArmPoses]) -> ArmPoses:
-        """One sequence after the other."""
-        return cls(
-            np.concatenate([p.elbow for p in parts]),
-            np.concatenate([p.gripper for p in parts]),
-            np.concatenate([p.finger_to_thumb for p in parts]),
-        )
-
-    def stacked(self) -> FloatArray:
-        """All components side by side, [K, 9]."""
-        return np.concatenate([self.elbow, self.gripper, self.finger_to_thumb], axis=1)
-
-    @classmethod
-    def from_stacked(cls, values: FloatArray) -> ArmPoses:
-        """Inverse of `stacked`."""
-        return cls(values[:, :3], values[:, 3:6], values[:, 6:])
-
-
-@dataclass(frozen=True)
-class RobotMovement:
+class RobotMovement(ReachingMovement):
     """The converted model: local state means of (elbow, gripper, finger to thumb) on the grid of targets.
 
     Attributes:
@@ -105,7 +67,7 @@ class RobotMovement:
             ValueError: The model lacks a point or does not say where in the movement the target is reached.
         """
         description = model.description or MovementDescription()
-        person = _points(model.means_, description.point_names)
+        person = points_of(model.means_, description.point_names)
         if not 0.0 < description.arrival < description.grasp < 1.0:
             raise ValueError(
                 f"the model of {description.action!r} gives arrival {description.arrival} and grasp "
@@ -113,10 +75,10 @@ class RobotMovement:
                 "a reaching action has 0 < arrival < grasp < 1"
             )
         shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
-        elbow, gripper, _ = _arm(person, shoulder)
+        elbow, gripper, _ = arm_of(person, shoulder)
         lengths = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
         scale = arm_length / float(lengths.max())  # s = l / l′
-        means = np.concatenate(_arm(person, shoulder), axis=-1) * scale  # (5.7)
+        means = np.concatenate(arm_of(person, shoulder), axis=-1) * scale  # (5.7)
         size = np.linalg.norm(means[..., 6:], axis=-1)
         grid = ParameterGrid((model.grid_.origin - shoulder) * scale, model.grid_.edges * scale, model.grid_.knots)
         last = model.n_states - 1
@@ -143,7 +105,12 @@ class RobotMovement:
         Raises:
             ValueError: A needed point is missing.
         """
-        return ArmPoses(*(self.scale * part for part in _arm(_points(means, point_names), self.shoulder)))
+        return ArmPoses(*(self.scale * part for part in arm_of(points_of(means, point_names), self.shoulder)))
+
+    @property
+    def centre(self) -> FloatArray:
+        """Mean of the grid's targets, [3], m."""
+        return np.asarray(self.grid.points().mean(axis=0))
 
     @property
     def n_states(self) -> int:
@@ -178,6 +145,15 @@ class RobotMovement:
         size = np.linalg.norm(np.asarray(finger_to_thumb, dtype=np.float64), axis=-1)
         return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
 
+    def openings(self, states: ArmPoses) -> FloatArray:
+        """ξ in all states, as `opening`."""
+        return self.opening(states.finger_to_thumb)
+
+    def within_training(self, target: ArrayLike) -> bool | None:
+        """Whether the parameter of `target` [3] lies in the grid."""
+        coordinates = self.grid.coordinates(self.parameter_for(self.reach_state, target))
+        return bool(((coordinates >= 0.0) & (coordinates <= 1.0)).all())
+
     def _means(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
         """Means of all states, [K, N, 9], or of one, [K, 9], for K parameters."""
         weights, corners = self._corners(parameters, state)
@@ -195,19 +171,3 @@ class RobotMovement:
         indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
         means = self.means if state is None else self.means[:, state]
         return weights, np.asarray(means[indices])
-
-
-def _points(means: FloatArray, point_names: tuple[str, ...]) -> dict[str, FloatArray]:
-    missing = [name for name in _POINTS if name not in point_names]
-    if missing:
-        raise ValueError(
-            f"the model has the points {', '.join(point_names) or 'none'}; needed also: {', '.join(missing)}"
-        )
-    points = means.reshape(*means.shape[:-1], -1, 3)
-    return {name: points[..., point_names.index(name), :] for name in _POINTS}
-
-
-def _arm(person: dict[str, FloatArray], shoulder: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Elbow q̃, gripper r̃ seen from the shoulder p̄, and finger to thumb õ; [..., 3] each (5.2.3)."""
-    gripper = np.mean([person["knuckle"], person["index"], person["thumb"]], axis=0)
-    return person["elbow"] - shoulder, gripper - shoulder, person["thumb"] - person["index"]

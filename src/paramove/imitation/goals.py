@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.msgs.relocation_pb2 import Position, RelocationGoal
+from paramove.imitation.reaching_movement import ReachingMovement
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 
 FloatArray = NDArray[np.float64]
 
@@ -32,6 +33,17 @@ def point_of(goal: RelocationGoal, name: str) -> FloatArray:
             f"position {name!r} is {point.tolist()} m; an arm reaches no farther than {FARTHEST:g} m"
         )
     return point
+
+
+def hull_of(goal: RelocationGoal, name: str, movement: ReachingMovement) -> RelocationStatus.Hull:
+    """Whether position `name` of a goal lies within the training of the movement; unspecified where it lacks."""
+    try:
+        within = movement.within_training(point_of(goal, name))
+    except (ArithmeticError, ValueError):  # the goal is refused for it elsewhere; LinAlgError is a ValueError
+        return RelocationStatus.HULL_UNSPECIFIED
+    if within is None:
+        return RelocationStatus.HULL_UNSPECIFIED
+    return RelocationStatus.HULL_INSIDE if within else RelocationStatus.HULL_OUTSIDE
 
 
 def standing_of(goal: RelocationGoal) -> FloatArray:

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from paramove.imitation.arm_pose import ArmPoseSolver
-from paramove.imitation.conversion import ArmPoses, RobotMovement
 from paramove.imitation.motion import Path, PlannedMotion, RelocationOptions
+from paramove.imitation.reaching_movement import ArmPoses, ReachingMovement
 from paramove.imitation.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
 from paramove.robots.description import Arm
 
@@ -41,7 +41,7 @@ class RelocationPlanner:
 
     def __init__(
         self,
-        movement: RobotMovement,
+        movement: ReachingMovement,
         solver: ArmPoseSolver,
         arm: Arm,
         base_angles: ArrayLike,
@@ -54,7 +54,7 @@ class RelocationPlanner:
         self.velocity = np.asarray(velocity, dtype=np.float64)
         self.acceleration = np.asarray(acceleration, dtype=np.float64)
         self.base_angles = base = np.asarray(base_angles, dtype=np.float64)
-        self._base = self._pose_of(base[:5])
+        self._base = self._pose_of(base[None, :5])
         self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
 
     def fetch(self, target: ArrayLike, entry_height: float | None = None, from_above: bool = False) -> PlannedMotion:
@@ -135,19 +135,19 @@ class RelocationPlanner:
 
     def _approach(self, path: Path, target: FloatArray, final_opening: float) -> None:
         """States 1..T of the movement for `target`, started from the base pose."""
-        o, m = self.options, self.movement
-        target = self.far_enough(target)
-        states = m.poses(m.parameter_for(m.reach_state, target)[0])[: m.reach_state + 1]
-        opening = m.opening(states.finger_to_thumb)
+        o = self.options
+        states, opening = self.movement.approach(self.far_enough(target))
         n = len(states)
         opening = _crossfaded(np.full(n, self._base_opening), opening, n)
-        level = fade_in(n, o.level_states)
+        level = fade_in(n, self._level_states(n))
         opening = _crossfaded(opening, np.full(n, final_opening), n)
-        states = self._blended(states, o.blend_share)
+        states = self._begun(states)
+        if self.movement.begins_above_table:
+            self._way_to_table(path, "approach", states[:1])
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
     def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool, opened: float) -> None:
-        o, m = self.options, self.movement
+        o = self.options
         self._fingers(path, "release", opening, opened)
         aside = target + o.release_aside * self._right(target)
         before = aside if upward else self._before(target)
@@ -156,18 +156,23 @@ class RelocationPlanner:
         if not upward:
             self._move(path, "withdraw", [before], o.speed, opened)
         self._move(path, "withdraw", [high], o.speed, opened)
-        states = m.poses(m.parameter_for(m.release_state, high)[0])[m.release_state :]
-        opening_path = m.opening(states.finger_to_thumb)
+        states, opening_path = self.movement.retreat(high)
         n = len(states)
         opening_path = _crossfaded(np.full(n, opened), opening_path, n)
         opening_path = _crossfaded(opening_path, np.full(n, self._base_opening), n)
-        level = fade_in(n, o.level_states)[::-1]
-        backwards = self._blended(ArmPoses.from_stacked(states.stacked()[::-1]), o.blend_share)
+        level = fade_in(n, self._level_states(n))[::-1]
+        backwards = self._begun(ArmPoses.from_stacked(states.stacked()[::-1]))
         states = ArmPoses.from_stacked(backwards.stacked()[::-1])
         first = path.end.stacked()[0]
         fade = fade_in(n, n // 2)[::-1, None]
         states = ArmPoses.from_stacked(states.stacked() + fade * (first - states.stacked()[0]))
         self._synthesised(path, "retreat", states, opening_path, level, o.retreat_duration)
+        if self.movement.begins_above_table:
+            self._way_to_table(path, "retreat", states[-1:], backwards=True)
+
+    def _level_states(self, n: int) -> int:
+        """Over how many of n states the hand is levelled: all of them where people did not grasp but touch."""
+        return n if self.movement.begins_above_table else self.options.level_states
 
     def _synthesised(
         self, path: Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
@@ -181,6 +186,16 @@ class RelocationPlanner:
         poses = ArmPoses.from_stacked(values[:, :9])
         poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
         path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
+
+    def _way_to_table(self, path: Path, name: str, begin: ArmPoses, backwards: bool = False) -> None:
+        """From the base pose to where the movement begins, or back: no movement of people, who sit at the table."""
+        o = self.options
+        first = self.solver.solve(begin.elbow, self._outward(begin.gripper), begin.finger_to_thumb).angles[0]
+        corners = np.concatenate([self.base_angles[None, :5], np.deg2rad(o.raise_via_deg), first[None]])
+        at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
+        n = max(2, round(o.raise_duration / path.period))
+        along = minimum_jerk((np.arange(n, 0, -1) - 1 if backwards else np.arange(1, n + 1)) / n)
+        path.add(name, self._pose_of(PchipInterpolator(at / at[-1], corners)(along)), self._base_opening, 0.0)
 
     def far_enough(self, point: FloatArray) -> FloatArray:
         """The point moved away from the shoulder until `_outward` leaves it where it is."""
@@ -236,17 +251,25 @@ class RelocationPlanner:
         """t′ = t - 0.03 b′ + 0.01 b′⊥ of 5.2.5."""
         return target - self.options.before * self._forward(target) + self.options.aside * self._right(target)
 
-    def _blended(self, states: ArmPoses, share: float) -> ArmPoses:
-        """The movement started from the robot's own base pose, which fades out over the first `share`."""
+    def _begun(self, states: ArmPoses) -> ArmPoses:
+        """The movement begun where the robot can: at its base pose, which fades out, or above the table."""
+        o = self.options
+        if not self.movement.begins_above_table:
+            return self._blended(states, self._base, o.blend_share)
+        gripper = np.clip(states.gripper[:1], *np.transpose(o.begin_within))
+        return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
+
+    def _blended(self, states: ArmPoses, first: ArmPoses, share: float) -> ArmPoses:
+        """The movement started from another pose, which fades out over the first `share`."""
         values = states.stacked()
         n = len(values)
         fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (share * (n - 1)), 0.0, 1.0))
-        return ArmPoses.from_stacked(values + fade[:, None] * (self._base.stacked()[0] - values[0]))
+        return ArmPoses.from_stacked(values + fade[:, None] * (first.stacked()[0] - values[0]))
 
     def _pose_of(self, angles: FloatArray) -> ArmPoses:
+        """Poses of joint angles [K, 5]."""
         points = self.arm.kinematics.forward(angles)
-        across = points.shoulder_from_hand[..., :, 1] * self.movement.o_max
-        return ArmPoses(points.elbow[None], points.gripper[None], across[None])
+        return ArmPoses(points.elbow, points.gripper, points.shoulder_from_hand[..., :, 1] * self.movement.o_max)
 
     def _finish(self, path: Path) -> PlannedMotion:
         poses = ArmPoses.joined(path.poses)

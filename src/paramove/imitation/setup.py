@@ -4,43 +4,67 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Literal, Self
 
 from platformdirs import user_cache_path
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.imitation.arm_pose import ArmPoseSolver
 from paramove.imitation.clear_plans import ClearPlans
 from paramove.imitation.clearance import ClearanceChecker, UprightCylinder, WorkSurface
-from paramove.imitation.conversion import RobotMovement
+from paramove.imitation.modelled_movement import robot_movement
 from paramove.imitation.reaching_file import load_reaching_model
+from paramove.imitation.recorded_reaching import people_model
 from paramove.imitation.relocation import RelocationPlanner
 from paramove.imitation.synthesizer import Synthesizer
-from paramove.phmm import InterpolativePHMM
+from paramove.phmm import ParametricHMM
 from paramove.robots.description import DescriptionError, RobotDescription
 
 _log = logging.getLogger(__name__)
 
 
 class MovementSource(BaseModel):
-    """Where the reaching movement comes from: `file`, or else the synthetic demonstrator's demonstrations (`seed`)."""
+    """Where the reaching movement comes from: a `file`, or a `model` that is trained when it is first asked for.
+
+    `synthetic`: demonstrations of the synthetic demonstrator with that `seed`. `table_reach`: recorded people that
+    reach for places on a table; `degree` 1 linear, 2 quadratic.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     file: Path | None = None
+    model: Literal["synthetic", "table_reach"] = "synthetic"
     seed: int = 0
+    degree: Literal[1, 2] = 1
 
-    def model(self) -> InterpolativePHMM:
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if self.file is not None and "model" in self.model_fields_set:
+            raise ValueError(f"give either a file or a model, found file {self.file} and model {self.model!r}")
+        return self
+
+    def trained(self) -> ParametricHMM:
         """The model, kept in the user's cache folder once trained. Raises ModelFileError for a bad `file`."""
         if self.file is not None:
             return load_reaching_model(self.file)
-        cache = user_cache_path("paramove") / f"reaching_{self.seed}.npz"
-        try:
-            cache.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            _log.warning("training the movement, which cannot be kept in %s: %s", cache.parent, error.strerror)
+        cache = _cache_folder()
+        if self.model == "table_reach":
+            return people_model(self.model, self.degree, cache)
+        if cache is None:
             return train_reaching_model(self.seed)
-        return train_reaching_model(self.seed, cache=cache)
+        return train_reaching_model(self.seed, cache=cache / f"reaching_{self.seed}.npz")
+
+
+def _cache_folder() -> Path | None:
+    """The user's folder for trained models; None where it cannot be made."""
+    folder = user_cache_path("paramove")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        _log.warning("training the movement, which cannot be kept in %s: %s", folder, error.strerror)
+        return None
+    return folder
 
 
 class SurfaceParameters(BaseModel):
@@ -67,7 +91,7 @@ def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: 
         raise DescriptionError(f"{robot_folder} describes the arms {', '.join(robot.arms)}, found side {side!r}")
     arm = robot.arms[side]
     solver = ArmPoseSolver(robot, arm)
-    converted = RobotMovement.from_model(movement.model(), solver.length)
+    converted = robot_movement(movement.trained(), solver.length)
     joints = [*arm.indices, arm.fingers_index]
     planner = RelocationPlanner(
         converted,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from paramove.imitation.arm_pose import UnreachablePoseError
 from paramove.imitation.arm_state import FELT_OPENING, ArmState
 from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
-from paramove.imitation.goals import FRAME, GoalRefusedError, centimetres, point_of, standing_of
+from paramove.imitation.goals import FRAME, GoalRefusedError, centimetres, hull_of, point_of, standing_of
 from paramove.imitation.motion import PlannedMotion
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
@@ -46,6 +47,14 @@ class _Outcome:
 _Course = Generator[PlannedMotion, None, _Outcome]
 
 
+class _Hulls(NamedTuple):
+    """Where the places of a goal lie, seen by the movement model."""
+
+    goal_id: str = ""
+    from_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
+    to_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
+
+
 @dataclass
 class _Running:
     """The goal being done: its course, the motion under way and what is known of it."""
@@ -76,6 +85,7 @@ class Synthesizer:
         self._hand = ArmState(self._arm, plans.planner.base_angles)
         self._running: _Running | None = None
         self._waiting: RelocationGoal | None = None
+        self._hulls = _Hulls()
         self._newest: dict[str, RelocationStatus] = {}
         self._statuses: list[RelocationStatus] = []
         self._trajectories: list[JointTrajectory] = []
@@ -226,6 +236,9 @@ class Synthesizer:
         return _Outcome(True)
 
     def _begin_or_refuse(self, goal: RelocationGoal) -> None:
+        if self._running is None:
+            movement = self._plans.planner.movement
+            self._hulls = _Hulls(goal.id, hull_of(goal, "from", movement), hull_of(goal, "to", movement))
         try:
             self._begin(goal)
         except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
@@ -306,6 +319,8 @@ class Synthesizer:
             goal_id=goal_id, state=state, phase=phase, reason=reason, holding=self.holding, elbow_turn_rad=elbow_turn
         )
         status.captured.FromNanoseconds(self._now_ns)
+        if self._hulls.goal_id == goal_id:
+            status.from_hull, status.to_hull = self._hulls.from_hull, self._hulls.to_hull
         self._statuses.append(status)
         self._newest[goal_id] = status
         while len(self._newest) > REMEMBERED_GOALS:

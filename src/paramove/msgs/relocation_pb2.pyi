@@ -55,7 +55,7 @@ class Position(_message.Message):
     def __init__(self, x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ...) -> None: ...
 
 class RelocationStatus(_message.Message):
-    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad", "in_the_way")
+    __slots__ = ("captured", "goal_id", "state", "phase", "reason", "holding", "elbow_turn_rad", "in_the_way", "from_hull", "to_hull")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[RelocationStatus.State]
@@ -70,6 +70,14 @@ class RelocationStatus(_message.Message):
     STATE_SUCCEEDED: RelocationStatus.State
     STATE_FAILED: RelocationStatus.State
     STATE_REFUSED: RelocationStatus.State
+    class Hull(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        HULL_UNSPECIFIED: _ClassVar[RelocationStatus.Hull]
+        HULL_INSIDE: _ClassVar[RelocationStatus.Hull]
+        HULL_OUTSIDE: _ClassVar[RelocationStatus.Hull]
+    HULL_UNSPECIFIED: RelocationStatus.Hull
+    HULL_INSIDE: RelocationStatus.Hull
+    HULL_OUTSIDE: RelocationStatus.Hull
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     GOAL_ID_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
@@ -78,6 +86,8 @@ class RelocationStatus(_message.Message):
     HOLDING_FIELD_NUMBER: _ClassVar[int]
     ELBOW_TURN_RAD_FIELD_NUMBER: _ClassVar[int]
     IN_THE_WAY_FIELD_NUMBER: _ClassVar[int]
+    FROM_HULL_FIELD_NUMBER: _ClassVar[int]
+    TO_HULL_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     goal_id: str
     state: RelocationStatus.State
@@ -86,4 +96,6 @@ class RelocationStatus(_message.Message):
     holding: bool
     elbow_turn_rad: float
     in_the_way: _containers.RepeatedScalarFieldContainer[int]
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ..., in_the_way: _Optional[_Iterable[int]] = ...) -> None: ...
+    from_hull: RelocationStatus.Hull
+    to_hull: RelocationStatus.Hull
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., goal_id: _Optional[str] = ..., state: _Optional[_Union[RelocationStatus.State, str]] = ..., phase: _Optional[str] = ..., reason: _Optional[str] = ..., holding: bool = ..., elbow_turn_rad: _Optional[float] = ..., in_the_way: _Optional[_Iterable[int]] = ..., from_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ..., to_hull: _Optional[_Union[RelocationStatus.Hull, str]] = ...) -> None: ...

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from paramove.evaluation.imitation.errors import Movement, RobotArm, errors_of, largest, pairs, ranges
-from paramove.imitation.conversion import ArmPoses
+from paramove.imitation.reaching_movement import ArmPoses
 
 N = 80
 LINE = np.stack([np.linspace(0.0, 0.2, N), np.zeros(N), np.zeros(N)], axis=1)

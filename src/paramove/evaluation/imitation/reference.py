@@ -14,8 +14,9 @@ from paramove.evaluation.imitation.errors import Movement, RobotArm
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.sequences import resample
 from paramove.imitation.arm_pose import ArmPoseSolver
-from paramove.imitation.conversion import ArmPoses, RobotMovement
+from paramove.imitation.conversion import RobotMovement
 from paramove.imitation.motion import RelocationOptions
+from paramove.imitation.reaching_movement import ArmPoses
 from paramove.phmm import InterpolativePHMM
 from paramove.phmm.synchronisation import synchronised
 

@@ -1,0 +1,127 @@
+"""A reaching movement as a robot's arm makes it: what the relocation action needs of it, whichever model is behind."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import Delaunay, QhullError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ArmPoses:
+    """A sequence of K arm poses in the robot's shoulder frame, m.
+
+    Attributes:
+        elbow: q of 5.2.3, [K, 3].
+        gripper: r, [K, 3].
+        finger_to_thumb: o, [K, 3].
+    """
+
+    elbow: FloatArray
+    gripper: FloatArray
+    finger_to_thumb: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.gripper)
+
+    def __getitem__(self, states: slice) -> ArmPoses:
+        return ArmPoses(self.elbow[states], self.gripper[states], self.finger_to_thumb[states])
+
+    @classmethod
+    def joined(cls, parts: list[ArmPoses]) -> ArmPoses:
+        """One sequence after the other."""
+        return cls(
+            np.concatenate([p.elbow for p in parts]),
+            np.concatenate([p.gripper for p in parts]),
+            np.concatenate([p.finger_to_thumb for p in parts]),
+        )
+
+    def stacked(self) -> FloatArray:
+        """All components side by side, [K, 9]."""
+        return np.concatenate([self.elbow, self.gripper, self.finger_to_thumb], axis=1)
+
+    @classmethod
+    def from_stacked(cls, values: FloatArray) -> ArmPoses:
+        """Inverse of `stacked`."""
+        return cls(values[:, :3], values[:, 3:6], values[:, 6:])
+
+
+class ReachingMovement(ABC):
+    """A family of movements over the place that is reached, converted to a robot's arm (thesis 5.2.3).
+
+    Attributes:
+        scale: s = l / l′.
+        o_max: Greatest distance of finger and thumb, m.
+        reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
+        release_state: State in which the hand begins to go back (T′).
+        begins_above_table: Whether the hand comes from above the table, as that of people who sit at it; otherwise it
+            comes from beside the body, where the robot's own hangs.
+    """
+
+    scale: float
+    o_max: float
+    reach_state: int
+    release_state: int
+    begins_above_table: bool = False
+
+    @property
+    @abstractmethod
+    def centre(self) -> FloatArray:
+        """Mean target of the training, [3], m, robot's shoulder frame."""
+
+    @abstractmethod
+    def poses(self, parameter: ArrayLike) -> ArmPoses:
+        """All states for one parameter [3]."""
+
+    @abstractmethod
+    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
+        """One state for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
+
+    @abstractmethod
+    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+        """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b)."""
+
+    @abstractmethod
+    def openings(self, states: ArmPoses) -> FloatArray:
+        """Normalised openings ξ of the gripper, 1 open, in all states [N, 9] of one movement, [N]."""
+
+    @abstractmethod
+    def within_training(self, target: ArrayLike) -> bool | None:
+        """Whether the gripper is at `target` [3] in a movement between the demonstrated ones; None if unknown.
+
+        Between: the parameter lies in the convex hull of the targets of the training.
+        """
+
+    def approach(self, target: ArrayLike) -> tuple[ArmPoses, FloatArray]:
+        """States 1..T of the movement that brings the gripper to `target` [3], and the openings."""
+        poses = self.poses(self.parameter_for(self.reach_state, target)[0])
+        last = self.reach_state + 1
+        return poses[:last], self.openings(poses)[:last]
+
+    def retreat(self, target: ArrayLike) -> tuple[ArmPoses, FloatArray]:
+        """States T′..N of the movement that leaves `target` [3], and the openings."""
+        poses = self.poses(self.parameter_for(self.release_state, target)[0])
+        return poses[self.release_state :], self.openings(poses)[self.release_state :]
+
+
+class TrainingTargets:
+    """The targets of the training as a body: their convex hull, widened by nothing.
+
+    Args:
+        targets: [K, P].
+    """
+
+    def __init__(self, targets: FloatArray) -> None:
+        try:
+            self._hull: Delaunay | None = Delaunay(targets)
+        except (QhullError, ValueError):
+            self._hull = None  # too few targets, or all in one plane: nothing lies between them
+
+    def enclose(self, parameter: FloatArray) -> bool:
+        """Whether a parameter [P] lies in the hull."""
+        return self._hull is not None and bool(self._hull.find_simplex(parameter[None])[0] >= 0)

@@ -1,0 +1,108 @@
+"""A reaching model from recorded people, for the robot's approach and retreat."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.body_frame import BODY
+from paramove.demonstrations.recorded_people import RATE_HZ, Recordings, RecordingsError, data_folder, load_recordings
+from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM
+
+logger = logging.getLogger(__name__)
+
+ACTIONS = ("reach_forward", "reach_across")
+N_STATES = 40
+REMEDY = (
+    "put the data set beside the clone as ../shared/data/table_reach/data.npz or name its folder in PARAMOVE_DATA; or "
+    "give a trained model with synthesizer.movement.file; or leave out synthesizer.movement to move as the synthetic "
+    "demonstrator does"
+)
+VERSION = 1  # raise it when the same recordings shall give another model: cached models then train again
+
+
+def people_model(name: str, degree: int, cache_folder: Path | None) -> PolynomialPHMM:
+    """The model of the data set `name`, trained once and kept in `cache_folder`.
+
+    The kept one is used as long as it was trained from the recordings that are there, or if there are none any more.
+
+    Raises:
+        ModelFileError: There are neither recordings nor a kept model, or the recordings do not suit; with the remedy.
+    """
+    cache = None if cache_folder is None else cache_folder / f"reaching_{name}_{degree}.npz"
+    kept = _kept(cache)
+    try:
+        source = f"{name}, {', '.join(ACTIONS)}, degree {degree}, version {VERSION}, sha256 {_digest(name)}"
+        if kept is not None and kept.description is not None and kept.description.source == source:
+            return kept
+        model = train_people_model(load_recordings(name), degree=degree)
+    except RecordingsError as error:
+        if kept is not None:
+            return kept
+        raise ModelFileError(
+            f"the movement {name!r} is trained from recorded people: {error}. Remedy: {REMEDY}", missing=True
+        ) from error
+    model.description = replace(model.description or MovementDescription(), source=source)
+    if cache is not None:
+        model.save(cache)
+    return model
+
+
+def _kept(cache: Path | None) -> PolynomialPHMM | None:
+    if cache is None or not cache.exists():
+        return None
+    try:
+        return PolynomialPHMM.load(cache)
+    except ModelFileError as error:
+        logger.warning("training again, the cached model does not fit: %s", error)
+        return None
+
+
+def _digest(name: str) -> str:
+    file = data_folder() / name / "data.npz"
+    if not file.is_file():
+        raise RecordingsError(f"{file} is missing")
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
+
+
+def train_people_model(
+    recordings: Recordings, *, degree: int = 1, actions: Sequence[str] = ACTIONS, n_states: int = N_STATES
+) -> PolynomialPHMM:
+    """A polynomial model of reaching over the touched place, in the body frame of one person, m.
+
+    The movements end where the hand arrives: arrival is 1, there is no grasp and no way back.
+
+    Args:
+        recordings: Of people that reach for places, each movement labelled with its target.
+        degree: 1 linear, 2 quadratic.
+        actions: Which of their actions, pooled.
+        n_states: Each of 2 or 3 of `2.5 * n_states` frames.
+
+    Raises:
+        ValueError: An action is not among the recorded ones.
+    """
+    unknown = sorted(set(actions) - set(recordings.actions))
+    if unknown or not actions:
+        raise ValueError(f"{recordings.name} has the actions {', '.join(recordings.actions)}; found {unknown}")
+    chosen = [one for action in actions for one in recordings.of(action=action) if np.isfinite(one.target).all()]
+    model = PolynomialPHMM(
+        n_states, 2, 3, degree=degree, resampled_frames=round(2.5 * n_states), residuals="independent"
+    )
+    theta = np.stack([one.target for one in chosen])
+    groups = np.array([one.subject for one in chosen])
+    model.fit([one.movement for one in chosen], theta, groups=groups)
+    seconds = float(np.mean([len(one.movement) - 1 for one in chosen])) / RATE_HZ
+    model.description = MovementDescription(
+        action="reaching",
+        point_names=recordings.point_names,
+        frame=BODY,
+        parameter_names=("target_x", "target_y", "target_z"),
+        duration=seconds,
+        arrival=1.0,
+    )
+    return model
