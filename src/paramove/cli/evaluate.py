@@ -12,7 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from paramove.cli import completions
-from paramove.cli.evaluate_chapters import chapter2
+from paramove.cli.evaluate_chapters import chapter2, chapter4
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
 from paramove.cli.evaluate_movements import peers, real
@@ -33,6 +33,7 @@ app.command("imitation")(imitation)
 app.command("real")(real)
 app.command("peers")(peers)
 app.command("chapter2")(chapter2)
+app.command("chapter4")(chapter4)
 
 RUNS = Path("runs/evaluation")
 

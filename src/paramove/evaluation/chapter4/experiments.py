@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
 from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from paramove.evaluation.chapter4.kinds import (
@@ -20,6 +25,7 @@ from paramove.evaluation.chapter4.kinds import (
 from paramove.evaluation.chapter4.learning import LEARNERS, TRAININGS, able, measured_learning
 from paramove.evaluation.chapter4.line_movement import measured_line
 from paramove.evaluation.chapter4.measurement import measured_kind, measured_noise
+from paramove.evaluation.chapter4.raster import REPETITIONS
 from paramove.evaluation.chapter4.redirect import FEWEST, redirect_experiment
 from paramove.evaluation.chapter4.variation import (
     fit_to_references,
@@ -47,21 +53,6 @@ SOURCES = (
     "paramove.evaluation.movements.tasks:raster_tasks",
     "paramove.hmm",
 )
-INTERPOLATIVE = tuple(
-    f"paramove.phmm.{name}"
-    for name in (
-        "bending",
-        "grid",
-        "interpolation_kernels",
-        "interpolation_search",
-        "interpolative",
-        "local_models",
-        "parametric",
-        "performance_spread",
-        "synchronisation",
-    )
-)
-"""Source that an interpolative model depends on: it is slow, and does not change with the polynomial ones."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +61,7 @@ class Scale:
 
     Attributes:
         states: numbers of states. kinds: names of models. noisy: those to which noise is shown.
-        every: each so many-th test movement is asked.
+        every: each so many-th test movement is asked. compared: movements per place whose pairs are compared.
         learners, trainings: of the learning curves.
         redirect_seeds: least number of seeds. redirect_tests: pairs of places. redirect_only: part of the names of
             the training sets.
@@ -81,6 +72,7 @@ class Scale:
     kinds: tuple[str, ...] = tuple(kind.name for kind in KINDS)
     noisy: tuple[str, ...] = (IPHMM_3, LPHMM_3, QPHMM_3, LPHMM_3 + OURS, QPHMM_3 + OURS)
     every: int = 1
+    compared: int = 14
     learners: tuple[str, ...] = LEARNERS
     trainings: tuple[tuple[int, int], ...] = TRAININGS
     redirect_seeds: int = 10
@@ -91,9 +83,10 @@ class Scale:
 
 QUICK = Scale(
     states=(10,),
-    kinds=(IPHMM_2, IPHMM_3, LPHMM_3, QPHMM_3, LPHMM_3 + OURS, QPHMM_3 + OURS),
-    noisy=(QPHMM_3, QPHMM_3 + OURS),
-    every=36,
+    kinds=(IPHMM_2, IPHMM_3, LPHMM_3, QPHMM_3, QPHMM_3 + OURS),
+    noisy=(QPHMM_3 + OURS,),
+    every=REPETITIONS,
+    compared=4,
     learners=(QPHMM_3 + OURS,),
     trainings=((3, 1), (3, 3)),
     redirect_seeds=1,
@@ -146,7 +139,12 @@ def experiments(seeds: Sequence[int], scale: Scale, *, with_hmmlearn: bool = Tru
     for seed in [*seeds, *more][: max(len(seeds), scale.redirect_seeds)]:
         found.append(
             Experiment(
-                REDIRECT, seed, {}, _redirects, (seed, scale.redirect_tests, scale.redirect_only), ("paramove.phmm",)
+                REDIRECT,
+                seed,
+                {},
+                _redirects,
+                (seed, scale.redirect_tests, scale.redirect_only),
+                POLYNOMIAL + INTERPOLATIVE,
             )
         )
     found += [one for seed in seeds for one in _of_models(seed, scale)]
@@ -154,16 +152,16 @@ def experiments(seeds: Sequence[int], scale: Scale, *, with_hmmlearn: bool = Tru
 
 
 def _of_data(seed: int, scale: Scale, with_hmmlearn: bool) -> Iterator[Experiment]:
-    yield Experiment(VARIATION, seed, {}, natural_variation, (seed,))
-    yield Experiment(FIT, seed, {}, fit_to_references, (seed,), ("paramove.phmm",))
+    yield Experiment(VARIATION, seed, {}, natural_variation, (seed, scale.compared))
+    yield Experiment(FIT, seed, {}, fit_to_references, (seed,), POLYNOMIAL)
     yield Experiment(PLAIN, seed, {}, plain_rate, (seed,))
-    yield Experiment(LINE, seed, {}, measured_line, (seed,), ("paramove.phmm",))
+    yield Experiment(LINE, seed, {}, measured_line, (seed,), POLYNOMIAL)
     if with_hmmlearn:
         likeness = ("paramove.evaluation.chapter4.class_likeness",)
         yield Experiment(HMMLEARN, seed, {}, hmmlearn_rate, (seed,), likeness)
     states = max(scale.states)
     arguments = (seed, states, scale.surface_points)
-    yield Experiment(SURFACES, seed, {"states": states}, likelihood_surfaces, arguments, ("paramove.phmm",))
+    yield Experiment(SURFACES, seed, {"states": states}, likelihood_surfaces, arguments, POLYNOMIAL + INTERPOLATIVE)
 
 
 def _of_models(seed: int, scale: Scale) -> Iterator[Experiment]:
@@ -190,5 +188,25 @@ def _redirects(seed: int, tests: int, only: str) -> dict[str, Any]:
     return {"values": {"jerk": [row["jerk_ratio"] for row in rows]}, "rows": rows}
 
 
+@lru_cache
+def modules_behind(module: str) -> tuple[str, ...]:
+    """A module of this project and all of its package that it imports, directly or through others."""
+    package = module.rpartition(".")[0]
+    found, open_ends = {module}, [module]
+    while open_ends:
+        tree = ast.parse(Path(str(import_module(open_ends.pop()).__file__)).read_text(encoding="utf-8"))
+        nodes = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        imported = {str(node.module) for node in nodes if str(node.module).startswith(f"{package}.")}
+        whole = {f"{package}.{one.name}" for node in nodes if node.module == package for one in node.names}
+        new = (imported | {name for name in whole if find_spec(name)}) - found
+        found |= new
+        open_ends += sorted(new)
+    return tuple(sorted(found))
+
+
+POLYNOMIAL = modules_behind("paramove.phmm.polynomial")
+INTERPOLATIVE = modules_behind("paramove.phmm.interpolative")
+
+
 def _sources(name: str) -> tuple[str, ...]:
-    return INTERPOLATIVE if BY_NAME[name].residuals is None else ("paramove.phmm",)
+    return INTERPOLATIVE if BY_NAME[name].residuals is None else POLYNOMIAL

@@ -67,7 +67,7 @@ def measured_line(seed: int) -> dict[str, Any]:
     curves: dict[str, list[list[list[float]]]] = {}
     for figure in FIGURES:
         model = trained_line(figure, seed)
-        made = [model.synthesize([p], SAMPLES) for p in SHOWN]
+        made = [model.synthesize([p], SAMPLES, path="linear") for p in SHOWN]
         values[f"distance_{figure.number}"] = [distance_from_curve(one, p) for one, p in zip(made, SHOWN, strict=True)]
         curves[figure.number] = [one.round(5).tolist() for one in made]
     began = time.perf_counter()

@@ -24,6 +24,7 @@ from paramove.evaluation.chapter4.raster import (
 from paramove.evaluation.chapter4.unfinished import aborted, stopped
 from paramove.evaluation.movements.measures import covered, theta_error
 from paramove.evaluation.movements.method import Estimate
+from paramove.hmm.synthesis import Path
 from paramove.phmm import InterpolativePHMM, MovementClassifier, ParametricHMM, PolynomialPHMM
 
 Floats = NDArray[np.float64]
@@ -40,7 +41,9 @@ def measured_kind(name: str, states: int, seed: int, every: int = 1) -> dict[str
     seconds = {"fit": (time.perf_counter() - began) / len(ACTIONS)}
     values: Values = {}
     for action, model in models.items():
-        values[f"synthesis_{action}"] = synthesis_errors(model, references(seed, action), shown.test[action].places)
+        averages, places = references(seed, action), shown.test[action].places
+        values[f"synthesis_{action}"] = synthesis_errors(model, averages, places)
+        values[f"linear_{action}"] = synthesis_errors(model, averages, places, "linear")
     began = time.perf_counter()
     _classified(models, shown, every, values)
     seconds["classify"] = (time.perf_counter() - began) / len(values["correct"])
@@ -58,10 +61,13 @@ def trained(kind: Kind, states: int, shown: Shown) -> ParametricHMM:
     return kind.untrained(states).fit(chosen.sequences, chosen.places)
 
 
-def synthesis_errors(model: ParametricHMM, averages: Floats, places: Floats) -> list[float]:
-    """Distance (4.3) of the prototype for each place from the average of the movements to it, cm."""
+def synthesis_errors(model: ParametricHMM, averages: Floats, places: Floats, path: Path = "smooth") -> list[float]:
+    """Distance (4.3) of the prototype for each place from the average of the movements to it, cm.
+
+    path "linear": straight lines between the means, as in the thesis.
+    """
     return [
-        100.0 * movement_distance(model.synthesize(place, COMPARED_SAMPLES), average)
+        100.0 * movement_distance(model.synthesize(place, COMPARED_SAMPLES, path=path), average)
         for place, average in zip(places[::REPETITIONS], averages, strict=True)
     ]
 
