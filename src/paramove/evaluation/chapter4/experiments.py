@@ -55,12 +55,17 @@ SOURCES = (
 )
 
 
+BY_THESIS = tuple(kind.name for kind in KINDS if kind.thesis)
+WITH_ALL_STATES = (LPHMM_3 + OURS, QPHMM_3 + OURS)
+"""What is also trained with more states: the thesis's models, and ours of the same training."""
+
+
 @dataclass(frozen=True)
 class Scale:
     """How much is computed.
 
     Attributes:
-        states: numbers of states. kinds: names of models. noisy: those to which noise is shown.
+        states: numbers of states, the first for all models. kinds: names of models. noisy: those shown noise.
         every: each so many-th test movement is asked. compared: movements per place whose pairs are compared.
         learners, trainings: of the learning curves.
         redirect_seeds: least number of seeds. redirect_tests: pairs of places. redirect_only: part of the names of
@@ -168,6 +173,8 @@ def _of_models(seed: int, scale: Scale) -> Iterator[Experiment]:
     unfinished = "paramove.evaluation.chapter4.unfinished"
     for states in scale.states:
         for name in scale.kinds:
+            if states != scale.states[0] and name not in (*WITH_ALL_STATES, *BY_THESIS):
+                continue
             labels = {"name": name, "states": states}
             sources = (*_sources(name), "paramove.phmm.classification", unfinished)
             yield Experiment(MODELS, seed, labels, measured_kind, (name, states, seed, scale.every), sources)
