@@ -185,6 +185,7 @@ class SyntheticRun:
         ):
             value = RelocationStatus.State.Value(f"STATE_{state}")
             status = RelocationStatus(goal_id="g-1", state=value, phase=phase, holding=holding, elbow_turn_rad=0.1)
+            status.from_hull, status.to_hull = RelocationStatus.HULL_INSIDE, RelocationStatus.HULL_OUTSIDE
             yield topics.RELOCATION_STATUS, _ns(time_s), status
 
     def _calibration(self):

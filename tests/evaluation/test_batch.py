@@ -44,6 +44,26 @@ def test_totals_and_enough():
     assert table_of(results).row_count == 10
 
 
+def hull(tried, succeeded, refused=0):
+    counts = {"tried": tried, "succeeded": succeeded, "refused": refused}
+    return {"from": {"inside": counts, "outside": {"tried": 3, "succeeded": 3, "refused": 0}}}
+
+
+def test_relocations_within_and_outside_the_training_are_told_apart():
+    results = [
+        result(0, training_hull=hull(2, 2)),
+        result(1, training_hull=hull(3, 2)),
+        result(2, training_hull=hull(0, 0)),
+        result(3, training_hull=hull(1, 1, refused=1)),
+        result(4),  # of an earlier release
+    ]
+    inside = totals_of(results)["training_hull.from"]["inside"]
+    assert inside == {"tried": 6, "succeeded": 5, "refused": 1, "runs": 3, "runs_all_succeeded": 2}
+    table = table_of(results)
+    column = next(one for one in table.columns if one.header == "inside\nhull")
+    assert (list(column.cells), column.footer) == (["2/2", "2/3", "0/0", "1/1", "–"], "5/6")
+
+
 LAUNCHER = """
 import json, pathlib, sys
 arguments = dict(word[2:].split("=", 1) for word in sys.argv if word.startswith("--") and "=" in word)

@@ -31,6 +31,17 @@ def test_grasp_tells_how_it_went(evaluated):
     np.testing.assert_allclose(grasp["to_error_mm"], 1e3 * np.hypot(0.015, 0.093), rtol=1e-6)
 
 
+def test_grasp_tells_whether_the_model_extrapolated(evaluated):
+    summary = evaluated().summary
+    (grasp,) = summary["grasp_list"]
+    assert (grasp["from_hull"], grasp["to_hull"]) == ("inside", "outside")
+    none, one = {"tried": 0, "succeeded": 0, "refused": 0}, {"tried": 1, "succeeded": 1, "refused": 0}
+    assert summary["training_hull"] == {
+        "from": {"inside": one, "outside": none},
+        "to": {"inside": none, "outside": one},
+    }
+
+
 def test_stages_follow_one_another(evaluated):
     stages = evaluated().summary["stages"]
     assert [stage["stage"] for stage in stages] == ["calibrate", "learn", "apply"]

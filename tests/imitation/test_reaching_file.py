@@ -13,8 +13,9 @@ import pytest
 from paramove.demonstrations import reaching
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.imitation.reaching_file import load_reaching_model
-from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParameterGrid
+from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParameterGrid, PolynomialPHMM
 from tests.imitation.reaching import reaching_model
+from tests.imitation.touching import DESCRIPTION, touches, touching_model
 
 Change = Callable[[InterpolativePHMM], object]
 
@@ -100,3 +101,57 @@ def test_a_damaged_cache_is_trained_again(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(reaching, "reaching_grid_demonstrations", asked)
     with pytest.raises(InterruptedError, match="demonstrations are asked for"):
         train_reaching_model(0, cache=cache)
+
+
+def test_a_model_of_touching_is_of_use(tmp_path: Path) -> None:
+    path = tmp_path / "touching.npz"
+    touching_model().save(path)
+    assert load_reaching_model(path).get_params() == touching_model().get_params()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"unit": "mm"}, "expected points in m, found 'mm'"),
+        ({"frame": "camera"}, "expected points in the frame 'demonstrator_table' or 'body' .* found 'camera'"),
+        (
+            {"point_names": ("shoulder", "elbow", "index", "thumb")},
+            "expected 12 numbers a frame for 4 points, found 15",
+        ),
+        ({"arrival": 0.5, "grasp": 0.4}, "a reaching action has 0 < arrival < grasp < 1, or arrival 1 if it ends"),
+    ],
+)
+def test_a_model_of_touching_that_does_not_suit(tmp_path: Path, changes: dict[str, Any], words: str) -> None:
+    path = tmp_path / "touching.npz"
+    touching_model().save(path)
+    model = PolynomialPHMM.load(path)
+    model.description = replace(model.description or MovementDescription(), **changes)
+    model.save(path)
+    with pytest.raises(ModelFileError, match=words) as refusal:
+        load_reaching_model(path)
+    assert "Remedy: train it again" in str(refusal.value)
+
+
+def test_a_model_of_other_parameters_is_refused(tmp_path: Path) -> None:
+    sequences, theta = touches(1)
+    model = PolynomialPHMM(20, 2, 3, degree=1, resampled_frames=50, residuals="independent", description=DESCRIPTION)
+    model.fit(sequences, theta[:, :2]).save(tmp_path / "two.npz")
+    with pytest.raises(ModelFileError, match="expected targets with 3 coordinates, found 2"):
+        load_reaching_model(tmp_path / "two.npz")
+
+
+def test_a_movement_that_only_points_at_its_targets_is_refused(tmp_path: Path) -> None:
+    sequences, theta = touches(1)
+    model = PolynomialPHMM(20, 2, 3, degree=1, resampled_frames=50, residuals="independent", description=DESCRIPTION)
+    model.fit(sequences, theta + np.array([1.5, 0.0, 0.0])).save(tmp_path / "pointing.npz")
+    with pytest.raises(ModelFileError, match=r"reaches its targets, found 1\.4\d* m beside"):
+        load_reaching_model(tmp_path / "pointing.npz")
+
+
+def test_a_movement_that_is_the_same_for_all_targets_is_refused(tmp_path: Path) -> None:
+    touching_model().save(tmp_path / "still.npz")
+    model = PolynomialPHMM.load(tmp_path / "still.npz")
+    model.coefficients_[..., 1:] = 0.0
+    model.save(tmp_path / "still.npz")
+    with pytest.raises(ModelFileError, match="expected a movement that reaches different targets"):
+        load_reaching_model(tmp_path / "still.npz")

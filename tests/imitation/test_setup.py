@@ -5,12 +5,15 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from paramove.imitation import setup
-from paramove.imitation.setup import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.imitation.setup import MovementSource, SurfaceParameters, plans_for, synthesizer_for
 from paramove.robots.description import DescriptionError
-from tests.imitation.reaching import ROBOT_FOLDER, reaching_model
+from tests.imitation.reaching import ROBOT_FOLDER, at, reaching_model
+from tests.imitation.touching import touching_model
 
 
 @pytest.fixture
@@ -56,3 +59,28 @@ def test_movement_is_trained_where_nothing_can_be_kept(
     MovementSource(seed=3).trained()
     assert asked == [(3, None)]
     assert "cannot be kept in" in caplog.text
+
+
+def test_a_file_and_a_model_are_too_much() -> None:
+    with pytest.raises(
+        ValidationError, match=r"give either a file or a model, found file one\.npz and model 'table_reach'"
+    ):
+        MovementSource(file=Path("one.npz"), model="table_reach")
+
+
+def test_the_named_model_is_asked_for_with_its_degree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(setup, "user_cache_path", lambda name: tmp_path / name)
+    monkeypatch.setattr(setup, "people_model", lambda *arguments: asked.append(arguments))
+    MovementSource(model="table_reach", degree=2).trained()
+    assert asked == [("table_reach", 2, tmp_path / "paramove")]
+    with pytest.raises(ValidationError, match="Input should be 'synthetic' or 'table_reach'"):
+        MovementSource.model_validate({"model": "table_tennis"})
+
+
+def test_a_file_of_people_drives_the_arm(tmp_path: Path) -> None:
+    touching_model().save(tmp_path / "touching.npz")
+    source = MovementSource(file=tmp_path / "touching.npz")
+    plans = plans_for(ROBOT_FOLDER, "right", source, SurfaceParameters())
+    motion = plans.fetch(at((0.178, 0.0)), np.zeros((0, 2)))
+    assert motion.phases[0][0] == "approach"

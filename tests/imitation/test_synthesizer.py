@@ -23,6 +23,7 @@ from tests.imitation.fake_driver import (
     goal,
     relocate,
 )
+from tests.imitation.reaching import planner
 
 ACCEPTED, EXECUTING = RelocationStatus.STATE_ACCEPTED, RelocationStatus.STATE_EXECUTING
 
@@ -44,6 +45,23 @@ def test_relocates() -> None:
     assert not holding["approach"]
     assert holding["carry"]
     assert not holding["retreat"]
+
+
+def test_says_whether_the_places_lie_within_the_training() -> None:
+    """The opening is nearer than the nearest demonstrated target; what is refused is told of as well."""
+    cell = Cell()
+    cell.do(relocate())
+    inside, outside = RelocationStatus.HULL_INSIDE, RelocationStatus.HULL_OUTSIDE
+    movement = planner().movement
+    expected = [
+        inside if movement.within_training([place.x, place.y, place.z]) else outside
+        for place in (getattr(relocate(), "from"), relocate().to)
+    ]
+    assert {(status.from_hull, status.to_hull) for status in cell.statuses} == {tuple(expected)}
+    far = cell.do(relocate("far", source=(0.30, 0.0)))
+    assert (far.state, far.from_hull) == (REFUSED, outside)
+    offered = cell.do(goal(RelocationGoal.KIND_OFFER_HAND, "offer", source=OFFER))
+    assert offered.to_hull == RelocationStatus.HULL_UNSPECIFIED
 
 
 def test_every_trajectory_goes_from_rest_to_rest_with_increasing_times() -> None:

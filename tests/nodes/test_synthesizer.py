@@ -83,3 +83,14 @@ def test_a_bad_model_file_ends_the_node_with_the_remedy(config: synthesizer.Conf
     with pytest.raises(InputError, match=r"there is no model file .*Remedy") as refusal:
         synthesizer.run(RecordedBus(), config)
     assert refusal.value.exit_code == 66
+
+
+def test_recordings_of_people_that_are_not_there_end_the_node_with_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setenv("PARAMOVE_DATA", str(tmp_path / "none"))
+    config = synthesizer.Config.model_validate({"robot": ROBOT_FOLDER, "movement": {"model": "table_reach"}})
+    with pytest.raises(InputError, match=r"trained from recorded people: .*Remedy: put the data set") as refusal:
+        synthesizer.run(RecordedBus(), config)
+    assert refusal.value.exit_code == 66

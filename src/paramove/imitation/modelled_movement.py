@@ -27,7 +27,7 @@ _STEP = 0.005  # m, of the differences
 _EXACT = 1e-7  # m
 _NEWTON_STEPS = 25
 _HALVINGS = 6
-_FARTHEST = 1.0  # m, of a parameter from the shoulder: no arm of a robot that is scaled to is so long
+_FARTHEST = 5.0  # arm lengths, of a parameter from the middle of the training
 
 
 class ModelledMovement(ReachingMovement):
@@ -49,6 +49,7 @@ class ModelledMovement(ReachingMovement):
         self._model = model
         description = model.description or MovementDescription()
         self._names = description.point_names
+        self._farthest = _FARTHEST * arm_length
         self._returns = not ends_at_target(description)
         self.begins_above_table = not self._returns
         self.reach_state, self.release_state = _moments(description, model.n_states)
@@ -58,14 +59,14 @@ class ModelledMovement(ReachingMovement):
         length = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
         self.scale = arm_length / float(length.max())  # s = l / l′
         self._shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
-        self._centre = (targets.mean(axis=0) - self._shoulder) * self.scale
+        self._centre: FloatArray = (targets.mean(axis=0) - self._shoulder) * self.scale
         size = self.scale * np.linalg.norm(across, axis=-1)
         self.o_min, self.o_max = float(size.min()), float(size.max())
 
     @property
     def centre(self) -> FloatArray:
         """Mean target of the training, [3], m."""
-        return np.asarray(self._centre)
+        return self._centre
 
     def poses(self, parameter: ArrayLike) -> ArmPoses:
         """All states; those of a movement that ends at the target are followed by the same in reversed order."""
@@ -86,7 +87,7 @@ class ModelledMovement(ReachingMovement):
             UnreachablePoseError: No parameter is found for a point.
         """
         wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
-        parameter = wanted.copy()
+        parameter: FloatArray = wanted + self._centre - self._gripper(state, self._centre[None])
         missed = wanted - self._gripper(state, parameter)
         for _ in range(_NEWTON_STEPS):
             if np.abs(missed).max() < _EXACT:
@@ -134,7 +135,7 @@ class ModelledMovement(ReachingMovement):
             raise UnreachablePoseError(self._refusal(wanted[0], float(np.linalg.norm(missed[0])))) from error
         distance = np.linalg.norm(missed, axis=1)
         for _ in range(_HALVINGS):
-            tried = np.clip(parameter + change, -_FARTHEST, _FARTHEST)
+            tried = self._centre + np.clip(parameter + change - self._centre, -self._farthest, self._farthest)
             left = wanted - self._gripper(state, tried)
             worse = np.linalg.norm(left, axis=1) > distance
             if not worse.any():

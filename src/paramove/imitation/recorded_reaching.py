@@ -40,13 +40,15 @@ def people_model(name: str, degree: int, cache_folder: Path | None) -> Polynomia
         source = f"{name}, {', '.join(ACTIONS)}, degree {degree}, version {VERSION}, sha256 {_digest(name)}"
         if kept is not None and kept.description is not None and kept.description.source == source:
             return kept
-        model = train_people_model(load_recordings(name), degree=degree)
+        model = train_people_model(load_recordings(name), degree=degree, actions=ACTIONS, n_states=N_STATES)
     except RecordingsError as error:
         if kept is not None:
             return kept
         raise ModelFileError(
             f"the movement {name!r} is trained from recorded people: {error}. Remedy: {REMEDY}", missing=True
         ) from error
+    except ValueError as error:
+        raise ModelFileError(f"no movement follows from the recordings {name!r}: {error}. Remedy: {REMEDY}") from error
     model.description = replace(model.description or MovementDescription(), source=source)
     if cache is not None:
         model.save(cache)
