@@ -25,6 +25,7 @@ from pathlib import Path
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
 
 import numpy as np
+from models_parametric import UNSEEN, estimate_rows
 from models_peers import NotInstalledError, dynamax_training, hmmlearn_model, hmmlearn_training
 
 from paramove.demonstrations import demonstrations_at, reaching_cuboid, reaching_grid_demonstrations
@@ -163,6 +164,11 @@ def parametric() -> list[Row]:
     ]
 
 
+def estimates() -> list[Row]:
+    """Theta of one movement over the table: 20 states of 4 to 6 frames, T = 100, D = 21."""
+    return [Row(name, task, UNSEEN, note) for name, task, note in estimate_rows()]
+
+
 FIRST_CALL = """
 import time
 start = time.perf_counter()
@@ -192,6 +198,7 @@ GROUPS: dict[str, Callable[[], list[Row]]] = {
     "training of thesis 4.1.1, 21 states, 10 x T=100, 10 iterations": thesis_training,
     "log-likelihood of one movement, 20 states, T=100": likelihood,
     "parametric models of reaching": parametric,
+    "estimate of theta, 20 states, T=100": estimates,
     "import and first training in a new process": first_call,
 }
 

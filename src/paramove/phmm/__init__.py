@@ -4,6 +4,7 @@ from paramove.phmm.classification import Classification, MovementClassifier
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.interpolative import InterpolativePHMM
+from paramove.phmm.neural import NeuralPHMM
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.polynomial import CubicPHMM, Examination, LinearPHMM, PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.storage import ModelFileError
@@ -17,6 +18,7 @@ __all__ = [
     "ModelFileError",
     "MovementClassifier",
     "MovementDescription",
+    "NeuralPHMM",
     "ParameterEstimate",
     "ParameterGrid",
     "ParametricHMM",

@@ -14,7 +14,7 @@ from paramove.hmm.kernels import feasible_ends, stacked_segments
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-NEGLIGIBLE = 1e-9
+NEGLIGIBLE = 1e-7
 LOG_2PI = 1.8378770664093453
 
 

@@ -14,8 +14,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BORDER = 1e-9
-MOST_STEPS, TOLERANCE = 40, 1e-4
-NEAREST, FURTHEST = 4.0, 40.0
+MOST_STEPS, TOLERANCE = 40, 1e-3
+COARSE = 30.0
+"""Tolerance of the search with widened covariances."""
+NEAREST, FURTHEST = 4.0, 32.0
 """Of the places at which hills that rise again are looked for, in standard deviations of the summit found first."""
 
 
@@ -190,7 +192,7 @@ def likeliest(
             start, promise = middle.copy(), found
     number = region_at(start, knots, counts)
     start, _, _ = climbed(
-        start, region_of(number, counts), margin, smoothing, 1.0, columns, knots, counts, means, covariances,
+        start, region_of(number, counts), margin, smoothing, COARSE, columns, knots, counts, means, covariances,
         durations, d_min,
     )  # fmt: skip
     best, value, curvature, number = _summit(
@@ -214,5 +216,5 @@ def likeliest(
                     best, value, number = other, found, reached
                 break
             before = found
-            distance *= 1.6
+            distance *= 2.0
     return best, value, cell_of(region_of(number, counts), counts)

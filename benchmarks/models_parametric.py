@@ -1,0 +1,67 @@
+"""The search for theta of one movement, beside hmmlearn's score with scipy's L-BFGS-B: rows for `benchmarks/models.py`.
+
+hmmlearn knows no parametric models. Its opponent here is what a user of it would write: interpolate the local models at
+each theta that the optimiser asks for, and score the movement. With the same durations that takes d_max sub-states per
+state ("expanded"); the plain chain is another, simpler model and is shown for comparison.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from models_peers import NotInstalledError, hmmlearn_model
+from scipy.optimize import minimize
+
+from paramove.demonstrations import demonstrations_at, table_targets
+from paramove.hmm import resample
+from paramove.phmm import InterpolativePHMM, NeuralPHMM, ParametricHMM, QuadraticPHMM
+
+FRAMES = 100
+MARGIN = 0.25
+
+Task = Callable[[], object]
+
+
+def raster(columns: int, rows: int, repetitions: int, seed: int) -> tuple[list[np.ndarray], np.ndarray]:
+    """Pointing movements over the table (thesis 4.2.1), 100 frames of 21 coordinates, and (u, v)."""
+    targets, places = table_targets(columns, rows)
+    rng = np.random.default_rng(seed)
+    shown = demonstrations_at(targets, rng, action="pointing", repetitions=repetitions).sequences
+    return [resample(one, FRAMES) for one in shown], np.repeat(places, repetitions, axis=0)
+
+
+def hmmlearn_search(model: InterpolativePHMM, movement: np.ndarray, d_min: int, d_max: int) -> Task:
+    """The most likely theta by hmmlearn and L-BFGS-B with its numerical gradient, from the middle of the raster."""
+
+    def falling(theta: np.ndarray) -> float:
+        local = model.at(theta)
+        return -hmmlearn_model(local.means_, local.covariances_, d_min, d_max, "log", 1).score(movement)
+
+    bounds = [(-MARGIN, 1.0 + MARGIN)] * 2
+    return lambda: minimize(falling, [0.5, 0.5], method="L-BFGS-B", bounds=bounds)
+
+
+def estimate_rows() -> list[tuple[str, Task | None, str]]:
+    """Name, work and note of each row; the work is one estimate in turn over the same eight movements."""
+    shown, theta = raster(3, 3, 10, seed=0)
+    unseen = raster(4, 2, 1, seed=1)[0]
+    local = InterpolativePHMM(20, 4, 6, search_margin=MARGIN).fit(shown, theta)
+    rows: list[tuple[str, Task | None, str]] = [("paramove, interpolative 3 x 3", _all(local, unseen), "")]
+    for name, lengths in (("hmmlearn, expanded, L-BFGS-B", (4, 6)), ("hmmlearn, plain chain, L-BFGS-B", (1, 1))):
+        try:
+            searches = [hmmlearn_search(local, movement, *lengths) for movement in unseen]
+            searches[0]()
+        except NotInstalledError as error:
+            rows.append((name, None, str(error)))
+        else:
+            rows.append((name, lambda searches=searches: [search() for search in searches], ""))
+    rows.append(("paramove, quadratic", _all(QuadraticPHMM(20, 4, 6).fit(shown, theta), unseen), ""))
+    rows.append(("paramove, neural", _all(NeuralPHMM(20, 4, 6).fit(shown, theta), unseen), ""))
+    return rows
+
+
+UNSEEN = 8
+"""Movements of one run of a row: `estimate_rows` of 4 x 2 places."""
+
+
+def _all(model: ParametricHMM, movements: list[np.ndarray]) -> Task:
+    return lambda: [model.estimate(movement) for movement in movements]

@@ -1,0 +1,124 @@
+"""How many hidden units the networks of a NeuralPHMM need, and how strongly they are held back: by cross validation.
+
+Groups of movements are left out (thesis 3.3.2.1), while the alignment of frames and states stays that of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NUMBERS_OF_UNITS = (1, 2, 4, 8)
+DECAYS = (1e-4, 1e-2)
+"""Ridge of the outer weights, as a share of the number of movements."""
+MOST_FOLDS = 5
+STEPS = 40
+WORTH = 0.05
+"""More units must miss left-out movements by so much less, as a share: noise would choose some as well."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Number of hidden units, their weight decay, and W1 with b1 to begin with, (N, H, P + 1)."""
+
+    n_hidden: int
+    decay: float
+    inner: Floats
+
+
+def chosen_units(targets: StateTargets, groups: Ints, n_hidden: int | None, n_restarts: int, seed: int) -> Choice:
+    """The best number of units, or the best start for a given one.
+
+    Args:
+        targets: with the ridge of the skip's columns alone. groups: number of the group of each target, (K,).
+    """
+    targets, groups = _condensed(targets, groups)
+    rng = np.random.default_rng(seed)
+    n_groups = len(np.unique(groups))
+    shape = targets.weights.shape[1], targets.places.shape[1]
+    if n_hidden is None and n_groups < 4:
+        n_hidden = 0  # nothing says that the rest is not noise
+    numbers = NUMBERS_OF_UNITS if n_hidden is None else (n_hidden,)
+    best = Choice(0, DECAYS[0], np.zeros((shape[0], 0, shape[1] + 1)))
+    least = _left_out_error(targets, groups, best) if n_hidden is None else np.inf
+    for units in numbers if n_hidden != 0 else ():
+        if n_hidden is None and units > 2 * max(1, best.n_hidden):
+            break  # half as many were not worth it
+        starts = [drawn_inner(shape[0], units, shape[1], rng) for _ in range(max(1, n_restarts))]
+        for decay in DECAYS:
+            choice, start = _trained(targets, Choice(units, decay, starts[0]), starts)
+            # Left-out groups must not be known to the start either, so it is the drawn one again.
+            error = _left_out_error(targets, groups, replace(choice, inner=start)) if n_groups > 1 else -decay
+            if error < least * (1.0 - (WORTH if units > best.n_hidden and np.isfinite(least) else 0.0)):
+                best, least = choice, error
+    return best
+
+
+def with_decay(targets: StateTargets, choice: Choice) -> StateTargets:
+    """The targets with the ridge of the outer weights too."""
+    held = np.full(choice.n_hidden, choice.decay * float(targets.weights.sum(axis=0).mean()))
+    return replace(targets, ridge=np.concatenate([targets.ridge, held]))
+
+
+def _condensed(targets: StateTargets, groups: Ints) -> tuple[StateTargets, Ints]:
+    """The same targets with those of one theta and group made one: Q changes by a constant."""
+    kinds = np.column_stack([np.round(targets.places, 9), groups])
+    _, first, number = np.unique(kinds, axis=0, return_index=True, return_inverse=True)
+    chosen = np.zeros((len(first), len(groups)))
+    chosen[number.reshape(-1), np.arange(len(groups))] = 1.0
+    weights = chosen @ targets.weights
+    total = np.einsum("mk,kn,knd->mnd", chosen, targets.weights, targets.rotated, optimize=True)
+    rotated = total / np.maximum(weights, 1e-300)[:, :, None]
+    together = replace(
+        targets, places=targets.places[first], features=targets.features[first], weights=weights, rotated=rotated
+    )
+    return together, groups[first]
+
+
+def _trained(targets: StateTargets, choice: Choice, starts: list[Floats]) -> tuple[Choice, Floats]:
+    """The choice with the best of what is reached from the starts, and that start."""
+    whole = with_decay(targets, choice)
+    reached = [whole.improved(start, STEPS) for start in starts]
+    losses = [whole.loss_and_gradient(inner)[0] for inner in reached]
+    best = int(np.argmin(losses))
+    return replace(choice, inner=reached[best]), starts[best]
+
+
+def _left_out_error(targets: StateTargets, groups: Ints, choice: Choice) -> float:
+    """Mean over states and dimensions of the logarithm of squared misses of left-out groups, exponentiated."""
+    different = np.unique(groups)
+    folds = np.searchsorted(different, groups) % MOST_FOLDS
+    whole = with_decay(targets, choice)
+    missed = np.zeros(targets.rotated.shape[1:])
+    for fold in np.unique(folds):
+        seen, tested = folds != fold, folds == fold
+        if not seen.any():
+            continue
+        part = _part(whole, seen)
+        found = part.networks(part.improved(choice.inner, STEPS))
+        rotated = _rotated_means(found, _part(whole, tested))
+        missed += (((targets.rotated[tested] - rotated) ** 2) * targets.weights[tested][:, :, None]).sum(axis=0)
+    return float(np.exp(np.log(missed + 1e-300).mean()))
+
+
+def _part(targets: StateTargets, chosen: NDArray[np.bool_]) -> StateTargets:
+    return replace(
+        targets,
+        places=targets.places[chosen],
+        features=targets.features[chosen],
+        weights=targets.weights[chosen],
+        rotated=targets.rotated[chosen],
+    )
+
+
+def _rotated_means(networks: StateNetworks, targets: StateTargets) -> Floats:
+    means = networks.means(targets.places, targets.features)
+    result: Floats = np.einsum("nde,kne->knd", targets.rotation, means)
+    return result

@@ -1,0 +1,154 @@
+"""Generalised EM of HMMs whose state means are networks of theta (thesis 3.3.2.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from paramove.hmm import kernels
+from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
+from paramove.hmm.options import TrainingOptions, TrainingSummary
+from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
+from paramove.phmm.networks import INNER_DEVIATION, StateNetworks, StateTargets
+
+Floats = NDArray[np.float64]
+AFTER_ANNEALING = 10**6
+
+
+@dataclass(frozen=True)
+class NetworkParameters:
+    """A family of HMMs whose means are networks.
+
+    Attributes:
+        networks: of the states. covariances: (N, D, D). durations: p_i(d) in column d - 1, (N, d_max).
+        d_min: least number of frames of a state.
+    """
+
+    networks: StateNetworks
+    covariances: Floats
+    durations: Floats
+    d_min: int
+
+    def with_means(self, means: Floats) -> Parameters:
+        """The HMM with these means (N, D)."""
+        return Parameters(means, self.covariances, self.durations, self.d_min)
+
+
+@dataclass(frozen=True)
+class SequenceMoments:
+    """Expected sums of each sequence, with residuals r of the means (K, N, D) with which they were gathered.
+
+    Attributes:
+        means: those means. weights: gamma, (K, N). firsts: gamma r, (K, N, D). squared: gamma r r' of all, (N, D, D).
+        durations: expected counts, (N, d_max). log_likelihood: of all sequences.
+    """
+
+    means: Floats
+    weights: Floats
+    firsts: Floats
+    squared: Floats
+    durations: Floats
+    log_likelihood: float
+
+    @classmethod
+    def gathered(cls, parameters: NetworkParameters, sequences: Sequence[Floats], means: Floats) -> SequenceMoments:
+        """E-step with the means (K, N, D) of the sequences."""
+        common = Evaluator.of(parameters.with_means(means[0]))
+        weights, firsts = np.zeros(means.shape[:2]), np.zeros(means.shape)
+        squared, durations = np.zeros_like(parameters.covariances), np.zeros_like(parameters.durations)
+        log_likelihood = 0.0
+        for k, sequence in enumerate(sequences):
+            evaluator = replace(common, means=np.ascontiguousarray(means[k]))
+            value, gamma, counts = evaluator.expectation(sequence)
+            log_likelihood += value
+            durations += counts
+            ends = evaluator.ends(len(sequence))
+            kernels.add_moments(sequence, gamma, ends, evaluator.means, weights[k], firsts[k], squared)
+        squared = squared + np.swapaxes(np.tril(squared, -1), 1, 2)
+        return cls(means, weights, firsts, squared, durations, log_likelihood)
+
+    @property
+    def averages(self) -> Floats:
+        """Mean of the frames in each state of each sequence. Shape (K, N, D)."""
+        result: Floats = self.means + self.firsts / np.maximum(self.weights, 1e-300)[:, :, None]
+        return result
+
+    def scatter(self, means: Floats) -> Floats:
+        """Sum of gamma (x - mu)(x - mu)' about other means (K, N, D). Shape (N, D, D)."""
+        change = means - self.means
+        cross = np.einsum("knd,kne->nde", self.firsts, change, optimize=True)
+        moved = np.einsum("kn,knd,kne->nde", self.weights, change, change, optimize=True)
+        result: Floats = self.squared - cross - np.swapaxes(cross, 1, 2) + moved
+        return 0.5 * (result + np.swapaxes(result, 1, 2))
+
+
+@dataclass(frozen=True)
+class NetworkPrior:
+    """How strongly Z and W2 are held back, in a metric (D, D) that does not change while covariances do.
+
+    Attributes:
+        metric: a covariance; ridge: of each column of Z and W2, (F + H,).
+    """
+
+    metric: Floats
+    ridge: Floats
+
+    def log_density(self, networks: StateNetworks) -> float:
+        """Up to a constant."""
+        columns = np.concatenate([networks.skip, networks.outer], axis=2)
+        pulled = np.linalg.solve(self.metric, columns)
+        held = float((self.ridge * (columns * pulled).sum(axis=(0, 1))).sum())
+        return -0.5 * held - 0.5 * float((networks.inner**2).sum()) / INNER_DEVIATION**2
+
+    def targets(self, places: Floats, features: Floats, found: SequenceMoments, covariances: Floats) -> StateTargets:
+        """What an M-step of the networks has to meet: dimensions turned so that metric and covariance are diagonal."""
+        rotation, precision = np.empty_like(covariances), np.empty(covariances.shape[:2])
+        for i, covariance in enumerate(covariances):
+            values, vectors = eigh(covariance, self.metric)  # vectors' metric vectors = 1
+            rotation[i], precision[i] = vectors.T, 1.0 / values
+        rotated = np.einsum("nde,kne->knd", rotation, found.averages, optimize=True)
+        return StateTargets(places, features, found.weights, rotated, rotation, precision, self.ridge)
+
+
+def train_networks(
+    initial: NetworkParameters,
+    prior: NetworkPrior,
+    sequences: Sequence[Floats],
+    places: Floats,
+    features: Floats,
+    options: TrainingOptions,
+    gradient_steps: int,
+) -> tuple[NetworkParameters, TrainingSummary]:
+    """Iterate until the objective converges: few gradient steps in each iteration, which raise it but not to the top.
+
+    Args:
+        initial: whose covariances need no annealing any more.
+        places: scaled theta, (K, P). features: monomials, (K, F).
+    """
+    monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
+    scale = root_mean_deviation(sequences)
+    parameters, target = initial, None
+    for _ in range(options.max_iterations):
+        found = SequenceMoments.gathered(parameters, sequences, parameters.networks.means(places, features))
+        if target is None:
+            target = pooled_covariance(found.scatter(found.means), found.weights.sum(axis=0))
+        regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
+        objective = found.log_likelihood + prior.log_density(parameters.networks)
+        objective += penalty(parameters.with_means(found.means[0]), regularisation)
+        monitor.add(found.log_likelihood, objective)
+        if monitor.converged:
+            break
+        targets = prior.targets(places, features, found, parameters.covariances)
+        networks = targets.networks(targets.improved(parameters.networks.inner, gradient_steps))
+        scatter = found.scatter(networks.means(places, features))
+        parameters = NetworkParameters(
+            networks,
+            covariances_of(scatter, found.weights.sum(axis=0), regularisation),
+            durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+            parameters.d_min,
+        )
+    return parameters, monitor.summary(len(sequences))

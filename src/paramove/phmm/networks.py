@@ -1,0 +1,142 @@
+"""One small logistic network per state, beside a polynomial: how state means depend on theta (thesis 3.3.2, (3.5)).
+
+mu_i(theta) = Z_i phi(u) + W2_i sigma(W1_i u + b1_i). The polynomial, b2 among it, takes what is nearly straight, so
+that few hidden units are left to learn the rest. For given hidden units the other weights follow from a linear
+equation, so gradients are needed for W1 and b1 alone: of the Q-function with the best Z and W2 put in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import expit
+
+Floats = NDArray[np.float64]
+
+INNER_DEVIATION = 3.0
+"""Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""
+
+
+@dataclass(frozen=True)
+class StateNetworks:
+    """The networks of all states.
+
+    Attributes:
+        skip: Z, shape (N, D, F), in the unit of the sequences.
+        outer: W2, shape (N, D, H), likewise.
+        inner: W1 and, last, b1, shape (N, H, P + 1).
+    """
+
+    skip: Floats
+    outer: Floats
+    inner: Floats
+
+    def means(self, places: Floats, features: Floats) -> Floats:
+        """Means of all states at scaled theta (M, P) with monomials (M, F). Shape (M, N, D)."""
+        hidden = hidden_units(self.inner, places)
+        result: Floats = np.einsum("ndf,mf->mnd", self.skip, features)
+        result += np.einsum("ndh,mnh->mnd", self.outer, hidden)
+        return result
+
+    def slopes(self, place: Floats, jacobian: Floats) -> Floats:
+        """Derivatives of the means in scaled theta at one place (P,), the monomials' being (F, P). Shape (N, D, P)."""
+        hidden = hidden_units(self.inner, place[None])[0]
+        bent = (hidden * (1.0 - hidden))[:, :, None] * self.inner[:, :, :-1]
+        result: Floats = self.skip @ jacobian + self.outer @ bent
+        return result
+
+
+@dataclass(frozen=True)
+class StateTargets:
+    """What the networks shall give: the part of the Q-function that depends on them.
+
+    Q = -1/2 sum_k,i w_ki |y_ki - mu_i(theta_k)|^2_i - the prior, where |r|^2_i = sum_d precision_id (rotation_i r)_d^2
+    and the prior holds the rotated Z and W2 back by `ridge` and W1, b1 by INNER_DEVIATION.
+
+    Attributes:
+        places: scaled theta of each target, (K, P). features: monomials, (K, F).
+        weights: w, (K, N). rotated: rotation_i y_ki, (K, N, D).
+        rotation: shape (N, D, D). precision: shape (N, D).
+        ridge: precision of each column of Z and W2, (F + H,).
+    """
+
+    places: Floats
+    features: Floats
+    weights: Floats
+    rotated: Floats
+    rotation: Floats
+    precision: Floats
+    ridge: Floats
+
+    def loss_and_gradient(self, inner: Floats) -> tuple[float, Floats]:
+        """-Q with the best Z and W2, up to a constant, and its derivative in W1 and b1 (N, H, P + 1)."""
+        design, hidden = self._design(inner)
+        best = self._best(design)
+        missed = self.rotated - np.einsum("knq,ndq->knd", design, best)
+        pulled = missed * (self.weights[:, :, None] * self.precision[None])
+        loss = 0.5 * float((pulled * missed).sum() + (self.ridge * best**2).sum())
+        loss += 0.5 * float((inner**2).sum()) / INNER_DEVIATION**2
+        # The best Z and W2 move with the hidden units, but at the minimum that changes nothing (envelope theorem).
+        outer = best[:, :, self.features.shape[1] :]
+        bent = -np.einsum("knd,ndh->knh", pulled, outer) * hidden * (1.0 - hidden)
+        gradient = np.einsum("knh,kp->nhp", bent, _with_one(self.places)) + inner / INNER_DEVIATION**2
+        return loss, gradient
+
+    def networks(self, inner: Floats) -> StateNetworks:
+        """The best networks with these hidden units."""
+        best: Floats = np.linalg.solve(self.rotation, self._best(self._design(inner)[0])).astype(np.float64)
+        n_features = self.features.shape[1]
+        return StateNetworks(best[..., :n_features].copy(), best[..., n_features:].copy(), inner)
+
+    def improved(self, inner: Floats, steps: int) -> Floats:
+        """W1 and b1 after some steps of a quasi-Newton method, each of which raises Q (generalised EM)."""
+        if inner.size == 0 or steps == 0:
+            return inner
+
+        def flat(values: Floats) -> tuple[float, Floats]:
+            loss, gradient = self.loss_and_gradient(values.reshape(inner.shape))
+            return loss, gradient.ravel()
+
+        found = minimize(flat, inner.ravel(), jac=True, method="L-BFGS-B", options={"maxiter": steps})
+        result: Floats = found.x.reshape(inner.shape)
+        return result if found.fun <= flat(inner.ravel())[0] else inner
+
+    def _design(self, inner: Floats) -> tuple[Floats, Floats]:
+        hidden = hidden_units(inner, self.places)
+        skip = np.broadcast_to(self.features[:, None], (*hidden.shape[:2], self.features.shape[1]))
+        return np.concatenate([skip, hidden], axis=2), hidden
+
+    def _best(self, design: Floats) -> Floats:
+        """Rotated Z and W2, (N, D, F + H)."""
+        weighed = design * self.weights[:, :, None]
+        squares = np.einsum("knp,knq->npq", weighed, design, optimize=True)
+        products = np.einsum("knd,knq->ndq", self.rotated, weighed, optimize=True)
+        penalty = np.diag(self.ridge + 1e-9)
+        if (self.precision == self.precision[:1, :1]).all():
+            alike = self.precision[0, 0] * squares + penalty
+            solved = np.linalg.solve(alike, self.precision[0, 0] * np.swapaxes(products, 1, 2))
+            return np.swapaxes(solved, 1, 2)
+        each = self.precision[:, :, None, None] * squares[:, None] + penalty
+        result: Floats = np.linalg.solve(each, (self.precision[:, :, None] * products)[..., None])[..., 0]
+        return result
+
+
+def hidden_units(inner: Floats, places: Floats) -> Floats:
+    """sigma(W1 u + b1) of all states. Shape (M, N, H)."""
+    result: Floats = expit(np.einsum("nhp,mp->mnh", inner, _with_one(places)))
+    return result
+
+
+def drawn_inner(n_states: int, n_hidden: int, n_components: int, rng: np.random.Generator) -> Floats:
+    """A start: units whose steps lie within the range of theta, the same in all states so that these stay alike."""
+    inner = rng.standard_normal((n_hidden, n_components + 1))
+    inner[:, :-1] *= 3.0 / np.maximum(np.linalg.norm(inner[:, :-1], axis=1, keepdims=True), 1e-9)
+    inner[:, -1] = 3.0 * rng.uniform(-0.8, 0.8, n_hidden)
+    return np.broadcast_to(inner, (n_states, *inner.shape)).copy()
+
+
+def _with_one(places: Floats) -> Floats:
+    return np.concatenate([places, np.ones((len(places), 1))], axis=1)
