@@ -8,7 +8,7 @@ BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
 
-.PHONY: help demo test check ci format setup messages lock benchmark-seeds bare clean
+.PHONY: help demo test check docs ci format setup messages lock benchmark-seeds bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -24,6 +24,9 @@ check: setup ## formatting, lint, types, generated messages
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/python msgs/generate.py --check
+
+docs: setup ## the documentation as HTML in build/docs: all pages, and the API from docstrings
+	@$(BIN)/python docs/build.py $(ARGS)
 
 ci: ## check and test as on a machine that lacks everything; as root it installs Debian packages
 	@.ci/run
@@ -44,7 +47,7 @@ messages: setup ## generates src/paramove/msgs from msgs/*.proto
 lock: ## finds newer versions and writes requirements.lock
 	python3 -m venv build/lock
 	build/lock/bin/python -m pip install --quiet uv
-	build/lock/bin/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade \
+	build/lock/bin/uv pip compile pyproject.toml --extra dev --extra docs --universal --python-version 3.11 --upgrade \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
 	  --output-file requirements.lock
 

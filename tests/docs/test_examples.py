@@ -8,7 +8,8 @@ import pytest
 from tests.docs.markdown import PAGES, ROOT, blocks, files
 from tests.docs.test_commands import ENVIRONMENT
 
-EXAMPLES = [path for path in PAGES if files(path)]
+MARKER = "in the example"
+EXAMPLES = [path for path in PAGES if files(path) or any(block.marker == MARKER for block in blocks(path))]
 
 
 @pytest.fixture(scope="module", params=EXAMPLES, ids=lambda path: path.stem)
@@ -29,7 +30,7 @@ def example(request, tmp_path_factory):
 
 def test_commands_of_the_example_run(example):
     page, root = example
-    marked = [block for block in blocks(page) if block.marker == "in the example"]
+    marked = [block for block in blocks(page) if block.marker == MARKER]
     assert marked, f"{page} shows files, but no command that uses them"
     for block in marked:
         answer = subprocess.run(

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
-from paramove.hmm.sequences import check_length, checked_sequence, checked_sequences
+from paramove.hmm.sequences import checked_sequence, checked_sequences
 from paramove.hmm.synthesis import Path as PathKind
 from paramove.hmm.synthesis import Timing, at_progress
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
+from paramove.phmm.training_checks import check_training
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -125,8 +126,8 @@ class ParametricHMM(ABC):
             raise ValueError(
                 f"theta has one finite row per sequence: expected shape ({len(checked)}, P), found {labels.shape}"
             )
-        for sequence in checked:
-            check_length(len(sequence), self.n_states, self.d_min, self.d_max)
+        floor = self._training_options().floor_deviation
+        check_training(recorded, checked, labels, (self.n_states, self.d_min, self.d_max), floor)
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
         self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
@@ -186,6 +187,12 @@ class ParametricHMM(ABC):
                 raise ValueError(f"{type(self).__name__} has the parameters {known}, found {name!r}")
             setattr(self, name, value)
         return self
+
+    def __sklearn_tags__(self) -> Any:
+        """What scikit-learn's model selection asks, where it is installed: nothing special, but theta is needed."""
+        from sklearn.utils import Tags, TargetTags
+
+        return Tags(estimator_type=None, target_tags=TargetTags(required=True))
 
     def save(self, path: str | Path) -> None:
         """Write the trained model to one .npz file. Raises RuntimeError before training."""
