@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import version
@@ -46,7 +46,6 @@ SOURCES = (
     "paramove.demonstrations.reaching",
     "paramove.demonstrations.synthetic",
     "paramove.evaluation.chapter2.movement",
-    "paramove.evaluation.chapter4.kinds",
     "paramove.evaluation.chapter4.raster",
     "paramove.evaluation.movements.measures:theta_error",
     "paramove.evaluation.movements.measures:covered",
@@ -127,6 +126,8 @@ class Experiment:
     def key(self) -> str:
         """Name of the file of its result: another one for other arguments, code or libraries."""
         parts = [self.group, repr(self.labels), repr(self.arguments), self.measure.__module__]
+        if "name" in self.labels:
+            parts.append(repr(replace(BY_NAME[self.labels["name"]], thesis=None)))
         parts += [code_digest(source) for source in (self.measure.__module__, *SOURCES, *self.sources)]
         parts += [f"{name} {version(name)}" for name in ("numpy", "scipy")]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
@@ -216,4 +217,4 @@ INTERPOLATIVE = modules_behind("paramove.phmm.interpolative")
 
 
 def _sources(name: str) -> tuple[str, ...]:
-    return INTERPOLATIVE if BY_NAME[name].residuals is None else POLYNOMIAL
+    return modules_behind(BY_NAME[name].make.__module__)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from paramove.phmm import CubicPHMM, InterpolativePHMM, LinearPHMM, ParametricHMM, QuadraticPHMM
+from paramove.phmm import CubicPHMM, InterpolativePHMM, LinearPHMM, NeuralPHMM, ParametricHMM, QuadraticPHMM
 
 FRAMES = 100
 RESTRICTIONS = {20: (4, 6), 40: (2, 3), 10: (8, 12)}
@@ -19,14 +18,14 @@ class Kind:
 
     Attributes:
         name: as it is shown.
-        make: an untrained model, given its number of states, least and most frames per state, and `resampled_frames`.
+        make: its class.
         corners: trained on the four corners only: the thesis's "2 x 2".
         residuals: "independent" is the thesis, "correlated" is ours; None for a model that has no choice.
         thesis: what the thesis calls it, if it has it.
     """
 
     name: str
-    make: Callable[..., ParametricHMM]
+    make: type[ParametricHMM]
     corners: bool = False
     residuals: str | None = None
     thesis: str | None = None
@@ -39,7 +38,7 @@ class Kind:
 
 IPHMM_2, IPHMM_3 = "IPHMM 2×2", "IPHMM 3×3"
 LPHMM_2, LPHMM_3 = "LPHMM 2×2", "LPHMM 3×3"
-QPHMM_3, CPHMM_3 = "QPHMM 3×3", "CPHMM 3×3"
+QPHMM_3, CPHMM_3, NPHMM_3 = "QPHMM 3×3", "CPHMM 3×3", "NPHMM 3×3"
 OURS = ", correlated"
 
 KINDS = (
@@ -53,6 +52,7 @@ KINDS = (
     Kind(LPHMM_3 + OURS, LinearPHMM, residuals="correlated"),
     Kind(QPHMM_3 + OURS, QuadraticPHMM, residuals="correlated"),
     Kind(CPHMM_3 + OURS, CubicPHMM, residuals="correlated"),
+    Kind(NPHMM_3, NeuralPHMM),
 )
 BY_NAME = {kind.name: kind for kind in KINDS}
 LINEAR_FIT = (Kind("LPHMM", LinearPHMM, residuals="independent"), 40)
