@@ -7,6 +7,7 @@ import pytest
 
 from paramove.phmm import InterpolativePHMM, LinearPHMM, MovementClassifier, ParametricHMM, QuadraticPHMM
 from tests.cli.conftest import call
+from tests.demonstrations.movements import a_set
 
 QUICK = ("--states", 10, "--frames", 50)
 
@@ -116,6 +117,13 @@ def test_one_theta_teaches_no_dependence(tmp_path):
     said = refused(78, tmp_path / "one", "--out", tmp_path / "a.npz")
     assert "all 4 movements have the same parameters" in said
     assert not (tmp_path / "a.npz").exists()
+
+
+def test_points_are_named(tmp_path):
+    a_set(subjects=("P1",), repetitions=1).write(tmp_path / "set")  # its shoulder never moves
+    said = refused(78, tmp_path / "set", "--out", tmp_path / "a.npz", *QUICK)
+    assert "dimension" not in said
+    assert "sternum_x has the value" in said
 
 
 def test_an_interrupted_training_leaves_nothing(trained, tmp_path, monkeypatch):

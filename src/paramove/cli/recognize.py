@@ -127,7 +127,8 @@ def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
     from paramove.evaluation.models.examining import percent
 
     row: dict[str, Any] = {"": number, "action": facts["action"] or "none"}
-    row["posterior"] = percent(facts["posterior"][facts["most_probable_action"]])
+    if len(facts["posterior"]) > 1:
+        row["posterior"] = percent(facts["posterior"][facts["most_probable_action"]])
     for name, value in facts["theta"].items():
         row[name] = f"{value:.3f} ± {facts['theta_region_95'][name]:.2g}"
     row["typicality"] = None if facts["typicality"] is None else percent(facts["typicality"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -134,7 +135,17 @@ def _trained(
     except InputError:
         raise
     except ValueError as error:
-        raise InputError(f"nothing can be learned so: {error}") from error
+        raise InputError(f"nothing can be learned so: {_with_points(str(error), examples.point_names)}") from error
+
+
+def _with_points(sentence: str, names: tuple[str, ...]) -> str:
+    """The sentence with names of body points for numbers of dimensions."""
+
+    def named(found: re.Match[str]) -> str:
+        point, axis = divmod(int(found[1]), 3)
+        return f"{names[point]}_{'xyz'[axis]}" if point < len(names) else found[0]
+
+    return re.sub(r"dimension (\d+)", named, sentence)
 
 
 def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:

@@ -67,7 +67,7 @@ def _plot_many(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]
     left, right = figure.subplots(1, 2, width_ratios=[1.4, 1.0])
     _plane(left, models, found)
     left.set_title("theta with 95 % regions; crosses: labels; red: not typical", fontsize=10)
-    if table:
+    if len(table) > 1:
         _matrix(right, table, [*models, "none"])
     else:
         _counts(right, found)
