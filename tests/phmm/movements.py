@@ -22,7 +22,7 @@ def wave(theta: np.ndarray, rng: np.random.Generator, n_frames: int = 40) -> np.
         [
             np.sin(np.pi * progress) * theta[0],
             progress * pull + 0.2 * np.sin(2.0 * np.pi * progress) * pull**2,
-            progress + 0.1 * np.sin(np.pi * progress) * theta[-1],
+            progress + 0.5 * np.sin(np.pi * progress) * theta[-1],
         ]
     )
     return points + 0.01 * rng.standard_normal(3) + 0.004 * rng.standard_normal(points.shape)

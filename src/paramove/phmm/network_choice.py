@@ -33,30 +33,34 @@ class Choice:
     inner: Floats
 
 
-def chosen_units(targets: StateTargets, groups: Ints, n_hidden: int | None, n_restarts: int, seed: int) -> Choice:
+def chosen_units(
+    targets: StateTargets, groups: Ints, units: tuple[int | None, int], n_restarts: int, seed: int
+) -> Choice:
     """The best number of units, or the best start for a given one.
 
     Args:
         targets: with the ridge of the skip's columns alone. groups: number of the group of each target, (K,).
+        units: their number, or None and the fewest that there may be.
     """
+    n_hidden, fewest = units
     targets, groups = _condensed(targets, groups)
     rng = np.random.default_rng(seed)
     n_groups = len(np.unique(groups))
     shape = targets.weights.shape[1], targets.places.shape[1]
     if n_hidden is None and n_groups < 4:
-        n_hidden = 0  # nothing says that the rest is not noise
+        n_hidden = fewest  # nothing says that the rest is not noise
     numbers = NUMBERS_OF_UNITS if n_hidden is None else (n_hidden,)
     best = Choice(0, DECAYS[0], np.zeros((shape[0], 0, shape[1] + 1)))
-    least = _left_out_error(targets, groups, best) if n_hidden is None else np.inf
-    for units in numbers if n_hidden != 0 else ():
-        if n_hidden is None and units > 2 * max(1, best.n_hidden):
+    least = _left_out_error(targets, groups, best) if n_hidden is None and fewest == 0 else np.inf
+    for number in numbers if n_hidden != 0 else ():
+        if n_hidden is None and number > 2 * max(1, best.n_hidden):
             break  # half as many were not worth it
-        starts = [drawn_inner(shape[0], units, shape[1], rng) for _ in range(max(1, n_restarts))]
+        starts = [drawn_inner(shape[0], number, shape[1], rng) for _ in range(max(1, n_restarts))]
         for decay in DECAYS:
-            choice, start = _trained(targets, Choice(units, decay, starts[0]), starts)
+            choice, start = _trained(targets, Choice(number, decay, starts[0]), starts)
             # Left-out groups must not be known to the start either, so it is the drawn one again.
             error = _left_out_error(targets, groups, replace(choice, inner=start)) if n_groups > 1 else -decay
-            if error < least * (1.0 - (WORTH if units > best.n_hidden and np.isfinite(least) else 0.0)):
+            if error < least * (1.0 - (WORTH if number > best.n_hidden and np.isfinite(least) else 0.0)):
                 best, least = choice, error
     return best
 

@@ -86,6 +86,10 @@ class NeuralPHMM(ParametricHMM):
                 "skip_degree and n_hidden are not negative, gradient_steps is at least 1, found "
                 f"{self.skip_degree}, {self.n_hidden} and {self.gradient_steps}"
             )
+        if self.skip_degree == 0 and self.n_hidden == 0:
+            raise ValueError(
+                "without hidden units and with skip_degree 0 nothing depends on theta: give n_hidden=None or more"
+            )
         options = self._training_options()
         aligned, polynomial = self._aligned(data, options)
         monomials = _monomials(self.skip_degree, data.theta)
@@ -106,7 +110,8 @@ class NeuralPHMM(ParametricHMM):
             ridge = frames * strengths[monomials.degrees]
         alike = np.broadcast_to(metric, aligned.covariances.shape)
         targets = NetworkPrior(metric, ridge).targets(places, features, found, alike)
-        choice = chosen_units(targets, data.groups, self.n_hidden, self.n_restarts, self.seed)
+        fewest = 1 if self.skip_degree == 0 else 0
+        choice = chosen_units(targets, data.groups, (self.n_hidden, fewest), self.n_restarts, self.seed)
         targets = with_decay(targets, choice)
         begin = NetworkParameters(targets.networks(choice.inner), aligned.covariances, aligned.durations, self.d_min)
         prior = NetworkPrior(metric, targets.ridge)
