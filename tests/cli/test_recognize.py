@@ -76,6 +76,13 @@ def test_models_one_by_one_compete_too(trained, tmp_path):
     assert "both models of 'reaching'" in refused(78, "recognize", trained.table, *twice)
 
 
+def test_models_of_different_kinds_do_not_compete(trained, tmp_path):
+    more = ("--action", "pointing", "--residuals", "independent", "--leave-out", "none")
+    good("train", trained.both, "--out", tmp_path / "pointing.npz", *more)
+    said = refused(78, "recognize", trained.table, "--model", trained.model, "--model", tmp_path / "pointing.npz")
+    assert "models that compete are of one kind" in said
+
+
 def test_beginnings(trained, tmp_path):
     for number, keep in enumerate((40, 2)):
         rows = good("synthesize", trained.model, "--theta", THETA).splitlines()

@@ -14,6 +14,7 @@ from paramove.demonstrations import DemonstrationError, Movement
 from paramove.demonstrations.body_frame import BODY, in_body_frame, mirrored
 from paramove.demonstrations.timing import resampled
 from paramove.evaluation.models.drawing import bounds, parameter_names
+from paramove.evaluation.models.kinds import kind_of
 from paramove.evaluation.models.leaving_out import REGION, covers
 from paramove.input_error import InputError
 from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
@@ -103,6 +104,12 @@ class Examiner:
                         f"models that compete have the same {what.replace('_', ' ')}: {self._about[0].action} has "
                         f"{one}, {about.action} has {other}; train them from one set"
                     )
+        scored = {_scored_by(model) for model in self.models.values()}
+        if len(scored) > 1:
+            raise InputError(
+                "models that compete are of one kind: all with correlated residuals, or all with the same states and "
+                f"frames; found {'; '.join(sorted(kind_of(model) for model in self.models.values()))}"
+            )
 
     def prepared(self, movement: Movement) -> Movement:
         """The movement with the points of the models, in their frame and at their rate.
@@ -160,6 +167,11 @@ class Examiner:
 def tells_typical(model: ParametricHMM) -> bool:
     """Whether a model knows how performances vary, and so which movements are untypical."""
     return getattr(model, "performances_", None) is not None
+
+
+def _scored_by(model: ParametricHMM) -> tuple[object, ...]:
+    """What has to be the same for the scores of two models to be comparable."""
+    return ("typicality",) if tells_typical(model) else (model.n_states, model.resampled_frames)
 
 
 def percent(share: float) -> str:
