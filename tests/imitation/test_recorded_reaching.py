@@ -26,6 +26,10 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of recordings, made up, with the actions that are asked for."""
     folder = tmp_path / "data"
     write_table(folder)
+    with np.load(folder / NAME / "data.npz") as file:
+        arrays = dict(file)
+    arrays["flat"] += np.random.default_rng(1).normal(0.0, 1.0, arrays["flat"].shape).astype(np.float32)  # mm
+    np.savez(folder / NAME / "data.npz", **arrays)
     monkeypatch.setenv("PARAMOVE_DATA", str(folder))
     monkeypatch.setattr(recorded_reaching, "ACTIONS", ("forward",))
     monkeypatch.setattr(recorded_reaching, "N_STATES", 10)
@@ -33,43 +37,43 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_is_trained_once_and_kept(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = people_model(NAME, 1, tmp_path)
+    first = people_model(NAME, tmp_path)
     assert first.description is not None
     assert (first.description.arrival, first.description.frame, first.degree) == (1.0, "body", 1)
-    assert "table_reach, forward, degree 1" in first.description.source
-    assert [path.name for path in tmp_path.glob("*.npz")] == ["reaching_table_reach_1.npz"]
+    assert "table_reach, forward, version" in first.description.source
+    assert [path.name for path in tmp_path.glob("*.npz")] == ["reaching_table_reach.npz"]
 
     def trained(*_: object, **__: object) -> None:
         raise InterruptedError("trained again")
 
     monkeypatch.setattr(recorded_reaching, "train_people_model", trained)
-    np.testing.assert_array_equal(people_model(NAME, 1, tmp_path).coefficients_, first.coefficients_)
+    np.testing.assert_array_equal(people_model(NAME, tmp_path).coefficients_, first.coefficients_)
     (recorded / NAME / "data.npz").unlink()  # the kept model serves where there are no recordings any more
-    np.testing.assert_array_equal(people_model(NAME, 1, tmp_path).coefficients_, first.coefficients_)
+    np.testing.assert_array_equal(people_model(NAME, tmp_path).coefficients_, first.coefficients_)
 
 
 def test_other_recordings_and_a_damaged_file_train_again(
     recorded: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    first = people_model(NAME, 1, tmp_path)
-    kept = tmp_path / "reaching_table_reach_1.npz"
+    first = people_model(NAME, tmp_path)
+    kept = tmp_path / "reaching_table_reach.npz"
     kept.write_bytes(kept.read_bytes()[:3000])
-    again = people_model(NAME, 1, tmp_path)
+    again = people_model(NAME, tmp_path)
     assert "training again, the cached model does not fit" in caplog.text
     assert first.description == again.description
     with (recorded / NAME / "data.npz").open("ab") as file:
         file.write(b"\0")
-    other = people_model(NAME, 1, tmp_path)
+    other = people_model(NAME, tmp_path)
     assert other.description is not None
     assert first.description is not None
     assert other.description.source != first.description.source
-    assert people_model(NAME, 1, None).description == other.description
+    assert people_model(NAME, None).description == other.description
 
 
 def test_without_recordings_it_is_told_what_would_help(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PARAMOVE_DATA", str(tmp_path / "none"))
     with pytest.raises(ModelFileError, match=r"'table_reach' is trained from recorded people: .*Remedy: put the") as no:
-        people_model(NAME, 1, tmp_path)
+        people_model(NAME, tmp_path)
     assert no.value.missing
     assert "PARAMOVE_DATA" in str(no.value)
     assert "synthesizer.movement.file" in str(no.value)
@@ -80,7 +84,7 @@ def test_recordings_of_something_else_are_refused(recorded: Path, monkeypatch: p
     with pytest.raises(
         ModelFileError, match=r"table_reach has the actions .*; found \['juggling'\]. Remedy"
     ) as refusal:
-        people_model(NAME, 1, None)
+        people_model(NAME, None)
     assert not refusal.value.missing
 
 

@@ -68,12 +68,12 @@ def test_a_file_and_a_model_are_too_much() -> None:
         MovementSource(file=Path("one.npz"), model="table_reach")
 
 
-def test_the_named_model_is_asked_for_with_its_degree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_named_model_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[object] = []
     monkeypatch.setattr(setup, "user_cache_path", lambda name: tmp_path / name)
     monkeypatch.setattr(setup, "people_model", lambda *arguments: asked.append(arguments))
-    MovementSource(model="table_reach", degree=2).trained()
-    assert asked == [("table_reach", 2, tmp_path / "paramove")]
+    MovementSource(model="table_reach").trained()
+    assert asked == [("table_reach", tmp_path / "paramove")]
     with pytest.raises(ValidationError, match="Input should be 'synthetic' or 'table_reach'"):
         MovementSource.model_validate({"model": "table_tennis"})
 

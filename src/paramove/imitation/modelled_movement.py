@@ -148,8 +148,8 @@ class ModelledMovement(ReachingMovement):
         description = self._model.description or MovementDescription()
         return (
             f"no movement of the model {description.action!r} brings the gripper to ({x:.1f}, {y:.1f}, {z:.1f}) cm, "
-            f"the nearest is {100 * missed:.1f} cm beside it; its training reached no such place: a linear model "
-            "(movement.degree 1) extrapolates farther"
+            f"the nearest is {100 * missed:.1f} cm beside it; its training reached no such place, and a linear "
+            "model extrapolates farther than others"
         )
 
     def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:

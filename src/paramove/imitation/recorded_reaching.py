@@ -26,21 +26,21 @@ REMEDY = (
 VERSION = 1  # raise it when the same recordings shall give another model: cached models then train again
 
 
-def people_model(name: str, degree: int, cache_folder: Path | None) -> PolynomialPHMM:
-    """The model of the data set `name`, trained once and kept in `cache_folder`.
+def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
+    """The linear model of the data set `name`, trained once and kept in `cache_folder`.
 
     The kept one is used as long as it was trained from the recordings that are there, or if there are none any more.
 
     Raises:
         ModelFileError: There are neither recordings nor a kept model, or the recordings do not suit; with the remedy.
     """
-    cache = None if cache_folder is None else cache_folder / f"reaching_{name}_{degree}.npz"
+    cache = None if cache_folder is None else cache_folder / f"reaching_{name}.npz"
     kept = _kept(cache)
     try:
-        source = f"{name}, {', '.join(ACTIONS)}, degree {degree}, version {VERSION}, sha256 {_digest(name)}"
+        source = f"{name}, {', '.join(ACTIONS)}, version {VERSION}, sha256 {_digest(name)}"
         if kept is not None and kept.description is not None and kept.description.source == source:
             return kept
-        model = train_people_model(load_recordings(name), degree=degree, actions=ACTIONS, n_states=N_STATES)
+        model = train_people_model(load_recordings(name), actions=ACTIONS, n_states=N_STATES)
     except RecordingsError as error:
         if kept is not None:
             return kept

@@ -28,7 +28,7 @@ class MovementSource(BaseModel):
     """Where the reaching movement comes from: a `file`, or a `model` that is trained when it is first asked for.
 
     `synthetic`: demonstrations of the synthetic demonstrator with that `seed`. `table_reach`: recorded people that
-    reach for places on a table; `degree` 1 linear, 2 quadratic.
+    reach for places on a table.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -36,7 +36,6 @@ class MovementSource(BaseModel):
     file: Path | None = None
     model: Literal["synthetic", "table_reach"] = "synthetic"
     seed: int = 0
-    degree: Literal[1, 2] = 1
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -50,7 +49,7 @@ class MovementSource(BaseModel):
             return load_reaching_model(self.file)
         cache = _cache_folder()
         if self.model == "table_reach":
-            return people_model(self.model, self.degree, cache)
+            return people_model(self.model, cache)
         if cache is None:
             return train_reaching_model(self.seed)
         return train_reaching_model(self.seed, cache=cache / f"reaching_{self.seed}.npz")
