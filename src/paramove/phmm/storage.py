@@ -24,7 +24,8 @@ Floats = NDArray[np.float64]
 FORMAT_VERSION = 1
 MOST_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""
-MOST_ARRAYS = 100
+MOST_ARRAYS = 500
+"""Every modelled beginning has seven; of movements of a minute there are 25."""
 _DAMAGED = (
     ValueError, OSError, EOFError, LookupError, NotImplementedError, RuntimeError, OverflowError, SyntaxError,
     TypeError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
