@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 from scipy.special import expit
 
 Floats = NDArray[np.float64]
 
 INNER_DEVIATION = 3.0
 """Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""
+MEMORY, MOST_HALVINGS = 10, 12
 
 
 @dataclass(frozen=True)
@@ -96,13 +96,29 @@ class StateTargets:
         if inner.size == 0 or steps == 0:
             return inner
 
-        def flat(values: Floats) -> tuple[float, Floats]:
-            loss, gradient = self.loss_and_gradient(values.reshape(inner.shape))
-            return loss, gradient.ravel()
-
-        found = minimize(flat, inner.ravel(), jac=True, method="L-BFGS-B", options={"maxiter": steps})
-        result: Floats = found.x.reshape(inner.shape)
-        return result if found.fun <= flat(inner.ravel())[0] else inner
+        best, loss, gradient = inner, *self.loss_and_gradient(inner)
+        moves: list[tuple[Floats, Floats]] = []
+        for _ in range(steps):
+            direction = -_newton_like(gradient, moves)
+            descent = float((direction * gradient).sum())
+            if not descent < 0.0:
+                break
+            share = 1.0 if moves else min(1.0, 1.0 / float(np.abs(gradient).max()))
+            for _ in range(MOST_HALVINGS):
+                tried = best + share * direction
+                found, slope = self.loss_and_gradient(tried)
+                if found <= loss + 1e-4 * share * descent:
+                    break
+                share *= 0.5
+            else:
+                break
+            gained = loss - found
+            if float(((tried - best) * (slope - gradient)).sum()) > 0.0:
+                moves = [*moves[1 - MEMORY :], (tried - best, slope - gradient)]
+            best, loss, gradient = tried, found, slope
+            if gained < 1e-9 * max(1.0, abs(loss)):
+                break
+        return best
 
     def _design(self, inner: Floats) -> tuple[Floats, Floats]:
         hidden = hidden_units(inner, self.places)
@@ -122,6 +138,25 @@ class StateTargets:
         each = self.precision[:, :, None, None] * squares[:, None] + penalty
         result: Floats = np.linalg.solve(each, (self.precision[:, :, None] * products)[..., None])[..., 0]
         return result
+
+
+def _newton_like(gradient: Floats, moves: list[tuple[Floats, Floats]]) -> Floats:
+    """The gradient times the inverse curvature that the last moves tell of (limited-memory BFGS).
+
+    scipy's takes many times as long where its threads have to wait for processors.
+    """
+    result = gradient.copy()
+    shares = []
+    for moved, changed in reversed(moves):
+        share = float((moved * result).sum() / (moved * changed).sum())
+        shares.append(share)
+        result -= share * changed
+    if moves:
+        moved, changed = moves[-1]
+        result *= float((moved * changed).sum() / (changed * changed).sum())
+    for (moved, changed), share in zip(moves, reversed(shares), strict=True):
+        result += (share - float((changed * result).sum() / (moved * changed).sum())) * moved
+    return result
 
 
 def hidden_units(inner: Floats, places: Floats) -> Floats:
