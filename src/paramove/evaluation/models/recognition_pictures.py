@@ -84,7 +84,7 @@ def _plane(axes: Axes, models: Mapping[str, ParametricHMM], found: Sequence[Reco
     for number, one in enumerate(found):
         colour = colours[one.action] if one.known else WARN
         if len(chosen) == 2:
-            _place(axes, one, chosen, colour)
+            _place(axes, one, chosen, colour, alpha=min(0.18, 6.0 / len(found)))
         else:
             _interval(axes, one, number, colour)
     names = found[0].parameter_names
@@ -104,9 +104,9 @@ def _plane(axes: Axes, models: Mapping[str, ParametricHMM], found: Sequence[Reco
     axes.grid(alpha=0.3)
 
 
-def _place(axes: Axes, one: Recognition, chosen: list[int], colour: Any) -> None:
+def _place(axes: Axes, one: Recognition, chosen: list[int], colour: Any, alpha: float) -> None:
     place = one.estimate.theta[chosen]
-    add_ellipse(axes, place, one.estimate.covariance[np.ix_(chosen, chosen)], colour, alpha=0.18, lw=0)
+    add_ellipse(axes, place, one.estimate.covariance[np.ix_(chosen, chosen)], colour, alpha=alpha, lw=0)
     axes.plot(*place, "o", color=colour, markersize=4)
     if one.labelled is not None:
         label = one.labelled[chosen]
