@@ -33,6 +33,7 @@ MEASURES = (
     *("theta_pointing", "theta_reaching", "theta", "covered", "correct"),
     *UNTYPICAL,
 )
+SHARES = ("covered", "correct", *UNTYPICAL)
 
 
 class Interval(NamedTuple):
@@ -44,14 +45,15 @@ class Interval(NamedTuple):
     seeds: int
 
 
-def over_seeds(values: Iterable[float]) -> Interval:
-    """From one value per seed."""
+def over_seeds(values: Iterable[float], *, share: bool = False) -> Interval:
+    """From one value per seed; the interval of shares ends at 0 and 1."""
     each = np.array(list(values))
     mean, count = float(each.mean()), len(each)
     if count < 2:
         return Interval(mean, float("nan"), float("nan"), count)
     half = float(student.ppf(0.975, count - 1) * each.std(ddof=1) / np.sqrt(count))
-    return Interval(mean, mean - half, mean + half, count)
+    low, high = (max(0.0, mean - half), min(1.0, mean + half)) if share else (mean - half, mean + half)
+    return Interval(mean, low, high, count)
 
 
 def of_group(results: Results, group: str, **labels: Any) -> list[dict[str, Any]]:
@@ -88,7 +90,9 @@ def _models(results: Results) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "states": states,
-                **{measure: over_seeds(one[measure] for one in each) for measure in MEASURES},
+                **{
+                    measure: over_seeds((one[measure] for one in each), share=measure in SHARES) for measure in MEASURES
+                },
                 **{name: over_seeds(one["seconds"][name] for one in own) for name in ("fit", "classify")},
             }
         )
