@@ -111,12 +111,12 @@ def likelihoods(figure: Figure, values: Mapping[str, Sequence[float]], found: Ma
 
 
 def noise(figure: Figure, found: Mapping[str, Mapping[str, Any]]) -> None:
-    """Error of theta over the noise that is added."""
+    """Error of theta over the noise that is added; what is beyond 10 cm is not shown."""
     axes = figure.subplots()
     for number, (name, values) in enumerate(found.items()):
         x = [float(key) for key in values]
         _with_interval(axes, x, list(values.values()), number, name)
-    axes.set(xlabel="standard deviation of the noise per component, cm", ylabel="error of θ, cm", ylim=(0.0, None))
+    axes.set(xlabel="standard deviation of the noise per component, cm", ylabel="error of θ, cm", ylim=(0.0, 10.0))
     axes.legend(fontsize=8)
 
 
