@@ -127,7 +127,7 @@ def _synthesis(surfaces: Mapping[str, Floats]) -> list[Finding]:
                 "figure 4.14 a, d",
                 "within the region: 2×2 IPHMM up to 3.5 cm, 3×3 LPHMM about 2.5 cm, 3×3 IPHMM best",
                 f"mean within: {inner[IPHMM_2]:.1f}, {inner[LPHMM_3]:.1f} and {inner[IPHMM_3]:.1f} cm",
-                _verdict(order, abs(inner[LPHMM_3] - 2.5) < 0.7),
+                _verdict(order, abs(inner[LPHMM_3] - 2.5) < 0.7, inner[IPHMM_2] < 3.5),
             )
         )
     return found
