@@ -154,7 +154,7 @@ def test_files_are_small():
 
 
 def test_lock_pins_every_dependency_with_hashes():
-    lock = (ROOT / "requirements.lock").read_text()
+    lock = "".join((ROOT / name).read_text() for name in ("requirements.lock", "requirements-peers.lock"))
     pinned = {match.lower() for match in re.findall(r"^([A-Za-z0-9_.-]+)==\S+", lock, re.M)}
     project = (ROOT / "pyproject.toml").read_text()
     wanted = set(re.findall(r'^    "([A-Za-z0-9_.-]+)[><=]', project, re.M)) | {"hatchling"}

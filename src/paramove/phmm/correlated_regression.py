@@ -9,7 +9,6 @@ shrunk, and how far regions of theta must be widened to hold what they promise.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -20,16 +19,14 @@ from scipy.linalg import solve_triangular
 from scipy.stats import chi2, norm
 
 from paramove.phmm.features import Monomials
+from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-STRENGTHS = 10.0 ** np.arange(-4.5, 1.1, 0.5)
-"""Candidates for the ridge of each degree, as a share of the number of movements."""
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""
 MOST_FOLDS = 10
-MOST_ROUNDS = 4
 LEAST_SHARE = 0.02
 """Standard deviations below this share of the mean one are lifted to it: they are known no better."""
 NEWTON_STEPS = 12
@@ -69,7 +66,7 @@ class CorrelatedRegression:
         """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
         features, degrees = monomials.at(theta), monomials.degrees
         ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
-        penalty = _penalties(ridge, degrees, len(y))
+        penalty = penalties(ridge, degrees, len(y))
         solved = np.linalg.solve(features.T @ features + penalty, features.T @ y)
         coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as a file gives it back
         left_out = residuals_left_out(y, features, penalty, groups)
@@ -83,12 +80,6 @@ class CorrelatedRegression:
         covariance = _shrunk(left_out / deviation, shrinkage)
         root: Floats = deviation[:, None] * np.linalg.cholesky(covariance)
         return replace(start, root=root, inflation=inflation, distances=distances, shrinkage=shrinkage)
-
-    def smoothed(self, features: Floats, values: Floats) -> Floats:
-        """Coefficients (m, F) of other values (K, m) of the same movements, with the same ridge."""
-        penalty = _penalties(self.ridge, self.monomials.degrees, len(values))
-        solved = np.linalg.solve(features.T @ features + penalty, features.T @ values)
-        return np.ascontiguousarray(solved.T, dtype=np.float64)
 
     def mean(self, theta: Floats) -> Floats:
         """Z phi(theta). Shape (n,)."""
@@ -194,64 +185,6 @@ class CorrelatedRegression:
             if gained < 1e-9 * (1.0 + misfit):
                 break
         return place, misfit
-
-
-def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
-    """What a regression without a movement's group misses of it, for all at once. Shape (K, n)."""
-    hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
-    residuals: Floats = y - hat @ y
-    if len(np.unique(groups)) < 2:
-        widened: Floats = residuals * float(np.sqrt(len(y) / max(1.0, len(y) - np.trace(hat))))
-        return widened
-    result = np.empty_like(residuals)
-    for members in _members(groups):
-        own = np.eye(len(members)) - hat[np.ix_(members, members)]
-        own += 1e-9 * np.eye(len(members))
-        result[members] = np.linalg.solve(own, residuals[members])
-    return result
-
-
-def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints) -> tuple[float, ...]:
-    """The ridge per degree, as a share of the number of movements, that predicts left-out groups best.
-
-    One degree after the other, until none changes; a higher degree is never held back less than a lower one.
-    """
-    ridge = tuple(float(STRENGTHS[min(3 + 2 * degree, len(STRENGTHS) - 1)]) for degree in range(int(degrees.max())))
-    if len(np.unique(groups)) < 3:
-        return ridge
-    known: dict[tuple[float, ...], float] = {}
-
-    def error(candidate: tuple[float, ...]) -> float:
-        if candidate not in known:
-            penalty = _penalties(candidate, degrees, len(y))
-            squared = (residuals_left_out(y, features, penalty, groups) ** 2).sum(axis=0)
-            # Logarithms: a fingertip that is a millimetre off at the target counts as one that is a centimetre off
-            # on the way.
-            known[candidate] = float(np.log(squared + 1e-12).mean())
-        return known[candidate]
-
-    for _ in range(MOST_ROUNDS):
-        before = ridge
-        for place in range(len(ridge)):
-            allowed: list[tuple[float, ...]] = [
-                (*ridge[:place], float(strength), *ridge[place + 1 :])
-                for strength in STRENGTHS
-                if strength >= max(ridge[:place], default=0.0) and strength <= min(ridge[place + 1 :], default=np.inf)
-            ]
-            ridge = min(allowed, key=error)
-        if ridge == before:
-            break
-    return ridge
-
-
-def _penalties(ridge: tuple[float, ...], degrees: Ints, count: int) -> Floats:
-    strengths = np.array([0.0, *ridge])
-    return np.diag(count * strengths[degrees] + 1e-12)
-
-
-def _members(groups: Ints) -> Iterator[Ints]:
-    for group in np.unique(groups):
-        yield np.flatnonzero(groups == group)
 
 
 @dataclass(frozen=True)

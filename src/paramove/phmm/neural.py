@@ -13,7 +13,6 @@ from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
 from paramove.hmm.training import equal_segments
 from paramove.phmm import search_kernels
-from paramove.phmm.correlated_regression import chosen_ridge, residuals_left_out
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
@@ -23,6 +22,7 @@ from paramove.phmm.networks import StateNetworks, hidden_units
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity
 from paramove.phmm.regression import RegressedParameters, train_regressed
+from paramove.phmm.ridge import chosen_ridge, residuals_left_out
 
 Floats = NDArray[np.float64]
 

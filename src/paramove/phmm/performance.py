@@ -163,16 +163,17 @@ def state_averages(evaluator: Evaluator, sequence: Floats) -> tuple[Floats, Floa
     return (gamma.T @ sequence) / weights[:, None], weights
 
 
-def part_averages(averages: Floats, weights: Floats) -> Floats:
-    """Mean of the frames in each of at most ten parts of the movement, each of several states. Shape (10 D,).
+def part_averages(averages: Floats, weights: Floats, sequence: Floats) -> Floats:
+    """Mean of the frames in each of at most ten parts of the movement, each of several states, and the last frame.
 
-    Correlations between many states would have to be learned from few movements, and they say the same many times.
+    Correlations between many states would have to be learned from few movements, and they say the same many times. The
+    last frame is there since movements end where theta says, more exactly than they get there. Shape (11 D,).
     """
     n_parts = min(MOVEMENT_PARTS, len(averages))
     begins = np.arange(n_parts) * len(averages) // n_parts
     sums = np.add.reduceat(averages * weights[:, None], begins, axis=0)
-    result: Floats = sums / np.add.reduceat(weights, begins)[:, None]
-    return result.ravel()
+    parts = sums / np.add.reduceat(weights, begins)[:, None]
+    return np.concatenate([parts, sequence[-1:]]).ravel()
 
 
 def beginning_lengths(lengths: Ints) -> list[int]:

@@ -20,6 +20,7 @@ from paramove.phmm.local_models import check_local_models
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance import Performances, beginning_features, part_averages, state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
+from paramove.phmm.ridge import smoothed
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class PolynomialPHMM(ParametricHMM):
         description: MovementDescription | None = None,
         smoothness: float | None = 0.05,
         residuals: Residuals = "correlated",
-        search_margin: float = 0.25,
+        search_margin: float = 1.0,
     ) -> None:
         super().__init__(
             n_states, d_min, d_max, options=options, resampled_frames=resampled_frames, description=description
@@ -117,7 +118,8 @@ class PolynomialPHMM(ParametricHMM):
         if self.residuals == "correlated":
             averages, performances = self._performances(data, trained, monomials)
             if self.smoothness is not None:
-                coefficients = performances.complete.smoothed(features, averages).reshape(coefficients.shape)
+                found = smoothed(features, monomials.degrees, averages, data.groups)
+                coefficients = found.reshape(coefficients.shape)
                 trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances
@@ -131,7 +133,7 @@ class PolynomialPHMM(ParametricHMM):
             state_averages(replace(common, means=trained.coefficients @ monomials.at(theta)), sequence)
             for sequence, theta in zip(data.sequences, data.theta, strict=True)
         ]
-        parts = np.stack([part_averages(*one) for one in found])
+        parts = np.stack([part_averages(*one, x) for one, x in zip(found, data.sequences, strict=True)])
         averages = np.stack([one.ravel() for one, _ in found])
         return averages, Performances.fitted(parts, data.recorded, data.theta, monomials, data.groups)
 
@@ -201,7 +203,7 @@ class PolynomialPHMM(ParametricHMM):
         regression = self.performances_.complete
         for _ in range(REALIGNMENTS):
             evaluator = replace(self._whitened()[0], means=self.state_means(theta))
-            parts = part_averages(*state_averages(evaluator, checked))
+            parts = part_averages(*state_averages(evaluator, checked), checked)
             theta, covariance, distance = regression.estimate(parts, self.search_margin)
         value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, *prepared)
         density = regression.log_density(parts, distance)
