@@ -120,8 +120,8 @@ class Evaluator:
     ) -> Floats:
         """Log-likelihood of each sequence, shape (K,).
 
-        Writes the responsibilities within the feasible windows to gamma (N, frames), adds to counts (N, d_max). Sequences
-        may have means of their own, (K, N, D).
+        Writes the responsibilities within the feasible windows to gamma (N, frames), adds to counts (N, d_max).
+        Sequences may have means of their own, (K, N, D).
         Raises ValueError naming a sequence whose likelihood is zero, since there are no responsibilities then; `before`
         sequences are in other stacks.
         """
