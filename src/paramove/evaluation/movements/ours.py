@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,12 @@ from paramove.evaluation.movements.method import (
     NotAble,
 )
 from paramove.evaluation.movements.sweep import Row
+from paramove.hmm import TrainingOptions
 from paramove.phmm import LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
 
 Floats = NDArray[np.float64]
+FLOOR_M = 1e-4
+"""Recordings may hold a point that never moves: nothing is known better than to a tenth of a millimetre."""
 SOURCES = ("paramove.evaluation.movements.ours", "paramove.phmm", "paramove.hmm")
 
 
@@ -67,12 +71,11 @@ class Models(NotAble):
 
 def our_rows() -> list[Row]:
     """All rows of this project."""
+    common: dict[str, Any] = {"resampled_frames": FRAMES, "options": TrainingOptions(floor_deviation=FLOOR_M)}
     kinds: dict[str, Callable[[], ParametricHMM]] = {
-        "paramove, quadratic PHMM": partial(QuadraticPHMM, resampled_frames=FRAMES),
-        "paramove, linear PHMM": partial(LinearPHMM, resampled_frames=FRAMES),
-        "paramove, quadratic PHMM as in the thesis": partial(
-            QuadraticPHMM, resampled_frames=FRAMES, residuals="independent"
-        ),
+        "paramove, quadratic PHMM": partial(QuadraticPHMM, **common),
+        "paramove, linear PHMM": partial(LinearPHMM, **common),
+        "paramove, quadratic PHMM as in the thesis": partial(QuadraticPHMM, residuals="independent", **common),
     }
     return [Row(name, _maker(make), repr(make), SOURCES, ours=True) for name, make in kinds.items()]
 
