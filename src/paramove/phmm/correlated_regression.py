@@ -16,10 +16,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.stats import chi2, norm
+from scipy.special import log_ndtr
+from scipy.stats import chi2
 
 from paramove.phmm.features import Monomials
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
+from paramove.phmm.search_kernels import nearest
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,16 +97,11 @@ class CorrelatedRegression:
         """
         right, triangle, rest = self._condensed(y)
         bound = 1.0 + 2.0 * margin
-        starts = [np.zeros(len(self.monomials.centre))]
-        if self.monomials.degrees.max() > 1:
-            starts += [np.array(corner) for corner in product((-0.5, 0.5), repeat=len(starts[0]))]
-        begin = min(starts, key=lambda place: self._misfit(place, right, triangle))
-        place, misfit = self._minimised(begin, right, triangle, bound)
-        slopes = triangle @ self._slopes(place)
+        place, misfit, slopes = nearest(self._starts, bound, self.monomials.exponents, right, triangle, NEWTON_STEPS)
         information = slopes.T @ slopes + np.eye(len(place)) / bound**2
         scale = self.monomials.scale
         covariance = self.inflation * np.linalg.inv(information) * np.outer(scale, scale)
-        return self.monomials.centre + scale * place, covariance, misfit + rest
+        return self.monomials.centre + scale * place, covariance, float(misfit) + rest
 
     def log_density(self, y: Floats, distance: float) -> float:
         """Logarithm of the density of y (n,) at a squared Mahalanobis distance."""
@@ -119,7 +116,7 @@ class CorrelatedRegression:
         if len(self.distances) < 2:
             return 0.0
         known = np.log(self.distances + 1e-9)
-        return float(norm.logsf((np.log(distance + 1e-9) - known.mean()) / max(float(known.std()), 1e-3)))
+        return float(log_ndtr(-(np.log(distance + 1e-9) - known.mean()) / max(float(known.std()), 1e-3)))
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
@@ -156,35 +153,15 @@ class CorrelatedRegression:
         """Q and R of L^-1 Z = Q R."""
         white = solve_triangular(self.root, self.coefficients, lower=True)
         basis, triangle = np.linalg.qr(white)
-        return basis, triangle
+        return basis, np.ascontiguousarray(triangle)
 
-    def _slopes(self, place: Floats) -> Floats:
-        return self.monomials.jacobian(self.monomials.centre + self.monomials.scale * place) * self.monomials.scale
-
-    def _misfit(self, place: Floats, right: Floats, triangle: Floats) -> float:
-        difference = right - triangle @ self.monomials.at(self.monomials.centre + self.monomials.scale * place)
-        return float(difference @ difference)
-
-    def _minimised(self, place: Floats, right: Floats, triangle: Floats, bound: float) -> tuple[Floats, float]:
-        """Gauss-Newton with halved steps, within the bounds."""
-        misfit = self._misfit(place, right, triangle)
-        for _ in range(NEWTON_STEPS):
-            at = self.monomials.at(self.monomials.centre + self.monomials.scale * place)
-            slopes = triangle @ self._slopes(place)
-            matrix = slopes.T @ slopes
-            matrix += 1e-9 * (np.trace(matrix) + 1e-300) * np.eye(len(place))
-            step = np.linalg.solve(matrix, slopes.T @ (right - triangle @ at))
-            for share in (1.0, 0.5, 0.2, 0.05):
-                candidate = np.clip(place + share * step, -bound, bound)
-                found = self._misfit(candidate, right, triangle)
-                if found < misfit:
-                    break
-            else:
-                break
-            gained, place, misfit = misfit - found, candidate, found
-            if gained < 1e-9 * (1.0 + misfit):
-                break
-        return place, misfit
+    @cached_property
+    def _starts(self) -> Floats:
+        """Where theta is looked for: the middle, and half-way to the corners if means are not linear. Shape (S, P)."""
+        middle = np.zeros((1, len(self.monomials.centre)))
+        if self.monomials.degrees.max() == 1:
+            return middle
+        return np.concatenate([middle, list(product((-0.5, 0.5), repeat=middle.shape[1]))])
 
 
 @dataclass(frozen=True)

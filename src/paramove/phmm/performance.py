@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm
+from scipy.special import log_ndtr
 
 from paramove.hmm import resample
 from paramove.hmm.estimation import Evaluator
@@ -105,7 +105,7 @@ class Performances:
             self.complete.distances, self.pace.distances, self.complete.distances, self.pace.distances
         ))  # fmt: skip
         deviation = max(float(known.std()), 1e-3) if len(known) > 1 else np.inf
-        return float(norm.logsf((np.log(strangeness) - known.mean()) / deviation))
+        return float(log_ndtr(-(np.log(strangeness) - known.mean()) / deviation))
 
     def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
         """The longest modelled beginning of at most so many frames. Raises ValueError where that is too short."""

@@ -169,8 +169,10 @@ class PolynomialPHMM(ParametricHMM):
         With correlated ones that is where the states are found; theta then follows from their averages. A beginning
         (`finished=False`) has the frame rate of the training; its log-likelihood is that of `beginning_features`.
         """
-        if self.performances_ is not None or not finished:
-            return self.examine(sequence, finished=finished).estimate
+        if not finished:
+            return self.examine(sequence, finished=False).estimate
+        if self.performances_ is not None:
+            return self._refined(self._checked(sequence), self.performances_)[0]
         prepared = self._prepared(self._checked(sequence))
         best, value = self._likeliest(prepared)
         information = search_kernels.information_at(best, *prepared)
@@ -196,20 +198,25 @@ class PolynomialPHMM(ParametricHMM):
             found = ParameterEstimate(theta, covariance, density)
             return Examination(found, strangeness, density, regression.log_typicality(distance))
         recorded = checked_sequence(sequence, self.covariances_.shape[-1])
-        checked = self._checked(recorded)
+        found, parts, distance = self._refined(self._checked(recorded), self.performances_)
+        strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
+        density = self.performances_.complete.log_density(parts, distance)
+        return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
+
+    def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats, float]:
+        """Estimate by whole performances, the parts of this one, and their squared Mahalanobis distance there.
+
+        The likeliest theta tells where the states are; theta from their averages then moves the states a little.
+        """
         prepared = self._prepared(checked)
         place, _ = self._likeliest(prepared)
         theta = self.monomials_.centre + self.monomials_.scale * place
-        regression = self.performances_.complete
         for _ in range(REALIGNMENTS):
             evaluator = replace(self._whitened()[0], means=self.state_means(theta))
             parts = part_averages(*state_averages(evaluator, checked), checked)
-            theta, covariance, distance = regression.estimate(parts, self.search_margin)
+            theta, covariance, distance = performances.complete.estimate(parts, self.search_margin)
         value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, *prepared)
-        density = regression.log_density(parts, distance)
-        strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
-        found = ParameterEstimate(theta, covariance, float(value))
-        return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
+        return ParameterEstimate(theta, covariance, float(value)), parts, distance
 
     @property
     def _widest(self) -> float:

@@ -225,3 +225,42 @@ def information_at(
         )
         hessian[p] = (down - up) / (2.0 * width)
     return 0.5 * (hessian + hessian.T)
+
+
+@compiled
+def nearest(
+    starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, most_steps: int
+) -> tuple[Floats, float, Floats]:
+    """The place u within +-bound with the least |right - triangle phi(u)|^2, that sum, and triangle dphi/du there.
+
+    Gauss-Newton with shorter steps where a whole one leads up, from the best of the starts (S, P).
+    """
+    n_features, n_components = exponents.shape
+    features, slopes = np.empty(n_features), np.empty((n_features, n_components))
+    place, misfit = starts[0].copy(), np.inf
+    for s in range(len(starts)):
+        monomials_at(starts[s], exponents, features, slopes)
+        found = ((right - triangle @ features) ** 2).sum()
+        if found < misfit:
+            place, misfit = starts[s].copy(), found
+    for _ in range(most_steps):
+        monomials_at(place, exponents, features, slopes)
+        moved = triangle @ slopes
+        matrix = moved.T @ moved
+        matrix += 1e-9 * (np.trace(matrix) + 1e-300) * np.eye(n_components)
+        step = np.linalg.solve(matrix, moved.T @ (right - triangle @ features))
+        share, gained = 1.0, -1.0
+        for _ in range(5):
+            candidate = np.minimum(np.maximum(place + share * step, -bound), bound)
+            monomials_at(candidate, exponents, features, slopes)
+            gained = misfit - ((right - triangle @ features) ** 2).sum()
+            if gained > 0.0:
+                break
+            share *= 0.4
+        if gained <= 0.0:
+            break
+        place, misfit = candidate, misfit - gained
+        if gained < 1e-9 * (1.0 + misfit):
+            break
+    monomials_at(place, exponents, features, slopes)
+    return place, ((right - triangle @ features) ** 2).sum(), triangle @ slopes
