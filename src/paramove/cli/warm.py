@@ -31,6 +31,7 @@ def _compile() -> None:
 
     from paramove.alignment import warp
     from paramove.hmm import GaussianHMM, LeftRightHMM, TrainingOptions
+    from paramove.phmm import InterpolativePHMM, QuadraticPHMM
 
     rng = np.random.default_rng(0)
     line = np.linspace(0.0, 1.0, 30)[:, None] + [0.0, 1.0]
@@ -43,6 +44,11 @@ def _compile() -> None:
     GaussianHMM(n_states=2, topology="ergodic", options=once).fit(sequences)
     warp(sequences[0], sequences[1], "A")
     warp(sequences[0], sequences[1], "B")
+    theta = [0.0, 0.5, 1.0]
+    QuadraticPHMM(5, 2, 8, options=once).fit(sequences, theta).estimate(sequences[0])
+    frames = QuadraticPHMM(5, 2, 8, options=once, residuals="independent").fit(sequences, theta)
+    frames.estimate(sequences[0])
+    InterpolativePHMM(5, 2, 8, options=once).fit(sequences, theta).estimate(sequences[0])
 
 
 def _train() -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from paramove.hmm.estimation import Parameters
 
@@ -151,6 +151,6 @@ def _inflation(excess: Floats, dimension: int, n_groups: int) -> float:
     """What squared errors in predicted deviations must be divided by, in the mean and at 95 %; never below 1."""
     count = len(excess)
     level = min(1.0, 0.95 * (1.0 + 1.0 / count))
-    tail = float(np.quantile(excess, level)) / float(chi2.ppf(0.95, dimension))
+    tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
     few = (n_groups + dimension) / max(1.0, n_groups - 1.0)  # few groups know little of the tails
     return few * max(1.0, float(excess.mean()) / dimension, tail)
