@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.performance import BEGINNING_POINTS, FIRST_FRAMES, GROWTH, beginning_features
 
 Floats = NDArray[np.float64]
@@ -23,7 +24,6 @@ SHRINKAGE = 0.1
 """Share of each variance that is taken for independent."""
 TEMPERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)
 """Candidates for the share of the distances that counts: features are not as normal as the model says."""
-MOST_FOLDS = 10
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,7 @@ class BeginningDiscriminant:
     ) -> BeginningDiscriminant:
         """From features (K, n) of movements that last so long, their actions (K,) and groups (K,)."""
         start = cls._estimated(features, actions, n_actions, n_frames)
-        different = np.unique(groups)
-        folds = (
-            np.searchsorted(different, groups) % MOST_FOLDS
-            if len(different) > 2
-            else np.arange(len(groups)) % MOST_FOLDS
-        )
+        folds = fold_numbers(groups)
         scores = np.zeros(len(TEMPERS))
         for fold in np.unique(folds):
             tested = folds == fold

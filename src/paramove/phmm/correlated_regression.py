@@ -16,9 +16,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import chdtri, log_ndtr  # scipy.stats would take half a second to import
+from scipy.special import log_ndtr
 
 from paramove.phmm.features import Monomials
+from paramove.phmm.left_out import fold_numbers, inflation_of
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 from paramove.phmm.search_kernels import nearest
 
@@ -27,7 +28,6 @@ Ints = NDArray[np.int64]
 
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""
-MOST_FOLDS = 10
 LEAST_SHARE = 0.02
 """Standard deviations below this share of the mean one are lifted to it: they are known no better."""
 NEWTON_STEPS = 12
@@ -75,9 +75,8 @@ class CorrelatedRegression:
         deviation = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
         start = cls(monomials, coefficients, np.eye(y.shape[1]), 1.0, np.zeros(0), ridge, 1.0)
         folds = _folds(y / deviation, theta, monomials, penalty, groups)
-        shrinkage, inflation, distances = _chosen_shrinkage(folds, shrinkages)
-        n_groups = len(np.unique(groups))
-        inflation *= (n_groups + theta.shape[1]) / max(1, n_groups - 1)  # few groups know little of the tails
+        shrinkage, excess, distances = _chosen_shrinkage(folds, shrinkages)
+        inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), least=1e-6)
         covariance = _shrunk(left_out / deviation, shrinkage)
         root: Floats = deviation[:, None] * np.linalg.cholesky(covariance)
         return replace(start, root=root, inflation=inflation, distances=distances, shrinkage=shrinkage)
@@ -177,13 +176,11 @@ class _Fold:
 
 
 def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[_Fold]:
-    """At most `MOST_FOLDS` parts that keep groups together; of a single group, parts of its movements."""
-    different = np.unique(groups)
-    numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(y))
-    features = monomials.at(theta)
+    """The folds of `fold_numbers` that leave at least two other movements."""
+    numbers, features = fold_numbers(groups), monomials.at(theta)
     folds = []
-    for fold in range(min(MOST_FOLDS, int(numbers.max()) + 1)):
-        tested, others = np.flatnonzero(numbers % MOST_FOLDS == fold), np.flatnonzero(numbers % MOST_FOLDS != fold)
+    for fold in np.unique(numbers):
+        tested, others = np.flatnonzero(numbers == fold), np.flatnonzero(numbers != fold)
         if len(others) < 2:
             continue
         seen = features[others]
@@ -194,9 +191,9 @@ def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, grou
     return folds
 
 
-def _chosen_shrinkage(folds: list[_Fold], candidates: tuple[float, ...]) -> tuple[float, float, Floats]:
-    """Shrinkage with the least error of theta on unseen movements, the inflation it needs, and the distances."""
-    best, least = (candidates[-1], 1.0, np.zeros(0)), np.inf
+def _chosen_shrinkage(folds: list[_Fold], candidates: tuple[float, ...]) -> tuple[float, Floats, Floats]:
+    """Shrinkage with the least error of theta on unseen movements; those in predicted deviations, and the distances."""
+    best, least = (candidates[-1], np.zeros(0), np.zeros(0)), np.inf
     for shrinkage in candidates:
         found = [_tested(fold, shrinkage) for fold in folds]
         if not found:
@@ -205,7 +202,7 @@ def _chosen_shrinkage(folds: list[_Fold], candidates: tuple[float, ...]) -> tupl
         total = float(np.sqrt(error + 1e-12).mean())
         if total < least:
             least = total
-            best = shrinkage, _inflation(excess, folds[0].slopes.shape[-1]), np.maximum(distance, 0.0)
+            best = shrinkage, excess, np.maximum(distance, 0.0)
     return best
 
 
@@ -222,13 +219,6 @@ def _tested(fold: _Fold, shrinkage: float) -> Floats:
         excess = float(missed @ gradient)
         result[:, k] = missed @ missed, excess, fold.residuals[k] @ solved[:, k] - excess
     return result
-
-
-def _inflation(excess: Floats, dimension: int) -> float:
-    """What squared errors in predicted standard deviations must be divided by, in the mean and at 95 %."""
-    level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
-    tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
-    return max(1e-6, float(excess.mean()) / dimension, tail)
 
 
 def _shrunk(residuals: Floats, shrinkage: float) -> Floats:

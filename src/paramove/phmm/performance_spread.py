@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from paramove.hmm.estimation import Parameters
+from paramove.phmm.left_out import inflation_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -85,7 +85,7 @@ class PerformanceSpread:
                 own = gain @ residuals[k]
                 without = (without - (1.0 - SHRINKAGE) * np.outer(own, own) / count) * count / (count - 1.0)
             excess[k] = moves[k] @ np.linalg.solve(without + 1e-12 * np.trace(without) * np.eye(len(gain)), moves[k])
-        return cls(everything.factor, everything.own, _inflation(excess, moves.shape[1], n_groups))
+        return cls(everything.factor, everything.own, inflation_of(excess, moves.shape[1], n_groups, least=1.0))
 
     @classmethod
     def _of(cls, residuals: Floats) -> PerformanceSpread:
@@ -145,12 +145,3 @@ def left_out_of_groups(residuals: Floats, groups: Ints) -> Floats:
         if len(members) > 1:
             result[members] *= len(members) / (len(members) - 1.0)
     return result
-
-
-def _inflation(excess: Floats, dimension: int, n_groups: int) -> float:
-    """What squared errors in predicted deviations must be divided by, in the mean and at 95 %; never below 1."""
-    count = len(excess)
-    level = min(1.0, 0.95 * (1.0 + 1.0 / count))
-    tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
-    few = (n_groups + dimension) / max(1.0, n_groups - 1.0)  # few groups know little of the tails
-    return few * max(1.0, float(excess.mean()) / dimension, tail)

@@ -1,0 +1,35 @@
+"""Which movements are left out together, and how much wider regions of theta must be for errors seen on them."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri  # scipy.stats would take half a second to import
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_FOLDS = 10
+
+
+def fold_numbers(groups: Ints) -> Ints:
+    """Number below `MOST_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
+
+    Of one or two groups, parts of their movements.
+    """
+    different = np.unique(groups)
+    numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(groups))
+    return np.asarray(numbers % MOST_FOLDS, dtype=np.int64)
+
+
+def inflation_of(excess: Floats, dimension: int, n_groups: int, least: float) -> float:
+    """What a covariance of theta must be multiplied by so that regions hold what they promise.
+
+    Args:
+        excess: squared errors of left-out movements in predicted deviations, (K,); none if nothing could be left out.
+        dimension: P. n_groups: how many different groups those are from. least: what is never gone below.
+    """
+    few = (n_groups + dimension) / max(1, n_groups - 1)  # few groups know little of the tails
+    if not len(excess):
+        return few
+    level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
+    tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
+    return few * max(least, float(excess.mean()) / dimension, tail)
