@@ -32,8 +32,8 @@ from paramove.demonstrations import demonstrations_at, reaching_cuboid, reaching
 from paramove.hmm import GaussianHMM, LeftRightHMM, TrainingOptions, resample
 from paramove.phmm import InterpolativePHMM, LinearPHMM, QuadraticPHMM
 
-ITERATIONS = 5
-SLOW_S = 3.0
+ITERATIONS = 10
+QUICK_S, SLOW_S = 0.2, 3.0
 OPTIONS = TrainingOptions(max_iterations=ITERATIONS, tolerance=0.0)
 THESIS_S = 50.0
 
@@ -123,10 +123,16 @@ def thesis_training() -> list[Row]:
     sequences = movements(100, 10)
     options = TrainingOptions(max_iterations=10, tolerance=0.0)
     theta = np.linspace(0.0, 1.0, 10)[:, None]
-    linear = LinearPHMM(n_states=21, d_min=3, d_max=6, options=options)
+    counts = {"n_states": 21, "d_min": 3, "d_max": 6, "options": options}
+    # The thesis has a prior that fades and no lasting floor (2.2.2).
+    unfloored = counts | {"options": TrainingOptions(max_iterations=10, tolerance=0.0, floor_fraction=0.0)}
+    thesis = LinearPHMM(**unfloored, residuals="independent", smoothness=None)
+    prior, correlated = LinearPHMM(**counts, residuals="independent"), LinearPHMM(**counts)
     return [
-        Row("paramove, HMM from start to end", lambda: LeftRightHMM(21, 3, 6, options=options).fit(sequences)),
-        Row("paramove, linear PHMM from start to end", lambda: linear.fit(sequences, theta)),
+        Row("paramove, linear PHMM, EM alone", lambda: thesis.fit(sequences, theta), note="as in the thesis"),
+        Row("paramove, linear PHMM with prior", lambda: prior.fit(sequences, theta)),
+        Row("paramove, linear PHMM, correlated", lambda: correlated.fit(sequences, theta), note="the default"),
+        Row("paramove, HMM", lambda: LeftRightHMM(21, 3, 6, options=options).fit(sequences)),
         Row("thesis, linear PHMM (Core 2, 2.4 GHz)", None, note=f"{THESIS_S:g} s as printed"),
     ]
 
@@ -164,9 +170,9 @@ def parametric() -> list[Row]:
     ]
 
 
-def estimates() -> list[Row]:
+def estimates(kind: str) -> list[Row]:
     """Theta of one movement over the table: 20 states of 4 to 6 frames, T = 100, D = 21."""
-    return [Row(name, task, UNSEEN, note) for name, task, note in estimate_rows()]
+    return [Row(name, task, UNSEEN, note) for name, task, note in estimate_rows(kind)]
 
 
 FIRST_CALL = """
@@ -198,19 +204,24 @@ GROUPS: dict[str, Callable[[], list[Row]]] = {
     "training of thesis 4.1.1, 21 states, 10 x T=100, 10 iterations": thesis_training,
     "log-likelihood of one movement, 20 states, T=100": likelihood,
     "parametric models of reaching": parametric,
-    "estimate of theta, 20 states, T=100": estimates,
+    "estimate of theta, interpolative, 20 states, T=100": lambda: estimates("interpolative"),
+    "estimate of theta, linear, 20 states, T=100": lambda: estimates("linear"),
+    "estimate of theta, quadratic, 20 states, T=100": lambda: estimates("quadratic"),
+    "estimate of theta, neural, 20 states, T=100": lambda: estimates("neural"),
     "import and first training in a new process": first_call,
 }
 
 
 def timed(group: str, rows: list[Row], rounds: int) -> list[Result]:
-    """Runs the rows in turn; a slow one only as often as it fits."""
+    """Runs the rows in turn, a quick one once more before it is timed; a slow one only as often as it fits."""
     times: list[list[float]] = [[] for _ in rows]
     for round_ in range(rounds + 1):
         for row, found in zip(rows, times, strict=True):
             # What takes seconds has been run once by `peer` already, so its first time counts.
             if row.task is None or (round_ > 0 and found[0] * row.divisor > SLOW_S):
                 continue
+            if found and found[0] * row.divisor < QUICK_S:
+                row.task()  # what others left in caches and memory is not its own
             clock = time.process_time if row.processor_time else time.perf_counter
             began = clock()
             row.task()

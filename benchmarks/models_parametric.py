@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from paramove.demonstrations import demonstrations_at, table_targets
 from paramove.hmm import resample
-from paramove.phmm import InterpolativePHMM, NeuralPHMM, ParametricHMM, QuadraticPHMM
+from paramove.phmm import InterpolativePHMM, NeuralPHMM, ParametricHMM, PolynomialPHMM
 
 FRAMES = 100
 MARGIN = 0.25
@@ -29,34 +29,49 @@ def raster(columns: int, rows: int, repetitions: int, seed: int) -> tuple[list[n
     return [resample(one, FRAMES) for one in shown], np.repeat(places, repetitions, axis=0)
 
 
-def hmmlearn_search(model: InterpolativePHMM, movement: np.ndarray, d_min: int, d_max: int) -> Task:
+def hmmlearn_search(model: ParametricHMM, movement: np.ndarray, lengths: tuple[int, int]) -> Task:
     """The most likely theta by hmmlearn and L-BFGS-B with its numerical gradient, from the middle of the raster."""
 
     def falling(theta: np.ndarray) -> float:
         local = model.at(theta)
-        return -hmmlearn_model(local.means_, local.covariances_, d_min, d_max, "log", 1).score(movement)
+        return -hmmlearn_model(local.means_, local.covariances_, *lengths, "log", 1).score(movement)
 
     bounds = [(-MARGIN, 1.0 + MARGIN)] * 2
     return lambda: minimize(falling, [0.5, 0.5], method="L-BFGS-B", bounds=bounds)
 
 
-def estimate_rows() -> list[tuple[str, Task | None, str]]:
-    """Name, work and note of each row; the work is one estimate in turn over the same eight movements."""
-    shown, theta = raster(3, 3, 10, seed=0)
-    unseen = raster(4, 2, 1, seed=1)[0]
-    local = InterpolativePHMM(20, 4, 6, search_margin=MARGIN).fit(shown, theta)
-    rows: list[tuple[str, Task | None, str]] = [("paramove, interpolative 3 x 3", _all(local, unseen), "")]
+def _searches(model: ParametricHMM, unseen: list[np.ndarray]) -> list[tuple[str, Task | None, str]]:
+    """The rows of hmmlearn for a model."""
+    rows: list[tuple[str, Task | None, str]] = []
     for name, lengths in (("hmmlearn, expanded, L-BFGS-B", (4, 6)), ("hmmlearn, plain chain, L-BFGS-B", (1, 1))):
         try:
-            searches = [hmmlearn_search(local, movement, *lengths) for movement in unseen]
+            searches = [hmmlearn_search(model, movement, lengths) for movement in unseen]
             searches[0]()
         except NotInstalledError as error:
             rows.append((name, None, str(error)))
         else:
             rows.append((name, lambda searches=searches: [search() for search in searches], ""))
-    rows.append(("paramove, quadratic", _all(QuadraticPHMM(20, 4, 6).fit(shown, theta), unseen), ""))
-    rows.append(("paramove, neural", _all(NeuralPHMM(20, 4, 6).fit(shown, theta), unseen), ""))
     return rows
+
+
+def estimate_rows(kind: str) -> list[tuple[str, Task | None, str]]:
+    """Name, work and note of each row; the work is one estimate in turn over the same eight movements.
+
+    `kind` is "interpolative", "linear", "quadratic" or "neural".
+    """
+    shown, theta = raster(3, 3, 10, seed=0)
+    unseen = raster(4, 2, 1, seed=1)[0]
+    if kind == "neural":
+        return [("paramove, neural", _all(NeuralPHMM(20, 4, 6).fit(shown, theta), unseen), "")]
+    if kind == "interpolative":
+        local = InterpolativePHMM(20, 4, 6, search_margin=MARGIN).fit(shown, theta)
+        return [("paramove, interpolative 3 x 3", _all(local, unseen), ""), *_searches(local, unseen)]
+    models = {
+        residuals: PolynomialPHMM(20, 4, 6, degree=1 if kind == "linear" else 2, residuals=residuals).fit(shown, theta)
+        for residuals in ("independent", "correlated")
+    }
+    own = [(f"paramove, {kind}, {residuals}", _all(model, unseen), "") for residuals, model in models.items()]
+    return own + _searches(models["independent"], unseen)
 
 
 UNSEEN = 8

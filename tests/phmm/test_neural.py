@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from paramove.demonstrations.edge import strongly_nonlinear_movement, strongly_n
 from paramove.hmm import TrainingOptions
 from paramove.hmm.training import LikelihoodDecreaseWarning
 from paramove.phmm import NeuralPHMM, QuadraticPHMM
+from paramove.phmm.network_choice import Choice, _better, _left_out_errors
 from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
 from tests.phmm.movements import numerical_gradient, shown, wave
 from tests.phmm.table import RASTER_CM, table_movements
@@ -94,22 +96,33 @@ def test_generalised_em_never_lowers_the_objective(seed: int, n_hidden: int, ski
     assert (np.diff(objectives) >= -1e-7 * np.abs(objectives[:-1])).all()
 
 
-def test_a_strongly_nonlinear_movement_is_learned_better_than_by_a_quadratic() -> None:
-    rng = np.random.default_rng(0)
+def test_strongly_nonlinear_movements_are_learned_better_than_by_a_quadratic() -> None:
+    found = np.array([learned_nonlinear_movements(seed) for seed in range(3)])
+    errors, scores, misses = found.mean(axis=0)
+    assert (found[:, 0, 0] < 0.6 * found[:, 0, 1]).all()
+    assert errors[0] < 0.5 * errors[1]
+    assert scores[0] > scores[1]
+    assert misses[0] < 1.1 * misses[1]
+
+
+def learned_nonlinear_movements(seed: int) -> list[list[float]]:
+    """Errors of synthesis, log-likelihoods of unseen movements, misses of theta; each neural, then quadratic."""
+    rng = np.random.default_rng(seed)
     demonstrated = strongly_nonlinear_movements(rng)
     heights = rng.uniform(-0.28, 0.28, 12)
     unseen = [strongly_nonlinear_movement(height, rng) for height in heights]
-    errors, scores = [], []
+    truth = np.stack([strongly_nonlinear_movement(height) for height in heights])
+    errors, scores, misses = [], [], []
     for kind in (NeuralPHMM, QuadraticPHMM):
         model = kind(20, 4, 6, resampled_frames=100).fit(demonstrated.sequences, demonstrated.theta)
-        made = np.stack([model.synthesize([height], 100) for height in heights])
-        truth = np.stack([strongly_nonlinear_movement(height) for height in heights])
-        errors.append(float(np.sqrt(((made - truth) ** 2).sum(axis=2).mean())))
-        scores.append(model.score(unseen, heights[:, None]))
         if isinstance(model, NeuralPHMM):
             assert model.n_hidden_ > 0
-    assert errors[0] < 0.6 * errors[1]
-    assert scores[0] > scores[1]
+        made = np.stack([model.synthesize([height], 100) for height in heights])
+        estimates = np.array([model.estimate(one).theta[0] for one in unseen])
+        errors.append(float(np.sqrt(((made - truth) ** 2).sum(axis=2).mean())))
+        scores.append(model.score(unseen, heights[:, None]))
+        misses.append(float(np.abs(estimates - heights).mean()))
+    return [errors, scores, misses]
 
 
 def test_over_the_table_it_is_no_worse_than_the_quadratic_one() -> None:
@@ -119,9 +132,48 @@ def test_over_the_table_it_is_no_worse_than_the_quadratic_one() -> None:
     errors = []
     for kind in (NeuralPHMM, QuadraticPHMM):
         model = kind(20, 4, 6).fit(sequences, theta)
+        if isinstance(model, NeuralPHMM):
+            assert model.n_hidden_ == 0
         found = np.stack([model.estimate(one).theta for one in unseen])
         errors.append(float(np.linalg.norm((found - labels) * RASTER_CM, axis=1).mean()))
     assert errors[0] <= 1.1 * errors[1]
+
+
+@pytest.mark.parametrize(
+    ("gains", "better"),
+    [
+        ((0.3, 0.2, 0.4, 0.3, 0.1), True),
+        ((0.4, 0.3, -0.3, 0.3, -0.2), False),  # by chance: as much worse in some folds as better in others
+        ((0.04, 0.04, 0.04, 0.04, 0.04), False),  # not worth it
+    ],
+)
+def test_more_units_must_be_better_in_nearly_all_folds(gains: tuple[float, ...], better: bool) -> None:
+    known = np.zeros(len(gains) + 1)
+    errors = -np.array([*gains, np.mean(gains)])
+    assert _better(errors, known, more=True) == better
+    assert _better(errors, known, more=False)
+
+
+def test_slopes_of_parts_equal_finite_differences() -> None:
+    sequences, theta = shown(2)
+    model = NeuralPHMM(8, 4, 6, n_hidden=2, options=TrainingOptions(max_iterations=5)).fit(sequences, theta)
+    weights, place = np.full(8, 5.0), np.array([0.1, -0.3])
+    observed = np.zeros(len(model.performances_.root))
+    slopes = model._missed(observed, weights, place)[1]
+    for p, unit in enumerate(np.eye(2)):
+        above, below = (model._missed(observed, weights, place + 1e-5 * sign * unit)[0] for sign in (1, -1))
+        assert_allclose(slopes[:, p], (below - above) / 2e-5, rtol=1e-5, atol=1e-7)
+
+
+def test_nearest_theta_is_the_minimum_and_where_the_networks_say_so() -> None:
+    """Of parts that the networks make themselves, theta is found exactly."""
+    sequences, theta = shown(2)
+    model = NeuralPHMM(8, 4, 6, n_hidden=1, options=TrainingOptions(max_iterations=5)).fit(sequences, theta)
+    weights, place = np.full(8, 5.0), np.array([0.4, -0.2])
+    observed = -model._missed(np.zeros(len(model.performances_.root)), weights, place)[0]
+    found, covariance = model.performances_.nearest(np.zeros(2), 1.5, lambda at: model._missed(observed, weights, at))
+    assert_allclose(found, place, rtol=0.0, atol=1e-4)
+    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
 
 
 def test_restarts_are_drawn_from_the_seed() -> None:
@@ -144,10 +196,23 @@ def test_the_network_alone_has_units() -> None:
     model = NeuralPHMM(8, 4, 6, skip_degree=0, n_restarts=1, options=TrainingOptions(max_iterations=4)).fit(*shown(0))
     assert model.n_hidden_ > 0
     found = model.estimate(wave(np.array([0.3, 0.7]), np.random.default_rng(7)))
-    assert_allclose(found.theta, [0.3, 0.7], rtol=0.0, atol=0.1)
+    assert_allclose(found.theta, [0.3, 0.7], rtol=0.0, atol=0.15)  # two units, trained for four iterations only
 
 
 @pytest.mark.parametrize("parameters", [{"n_hidden": -1}, {"skip_degree": -1}, {"gradient_steps": 0}])
 def test_impossible_parameters_are_refused(parameters: dict[str, int]) -> None:
     with pytest.raises(ValueError, match="not negative, gradient_steps is at least 1"):
         NeuralPHMM(8, 4, 6, **parameters).fit(*shown(0))
+
+
+def test_which_way_targets_are_turned_does_not_matter_to_the_choice() -> None:
+    """Covariances that are alike leave the turn open, and rounding would decide."""
+    rng = np.random.default_rng(3)
+    targets = drawn_targets(rng, 1, 0, alike=True)
+    turn, _ = np.linalg.qr(rng.standard_normal((2, 2)))
+    turned = replace(targets, rotated=targets.rotated @ turn.T, rotation=turn @ targets.rotation)
+    choice = Choice(0, 0.0, np.zeros((3, 0, 2)))
+    groups = np.arange(12)
+    assert_allclose(
+        _left_out_errors(turned, groups, choice), _left_out_errors(targets, groups, choice), rtol=0, atol=1e-9
+    )

@@ -110,7 +110,7 @@ def test_regions_of_95_percent_hold_theta_over_the_table(kind: type[ParametricHM
     sequences, theta = table_movements(3, 3, 10, seed=0)
     unseen, labels = table_movements(7, 5, 3, seed=2)
     share, error = coverage(kind(20, 4, 6).fit(sequences, theta), unseen, labels)
-    assert 0.85 <= share <= (0.99 if kind is not QuadraticPHMM else 1.0)
+    assert 0.85 <= share <= (0.99 if kind is InterpolativePHMM else 1.0)
     assert error <= 1.5
 
 

@@ -8,18 +8,14 @@ alpha beta / p(X) (2.14), for what follows t does not depend on what was before,
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
+from paramove.hmm.compilation import compiled, compiled_arithmetic
+from paramove.hmm.vector_functions import UNDERFLOW, add_multiple, dot, exp_of_negative, log_of_one_plus
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 DENSE_UNDERFLOW = -700.0
-UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
 LEAST_POSTERIOR = 1e-100
-LOG2_E = 1.4426950408889634
-LN2_HIGH = 0.693147180369123816490  # the upper 33 bits of ln 2, and the rest
-LN2_LOW = 1.90821492927058770002e-10
-ROUNDING = 6755399441055744.0  # 1.5 * 2^52: adding it rounds to an integer, which is then in the lowest bits
 SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
 
 
@@ -95,49 +91,6 @@ def _banded_forward(
 
 
 @compiled_arithmetic
-def _exp_of_negative(values: Floats, n: int, bits: Ints, result: Floats) -> None:
-    """e^x of the first n values, none above 0; 0 where x is below UNDERFLOW. Plain arithmetic, which is vectorised.
-
-    x = k ln 2 + r with |r| <= ln 2 / 2; the exponent of 2^k is written into the bits of a number.
-    """
-    rounded = bits.view(np.float64)
-    for j in range(n):
-        rounded[j] = max(values[j], UNDERFLOW) * LOG2_E + ROUNDING
-    for j in range(n):
-        k = rounded[j] - ROUNDING
-        r = (max(values[j], UNDERFLOW) - k * LN2_HIGH) - k * LN2_LOW
-        # Taylor series to r^13 / 13!: the next term is below 5e-18.
-        tail = 1 / 479001600 + r * (1 / 6227020800)
-        tail = 1 / 3628800 + r * (1 / 39916800 + r * tail)
-        tail = 1 / 40320 + r * (1 / 362880 + r * tail)
-        tail = 1 / 720 + r * (1 / 5040 + r * tail)
-        tail = 1 / 24 + r * (1 / 120 + r * tail)
-        tail = 1 / 2 + r * (1 / 6 + r * tail)
-        result[j] = 1.0 + r * (1.0 + r * tail)
-    for j in range(n):
-        bits[j] = (bits[j] + 1023) << 52
-    for j in range(n):
-        result[j] = result[j] * rounded[j] if values[j] >= UNDERFLOW else 0.0
-
-
-@compiled_arithmetic
-def _log_of_one_plus(values: Floats, n: int, result: Floats) -> None:
-    """ln(1 + x) of the first n values in [0, 1]: 2 artanh(x / (2 + x)), whose argument is at most 1/3."""
-    for j in range(n):
-        s = values[j] / (2.0 + values[j])
-        q = s * s
-        total = 1 / 31 + q * (1 / 33 + q * (1 / 35))
-        total = 1 / 27 + q * (1 / 29 + q * total)
-        total = 1 / 23 + q * (1 / 25 + q * total)
-        total = 1 / 19 + q * (1 / 21 + q * total)
-        total = 1 / 15 + q * (1 / 17 + q * total)
-        total = 1 / 11 + q * (1 / 13 + q * total)
-        total = 1 / 7 + q * (1 / 9 + q * total)
-        total = 1 / 3 + q * (1 / 5 + q * total)
-        result[j] = 2.0 * s * (1.0 + q * total)
-
-
-@compiled_arithmetic
 def _next_state_forward(
     log_output: Floats, offset: int, n_frames: int, log_start: Floats, log_band: Floats, low: Ints, high: Ints,
     alpha: Floats, shares: Floats,
@@ -163,8 +116,8 @@ def _next_state_forward(
             # Of two impossible ones neither has a share.
             difference[j] = min(here, there) - top if top > -np.inf else -np.inf
             shares[t, i, 0] = 1.0 if here >= there else 0.0
-        _exp_of_negative(difference, n, bits, small)
-        _log_of_one_plus(small, n, logarithm)
+        exp_of_negative(difference, n, bits, small)
+        log_of_one_plus(small, n, logarithm)
         for j in range(n):
             i = first + j
             greater = 1.0 / (1.0 + small[j])
@@ -245,20 +198,6 @@ def stacked_banded(
     return log_likelihood
 
 
-@compiled_sums
-def _add_multiple(factor: float, row: Floats, total: Floats) -> None:
-    for j in range(len(row)):
-        total[j] += factor * row[j]
-
-
-@compiled_sums
-def _dot(row: Floats, column: Floats) -> float:
-    total = 0.0
-    for j in range(len(row)):
-        total += row[j] * column[j]
-    return total
-
-
 @compiled
 def _log_sum(terms: Floats) -> float:
     largest = terms.max()
@@ -286,7 +225,7 @@ def _dense_forward(
             difference = alpha[t - 1, i] - largest
             scaled[t - 1, i] = np.exp(difference) if difference > DENSE_UNDERFLOW else 0.0
             if scaled[t - 1, i] > 0.0:
-                _add_multiple(scaled[t - 1, i], transitions[i], sums[t])
+                add_multiple(scaled[t - 1, i], transitions[i], sums[t])
         for j in range(n_states):
             if sums[t, j] > SMALLEST_SUM:
                 alpha[t, j] = largest + np.log(sums[t, j]) + log_output[j, offset + t]
@@ -334,8 +273,8 @@ def stacked_dense(
                     counts[i, j] += share
             for i in range(n_states):
                 if scaled[t - 1, i] > 0.0:
-                    previous[i] += scaled[t - 1, i] * _dot(transitions[i], ratios)
-                    _add_multiple(scaled[t - 1, i], ratios, products[i])
+                    previous[i] += scaled[t - 1, i] * dot(transitions[i], ratios)
+                    add_multiple(scaled[t - 1, i], ratios, products[i])
                 gamma[i, offset + t - 1] = previous[i]
             posterior[:] = previous
         starts += posterior

@@ -91,14 +91,16 @@ class Evaluator:
         return kernels.feasible_ends(len(self.means), self.d_min, self.log_duration.shape[1], n_frames)
 
     def log_outputs(self, sequence: Floats) -> Floats:
-        """ln b_i(x_t) of the feasible pairs. Shape (T, N)."""
-        return kernels.log_outputs(sequence, self.means, self.whitening, self.log_norm, self.ends(len(sequence)))
+        """ln b_i(x_t) of the feasible pairs; other entries have no meaning. Shape (N, T)."""
+        stack = Stack.of([sequence])
+        windows = self.windows(stack)
+        return kernels.stacked_log_outputs(
+            stack.columns, windows, self.means[None], self.whitening, self.log_norm, False
+        )
 
     def log_likelihood(self, sequence: Floats) -> float:
         """ln p(X | lambda) with the finish state."""
-        ends = self.ends(len(sequence))
-        outputs = kernels.log_outputs(sequence, self.means, self.whitening, self.log_norm, ends)
-        return float(kernels.forward(outputs, self.log_duration, self.d_min, ends)[-1, -1])
+        return float(kernels.segments_log_likelihood(self.log_outputs(sequence), self.log_duration, self.d_min))
 
     def expectation(self, sequence: Floats) -> tuple[float, Floats, Floats]:
         """Log-likelihood, responsibilities (T, N) and expected duration counts (N, d_max).

@@ -114,27 +114,6 @@ def _add_products(difference: Floats, scaled: Floats, n: int, diagonal: bool, to
 
 
 @compiled
-def log_outputs(sequence: Floats, means: Floats, whitening: Floats, log_norm: Floats, ends: Ints) -> Floats:
-    """ln b_i(x_t) of the feasible pairs, -inf elsewhere. `whitening` is the inverse Cholesky factor. Shape (T, N)."""
-    n_frames, dim = sequence.shape
-    n_states = means.shape[0]
-    out = np.full((n_frames, n_states), -np.inf)
-    difference = np.zeros(((dim + TILE - 1) // TILE * TILE, BLOCK))
-    products, squared = np.empty((TILE, BLOCK)), np.empty(BLOCK)
-    for i in range(n_states):
-        matrix = whitening[i] if dim % TILE == 0 else _padded(whitening[i])
-        for begin in range(ends[i, 0], ends[i + 1, 1], BLOCK):
-            n = min(BLOCK, ends[i + 1, 1] - begin)
-            for f in range(n):
-                for k in range(dim):
-                    difference[k, f] = sequence[begin + f, k] - means[i, k]
-            _squares(difference, matrix, n, False, products, squared)
-            for f in range(n):
-                out[begin + f, i] = log_norm[i] - 0.5 * squared[f]
-    return out
-
-
-@compiled
 def stacked_log_outputs(
     columns: Floats, windows: Ints, means: Floats, whitening: Floats, log_norm: Floats, diagonal: bool
 ) -> Floats:

@@ -11,18 +11,17 @@ Index convention: `ending[i, t]` belongs to "i states are complete and t frames 
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled, compiled_arithmetic
-from paramove.hmm.gaussians import add_moments, log_outputs, stacked_log_outputs, stacked_moments
+from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
+from paramove.hmm.gaussians import add_moments, stacked_log_outputs, stacked_moments
+from paramove.hmm.vector_functions import exp_of_negative, log_of_positive
 
 __all__ = [
     "add_moments",
-    "backward",
     "best_segmentation",
     "feasible_ends",
-    "forward",
-    "log_outputs",
-    "posteriors",
+    "filled",
     "segment_windows",
+    "segments_log_likelihood",
     "stacked_log_outputs",
     "stacked_moments",
     "stacked_segments",
@@ -31,7 +30,8 @@ __all__ = [
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
+LANES = 8
+"""Numbers in a vector register: rows are filled up to a multiple, so that nothing is left over."""
 
 
 @compiled
@@ -46,87 +46,12 @@ def feasible_ends(n_states: int, d_min: int, d_max: int, n_frames: int) -> Ints:
 
 
 @compiled
-def forward(log_output: Floats, log_duration: Floats, d_min: int, ends: Ints) -> Floats:
-    """Log probability of the first t frames with i states complete (2.7, segment form). Shape (N + 1, T + 1)."""
-    n_frames, n_states = log_output.shape
-    d_max = log_duration.shape[1]
-    ending = np.full((n_states + 1, n_frames + 1), -np.inf)
-    ending[0, 0] = 0.0
-    terms = np.empty(d_max)
-    for i in range(n_states):
-        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
-            largest, outputs = -np.inf, 0.0
-            for d in range(1, min(d_max, t) + 1):
-                outputs += log_output[t - d, i]
-                terms[d - 1] = -np.inf
-                if d >= d_min:
-                    terms[d - 1] = ending[i, t - d] + log_duration[i, d - 1] + outputs
-                largest = max(largest, terms[d - 1])
-            if largest > -np.inf:
-                total = 0.0
-                for d in range(d_min, min(d_max, t) + 1):
-                    total += np.exp(terms[d - 1] - largest)
-                ending[i + 1, t] = largest + np.log(total)
-    return ending
-
-
-@compiled
-def backward(log_output: Floats, log_duration: Floats, d_min: int, ends: Ints) -> Floats:
-    """Log probability of the frames after t, given that i states were complete at t (2.10). Shape (N + 1, T + 1)."""
-    n_frames, n_states = log_output.shape
-    d_max = log_duration.shape[1]
-    following = np.full((n_states + 1, n_frames + 1), -np.inf)
-    following[n_states, n_frames] = 0.0
-    terms = np.empty(d_max)
-    for i in range(n_states - 1, -1, -1):
-        for t in range(ends[i, 0], ends[i, 1] + 1):
-            largest, outputs = -np.inf, 0.0
-            longest = min(d_max, n_frames - t)
-            for d in range(1, longest + 1):
-                outputs += log_output[t + d - 1, i]
-                terms[d - 1] = -np.inf
-                if d >= d_min:
-                    terms[d - 1] = following[i + 1, t + d] + log_duration[i, d - 1] + outputs
-                largest = max(largest, terms[d - 1])
-            if largest > -np.inf:
-                total = 0.0
-                for d in range(d_min, longest + 1):
-                    total += np.exp(terms[d - 1] - largest)
-                following[i, t] = largest + np.log(total)
-    return following
-
-
-@compiled
-def posteriors(
-    log_output: Floats, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, following: Floats
-) -> tuple[Floats, Floats]:
-    """Responsibilities gamma_i(t), shape (T, N) (2.14), and the expected count of each duration, shape (N, d_max)."""
-    n_frames, n_states = log_output.shape
-    d_max = log_duration.shape[1]
-    gamma = np.zeros((n_frames, n_states))
-    counts = np.zeros((n_states, d_max))
-    log_likelihood = ending[n_states, n_frames]
-    for i in range(n_states):
-        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
-            outputs = 0.0
-            for d in range(1, min(d_max, t) + 1):
-                outputs += log_output[t - d, i]
-                if d < d_min:
-                    continue
-                exponent = ending[i, t - d] + log_duration[i, d - 1] + outputs + following[i + 1, t] - log_likelihood
-                if exponent < -700.0:
-                    continue
-                share = np.exp(exponent)
-                counts[i, d - 1] += share
-                for s in range(t - d, t):
-                    gamma[s, i] += share
-    return gamma, counts
-
-
-@compiled
 def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends: Ints) -> tuple[float, Ints]:
-    """Log probability of the best segmentation and the number of frames used after each state, shape (N + 1,)."""
-    n_frames, n_states = log_output.shape
+    """Log probability of the best segmentation and the number of frames used after each state, shape (N + 1,).
+
+    `log_output` holds ln b_i(x_t), shape (N, T).
+    """
+    n_states, n_frames = log_output.shape
     d_max = log_duration.shape[1]
     best = np.full((n_states + 1, n_frames + 1), -np.inf)
     choice = np.zeros((n_states + 1, n_frames + 1), np.int64)
@@ -135,7 +60,7 @@ def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends
         for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
             outputs = 0.0
             for d in range(1, min(d_max, t) + 1):
-                outputs += log_output[t - d, i]
+                outputs += log_output[i, t - d]
                 if d < d_min:
                     continue
                 value = best[i, t - d] + log_duration[i, d - 1] + outputs
@@ -149,47 +74,114 @@ def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends
     return float(best[n_states, n_frames]), borders
 
 
+@compiled
+def _places(begins: Ints, d: int, low: int, n: int) -> tuple[int, int]:
+    """Of n ends from `low` on, the first whose segment of d frames has a feasible begin, and the one after the last."""
+    begin = min(n, max(0, begins[0] + d - low))
+    return begin, max(begin, min(n, begins[1] + d - low + 1))
+
+
+@compiled_arithmetic
+def _compared(
+    before: Floats, log_duration: float, sums: Floats, sums_before: Floats, terms: Floats, largest: Floats
+) -> None:
+    """Terms of one duration, and the largest of all durations so far."""
+    for j in range(len(terms)):
+        terms[j] = before[j] + log_duration + (sums[j] - sums_before[j])
+        largest[j] = max(largest[j], terms[j])
+
+
+@compiled_arithmetic
+def _without_largest(terms: Floats, largest: Floats, result: Floats) -> None:
+    for j in range(len(largest)):
+        result[j] = terms[j] - largest[j] if largest[j] > -np.inf else -np.inf
+
+
+@compiled_arithmetic
+def _add(source: Floats, target: Floats) -> None:
+    for j in range(len(target)):
+        target[j] += source[j]
+
+
+@compiled_arithmetic
+def _scale(factors: Floats, target: Floats) -> None:
+    for j in range(len(factors)):
+        target[j] *= factors[j]
+
+
 @compiled_arithmetic
 def _forward_shares(
     log_output: Floats, offset: int, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, shares: Floats
-) -> None:
-    """As `forward`, and the probability of each last duration given that i states end at t, in `shares[i, t, d - 1]`.
+) -> float:
+    """Log probability of the frames, and what the way back needs. Everything of a state is done for all ends at once.
 
+    ending[i, t]: log probability of the first t frames with i states complete (2.7, segment form); (N + 1, T + 1).
+    shares[i, (d - d_min) whole + t - ends[i + 1, 0]]: probability that state i, which ends there, has d frames, where
+    `whole` is `filled` of the number of ends.
     Entries outside the feasible ends are neither read nor written.
     """
     n_states, d_max = log_duration.shape
+    room = shares.shape[1]
+    largest, total, logarithm, sums = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
+    differences, bits = np.empty(room), np.empty(room, np.int64)
     ending[0, 0] = 0.0
     for i in range(n_states):
-        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
-            shortest, longest = max(d_min, t - ends[i, 1]), min(d_max, t - ends[i, 0])
-            largest, likeliest, outputs = -np.inf, 0, 0.0
-            for d in range(1, longest + 1):
-                outputs += log_output[i, offset + t - d]
-                if d >= shortest:
-                    term = ending[i, t - d] + log_duration[i, d - 1] + outputs
-                    shares[i, t, d - 1] = term
-                    if term > largest:
-                        largest, likeliest = term, d
-            if largest == -np.inf:
-                ending[i + 1, t] = -np.inf
-                shares[i, t, :] = 0.0
-                continue
-            total = 1.0
-            for d in range(shortest, longest + 1):
-                if d != likeliest:
-                    difference = shares[i, t, d - 1] - largest
-                    shares[i, t, d - 1] = np.exp(difference) if difference > UNDERFLOW else 0.0
-                    total += shares[i, t, d - 1]
-            shares[i, t, likeliest - 1] = 1.0
-            ending[i + 1, t] = largest + np.log(total)
-            for d in range(shortest, longest + 1):
-                shares[i, t, d - 1] /= total
+        early, low, n = ends[i, 0], ends[i + 1, 0], ends[i + 1, 1] - ends[i + 1, 0] + 1
+        whole = filled(n)
+        count = (d_max - d_min + 1) * whole
+        sums[0] = 0.0
+        for t in range(ends[i + 1, 1] - early):
+            sums[t + 1] = sums[t] + log_output[i, offset + early + t]
+        largest[:whole], total[:whole] = -np.inf, 0.0
+        terms = shares[i]
+        terms[:count] = -np.inf
+        for d in range(d_min, d_max + 1):
+            begin, end = _places(ends[i], d, low, n)
+            k, first = (d - d_min) * whole, low + begin
+            _compared(
+                ending[i, first - d :], log_duration[i, d - 1], sums[first - early :], sums[first - early - d :],
+                terms[k + begin : k + end], largest[begin:end],
+            )  # fmt: skip
+        for k in range(0, count, whole):
+            _without_largest(terms[k:], largest[:whole], differences[k:])
+        exp_of_negative(differences, count, bits, terms)
+        for k in range(0, count, whole):
+            _add(terms[k:], total[:whole])
+        for j in range(whole):
+            total[j] = total[j] if total[j] > 0.0 else 1.0
+        log_of_positive(total, whole, bits, logarithm)
+        _add(largest, logarithm[:whole])
+        ending[i + 1, low : low + n] = logarithm[:n]
+        for j in range(whole):
+            total[j] = 1.0 / total[j]
+        for k in range(0, count, whole):
+            _scale(total[:whole], terms[k:])
+    return float(ending[n_states, ends[n_states, 1]])
+
+
+@compiled
+def filled(n: int) -> int:
+    """The next multiple of `LANES`."""
+    return (n + LANES - 1) // LANES * LANES
+
+
+@compiled_sums
+def _shared_back(posterior: Floats, shares: Floats, complete: Floats, running: Floats) -> float:
+    """Posteriors of the segments of one duration, added to those of their begins, and their sum."""
+    total = 0.0
+    for j in range(len(shares)):
+        share = posterior[j] * shares[j]
+        complete[j] += share
+        running[j] += share
+        total += share
+    return total
 
 
 @compiled
 def _smooth(
-    offset: int, d_min: int, ends: Ints, shares: Floats, complete: Floats, gamma: Floats, counts: Floats
-) -> None:
+    offset: int, d_min: int, ends: Ints, shares: Floats, complete: Floats, running: Floats, gamma: Floats,
+    counts: Floats,
+) -> None:  # fmt: skip
     """Posterior of all segments from the last frame backwards: p(i ends at t | X) times the shares of its durations.
 
     The same as alpha beta / p(X) (2.14), for what follows t does not depend on what was before, and without any
@@ -200,19 +192,19 @@ def _smooth(
     for i in range(n_states - 1, -1, -1):
         complete[i, ends[i, 0] : ends[i, 1] + 1] = 0.0
         gamma[i, offset + ends[i, 0] : offset + ends[i + 1, 1]] = 0.0
-        for t in range(ends[i + 1, 0], ends[i + 1, 1] + 1):
-            posterior = complete[i + 1, t]
-            if posterior == 0.0:
-                continue
-            shortest, longest = max(d_min, t - ends[i, 1]), min(d_max, t - ends[i, 0])
-            running = 0.0
-            for d in range(longest, 0, -1):
-                if d >= shortest:
-                    share = posterior * shares[i, t, d - 1]
-                    complete[i, t - d] += share
-                    counts[i, d - 1] += share
-                    running += share
-                gamma[i, offset + t - d] += running
+        low, n = ends[i + 1, 0], ends[i + 1, 1] - ends[i + 1, 0] + 1
+        whole = filled(n)
+        running[:n] = 0.0
+        for d in range(d_max, 0, -1):
+            begin, end = _places(ends[i], d, low, n)
+            first = low + begin
+            if d >= d_min:
+                k = (d - d_min) * whole
+                counts[i, d - 1] += _shared_back(
+                    complete[i + 1, first:], shares[i, k + begin : k + end], complete[i, first - d :], running[begin:]
+                )
+            # Frame t - d is of this state wherever a segment of d frames or more ends at t.
+            _add(running[begin:], gamma[i, offset + first - d : offset + low + n - d])
 
 
 @compiled
@@ -228,18 +220,31 @@ def stacked_segments(
         counts: expected counts of durations, added to, shape (N, d_max).
     """
     n_states, d_max = log_duration.shape
-    longest = np.diff(offsets).max()
-    ending, complete = np.empty((n_states + 1, longest + 1)), np.empty((n_states + 1, longest + 1))
-    shares = np.empty((n_states, longest + 1, d_max))
+    room = np.diff(offsets).max() + 1
+    ending, complete = np.empty((n_states + 1, room)), np.empty((n_states + 1, room))
+    shares, running = np.empty((n_states, (d_max - d_min + 1) * filled(room))), np.empty(room)
     log_likelihood = np.empty(len(offsets) - 1)
     for s in range(len(offsets) - 1):
-        n_frames = offsets[s + 1] - offsets[s]
-        ends = feasible_ends(n_states, d_min, d_max, n_frames)
-        _forward_shares(log_output, offsets[s], log_duration, d_min, ends, ending, shares)
-        log_likelihood[s] = ending[n_states, n_frames]
+        log_likelihood[s] = -np.inf
+        ends = feasible_ends(n_states, d_min, d_max, offsets[s + 1] - offsets[s])
+        if ends[n_states, 0] > ends[n_states, 1]:
+            continue
+        log_likelihood[s] = _forward_shares(log_output, offsets[s], log_duration, d_min, ends, ending, shares)
         if log_likelihood[s] > -np.inf:
-            _smooth(offsets[s], d_min, ends, shares, complete, gamma, counts)
+            _smooth(offsets[s], d_min, ends, shares, complete, running, gamma, counts)
     return log_likelihood
+
+
+@compiled
+def segments_log_likelihood(log_output: Floats, log_duration: Floats, d_min: int) -> float:
+    """ln p(X | lambda) of one sequence from ln b_i(x_t), shape (N, T)."""
+    (n_states, n_frames), d_max = log_output.shape, log_duration.shape[1]
+    ends = feasible_ends(n_states, d_min, d_max, n_frames)
+    if ends[n_states, 0] > ends[n_states, 1]:
+        return -np.inf
+    ending = np.empty((n_states + 1, n_frames + 1))
+    shares = np.empty((n_states, (d_max - d_min + 1) * filled(n_frames + 1)))
+    return _forward_shares(log_output, 0, log_duration, d_min, ends, ending, shares)
 
 
 @compiled

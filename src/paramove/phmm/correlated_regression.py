@@ -9,19 +9,20 @@ shrunk, and how far regions of theta must be widened to hold what they promise.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import log_ndtr
 
 from paramove.phmm.features import Monomials
-from paramove.phmm.left_out import fold_numbers, inflation_of
+from paramove.phmm.left_out import folds_of, inflation_of
+from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
-from paramove.phmm.search_kernels import nearest
+from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
+from paramove.phmm.typicality import PredictiveDistribution
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,7 +43,8 @@ class CorrelatedRegression:
         coefficients: Z, shape (n, F).
         root: lower triangular L with C = L L', shape (n, n).
         inflation: factor on covariances of theta that makes regions hold what they promise.
-        distances: squared Mahalanobis distances of training movements, each left out. Shape (K,).
+        distances: squared Mahalanobis distances of training movements, each left out, in their order. Shape (K,).
+        groups: number of the group of each, shape (K,).
         ridge: share per degree above 0. shrinkage: of the correlations.
     """
 
@@ -51,6 +53,7 @@ class CorrelatedRegression:
     root: Floats
     inflation: float
     distances: Floats
+    groups: Ints
     ridge: tuple[float, ...]
     shrinkage: float
 
@@ -65,41 +68,89 @@ class CorrelatedRegression:
         shrinkages: tuple[float, ...] = SHRINKAGES,
     ) -> CorrelatedRegression:
         """From movements (K, n), labels (K, P) and the number of the group of each (K,); a ridge may be given."""
+        return cls._fitted(y, theta, monomials, groups, ridge, shrinkages)[0]
+
+    @classmethod
+    def best_fitted(
+        cls, descriptions: Iterable[Floats], theta: Floats, monomials: Monomials, groups: Ints
+    ) -> CorrelatedRegression:
+        """From the one of several descriptions of the same movements, (K, n) each, that tells theta best.
+
+        Of unseen groups; the first where nothing can be left out.
+        """
+        found = [cls._fitted(y, theta, monomials, groups, None, SHRINKAGES) for y in descriptions]
+        return min(found, key=lambda one: one[1])[0]
+
+    @classmethod
+    def _fitted(
+        cls,
+        y: Floats,
+        theta: Floats,
+        monomials: Monomials,
+        groups: Ints,
+        ridge: tuple[float, ...] | None,
+        shrinkages: tuple[float, ...],
+    ) -> tuple[CorrelatedRegression, float]:
+        """And the mean error of scaled theta of left-out movements, infinite if none could be left out."""
         features, degrees = monomials.at(theta), monomials.degrees
         ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
         penalty = penalties(ridge, degrees, len(y))
         solved = np.linalg.solve(features.T @ features + penalty, features.T @ y)
         coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as a file gives it back
         left_out = residuals_left_out(y, features, penalty, groups)
-        deviation = np.sqrt((left_out**2).mean(axis=0))
-        deviation = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
-        start = cls(monomials, coefficients, np.eye(y.shape[1]), 1.0, np.zeros(0), ridge, 1.0)
+        deviation = deviations_of(left_out)
         folds = _folds(y / deviation, theta, monomials, penalty, groups)
-        shrinkage, excess, distances = _chosen_shrinkage(folds, shrinkages)
+        shrinkage, excess, tested, error = chosen_shrinkage(folds, shrinkages)
         inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), least=1e-6)
-        covariance = _shrunk(left_out / deviation, shrinkage)
-        root: Floats = deviation[:, None] * np.linalg.cholesky(covariance)
-        return replace(start, root=root, inflation=inflation, distances=distances, shrinkage=shrinkage)
+        triangle = np.linalg.cholesky(shrunk(left_out / deviation, shrinkage))
+        # What no fold could test is compared with a covariance that knows it.
+        distances = (solve_triangular(triangle, (left_out / deviation).T, lower=True) ** 2).sum(axis=0)
+        for fold, distance in zip(folds, tested, strict=False):
+            distances[fold.members] = distance
+        root: Floats = deviation[:, None] * triangle
+        return cls(monomials, coefficients, root, inflation, distances, groups, ridge, shrinkage), error
 
     def mean(self, theta: Floats) -> Floats:
         """Z phi(theta). Shape (n,)."""
         result: Floats = self.coefficients @ self.monomials.at(theta)
         return result
 
-    def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats, float]:
-        """Most likely theta (P,), its widened covariance (P, P), and the squared Mahalanobis distance there.
+    def estimate(self, y: Floats, margin: float) -> tuple[Floats, Floats]:
+        """Most likely theta (P,) and its widened covariance (P, P).
 
         Args:
             y: the movement, (n,).
             margin: how far outside the bounds of the training theta may lie, as a share of their width.
         """
-        right, triangle, rest = self._condensed(y)
-        bound = 1.0 + 2.0 * margin
-        place, misfit, slopes = nearest(self._starts, bound, self.monomials.exponents, right, triangle, NEWTON_STEPS)
-        information = slopes.T @ slopes + np.eye(len(place)) / bound**2
-        scale = self.monomials.scale
-        covariance = self.inflation * np.linalg.inv(information) * np.outer(scale, scale)
-        return self.monomials.centre + scale * place, covariance, float(misfit) + rest
+        self._check_length(y)
+        _, projector, triangle = self._condensing
+        own, bound = self.monomials, 1.0 + 2.0 * margin
+        place, slopes = nearest(own.starts, bound, own.exponents, projector @ y, triangle, NEWTON_STEPS)
+        information = slopes.T @ slopes
+        information.flat[:: len(place) + 1] += 1.0 / bound**2
+        covariance = np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
+        return own.centre + own.scale * place, covariance
+
+    def distance(self, y: Floats, theta: Floats) -> float:
+        """Squared Mahalanobis distance of a movement (n,) from that of theta (P,)."""
+        self._check_length(y)
+        white = self._condensing[0] @ (y - self.mean(theta))
+        return float(white @ white)
+
+    def aligned_parts(
+        self, sequence: Floats, movement: Movement, begins: Ints, alignments: int, margin: float
+    ) -> Floats:
+        """See `search_kernels.aligned_parts`; theta is where `estimate` finds it."""
+        _, projector, triangle = self._condensing
+        starts, bound = self.monomials.starts, 1.0 + 2.0 * margin
+        return aligned_parts(sequence, movement, begins, alignments, starts, bound, projector, triangle, NEWTON_STEPS)
+
+    def widened(self, covariance: Floats) -> CorrelatedRegression:
+        """With noise of that covariance (n, n) in every movement."""
+        own = self.root @ self.root.T
+        moments = own if self.shrinkage >= 1.0 else own - self.shrinkage * np.diag(np.diagonal(own))
+        distances = distances_with_noise(self.distances, own, moments, covariance)
+        return replace(self, root=np.linalg.cholesky(own + covariance).astype(np.float64), distances=distances)
 
     def log_density(self, y: Floats, distance: float) -> float:
         """Logarithm of the density of y (n,) at a squared Mahalanobis distance."""
@@ -109,24 +160,34 @@ class CorrelatedRegression:
     def log_typicality(self, distance: float) -> float:
         """Logarithm of the probability that a genuine movement lies as far from the model or farther.
 
-        The logarithms of the distances of unseen training movements are taken for normally distributed.
+        The logarithms of the distances of unseen training movements are taken for normally distributed, in a group that
+        was not seen about another mean.
         """
-        if len(self.distances) < 2:
-            return 0.0
-        known = np.log(self.distances + 1e-9)
-        return float(log_ndtr(-(np.log(distance + 1e-9) - known.mean()) / max(float(known.std()), 1e-3)))
+        return self._usual.log_above(float(np.log(distance + 1e-9)))
+
+    @cached_property
+    def _usual(self) -> PredictiveDistribution:
+        """Of the logarithm of the distance of a genuine movement."""
+        return PredictiveDistribution.of(np.log(self.distances + 1e-9), self.groups)
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
         scalars = np.array([self.inflation, self.shrinkage, *self.ridge])
-        return {"coefficients": self.coefficients, "root": self.root, "distances": self.distances, "scalars": scalars}
+        own = {"coefficients": self.coefficients, "root": self.root, "distances": self.distances, "scalars": scalars}
+        return own | {"groups": self.groups.astype(np.float64)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], prefix: str, monomials: Monomials) -> CorrelatedRegression:
-        """From what `arrays` gave, with a prefix to the names. Raises ValueError for shapes that do not fit."""
+        """From what `arrays` gave, with a prefix to the names. Raises ValueError for shapes that do not fit.
+
+        Files of earlier releases hold no groups: each movement is then one of its own.
+        """
         coefficients, root = arrays[f"{prefix}coefficients"], arrays[f"{prefix}root"]
         distances, scalars = arrays[f"{prefix}distances"], arrays[f"{prefix}scalars"]
         count = len(coefficients)
+        groups = arrays.get(f"{prefix}groups", np.arange(float(len(distances))))
+        if groups.shape != distances.shape:
+            raise ValueError(f"expected {prefix}groups of shape {distances.shape}, found {groups.shape}")
         if coefficients.shape != (count, len(monomials)) or root.shape != (count, count) or distances.ndim != 1:
             raise ValueError(
                 f"expected {prefix}coefficients of shape (n, {len(monomials)}) and root of shape (n, n), "
@@ -135,78 +196,73 @@ class CorrelatedRegression:
         if not (np.diagonal(root) > 0).all() or scalars.ndim != 1 or len(scalars) < 3 or not scalars[0] > 0:
             raise ValueError(f"expected a root with a positive diagonal and an inflation above 0 in {prefix}scalars")
         inflation, shrinkage, *ridge = (float(one) for one in scalars)
-        return cls(monomials, coefficients, root, inflation, distances, tuple(ridge), shrinkage)
+        return cls(
+            monomials, coefficients, root, inflation, distances, groups.astype(np.int64), tuple(ridge), shrinkage
+        )
 
-    def _condensed(self, y: Floats) -> tuple[Floats, Floats, float]:
-        """R and c with |L^-1 (y - Z phi)|^2 = |c - R phi|^2 + rest: the movement in as many numbers as monomials."""
+    def _check_length(self, y: Floats) -> None:
         if len(y) != len(self.coefficients):
             raise ValueError(f"expected a movement as {len(self.coefficients)} numbers, found {len(y)}")
-        basis, triangle = self._condensing
-        white = solve_triangular(self.root, y, lower=True, check_finite=False)
-        right = basis.T @ white
-        return right, triangle, float(white @ white - right @ right)
 
     @cached_property
-    def _condensing(self) -> tuple[Floats, Floats]:
-        """Q and R of L^-1 Z = Q R."""
-        white = solve_triangular(self.root, self.coefficients, lower=True)
-        basis, triangle = np.linalg.qr(white)
-        return basis, np.ascontiguousarray(triangle)
+    def _condensing(self) -> tuple[Floats, Floats, Floats]:
+        """L^-1, Q' L^-1 and R, where L^-1 Z = Q R: |L^-1 (y - Z phi)|^2 = |Q' L^-1 y - R phi|^2 + a rest.
 
-    @cached_property
-    def _starts(self) -> Floats:
-        """Where theta is looked for: the middle, and half-way to the corners if means are not linear. Shape (S, P)."""
-        middle = np.zeros((1, len(self.monomials.centre)))
-        if self.monomials.degrees.max() == 1:
-            return middle
-        return np.concatenate([middle, list(product((-0.5, 0.5), repeat=middle.shape[1]))])
+        So a movement is searched for in as many numbers as there are monomials.
+        """
+        inverse = solve_triangular(self.root, np.eye(len(self.root)), lower=True)
+        basis, triangle = np.linalg.qr(inverse @ self.coefficients)
+        return np.ascontiguousarray(inverse), np.ascontiguousarray(basis.T @ inverse), np.ascontiguousarray(triangle)
 
 
 @dataclass(frozen=True)
-class _Fold:
+class LeftOutFold:
     """Movements that a regression has not seen: residuals (k, n) and slopes (k, n, P) by the others' coefficients.
+
+    `members` (k,) are their numbers.
 
     `reference` are residuals of the others, each left out in turn; had their regression seen the tested movements, the
     covariance would know the noise of those.
     """
 
+    members: Ints
     reference: Floats
     residuals: Floats
     slopes: Floats
 
 
-def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[_Fold]:
-    """The folds of `fold_numbers` that leave at least two other movements."""
-    numbers, features = fold_numbers(groups), monomials.at(theta)
-    folds = []
-    for fold in np.unique(numbers):
-        tested, others = np.flatnonzero(numbers == fold), np.flatnonzero(numbers != fold)
-        if len(others) < 2:
-            continue
+def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[LeftOutFold]:
+    features, folds = monomials.at(theta), []
+    for tested, others in folds_of(groups):
         seen = features[others]
         coefficients = np.linalg.solve(seen.T @ seen + penalty, seen.T @ y[others]).T
         slopes = np.stack([coefficients @ monomials.jacobian(one) * monomials.scale for one in theta[tested]])
         reference = residuals_left_out(y[others], seen, penalty, groups[others])
-        folds.append(_Fold(reference, y[tested] - features[tested] @ coefficients.T, slopes))
+        folds.append(LeftOutFold(tested, reference, y[tested] - features[tested] @ coefficients.T, slopes))
     return folds
 
 
-def _chosen_shrinkage(folds: list[_Fold], candidates: tuple[float, ...]) -> tuple[float, Floats, Floats]:
-    """Shrinkage with the least error of theta on unseen movements; those in predicted deviations, and the distances."""
-    best, least = (candidates[-1], np.zeros(0), np.zeros(0)), np.inf
+def chosen_shrinkage(
+    folds: list[LeftOutFold], candidates: tuple[float, ...]
+) -> tuple[float, Floats, list[Floats], float]:
+    """Shrinkage with the least error of theta on unseen movements.
+
+    Those errors in predicted deviations, of all folds, the distances of the movements of each fold, and the mean error.
+    """
+    best, least = (candidates[-1], np.zeros(0), list[Floats](), np.inf), np.inf
     for shrinkage in candidates:
         found = [_tested(fold, shrinkage) for fold in folds]
         if not found:
             break
-        error, excess, distance = np.concatenate(found, axis=1)
+        error, excess, _ = np.concatenate(found, axis=1)
         total = float(np.sqrt(error + 1e-12).mean())
         if total < least:
             least = total
-            best = shrinkage, excess, np.maximum(distance, 0.0)
+            best = shrinkage, excess, [np.maximum(distance, 0.0) for _, _, distance in found], total
     return best
 
 
-def _tested(fold: _Fold, shrinkage: float) -> Floats:
+def _tested(fold: LeftOutFold, shrinkage: float) -> Floats:
     """Squared error of theta, the same in predicted deviations, and distance, of each tested movement. Shape (3, k)."""
     dimension = fold.slopes.shape[-1]
     solved = _solved(fold.reference, shrinkage, np.concatenate([fold.residuals.T, *fold.slopes], axis=1))
@@ -215,13 +271,28 @@ def _tested(fold: _Fold, shrinkage: float) -> Floats:
     for k in range(count):
         wide = solved[:, count + k * dimension : count + (k + 1) * dimension]
         gradient = wide.T @ fold.residuals[k]
-        missed = np.linalg.solve(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
+        missed = _solved_or_least(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
         excess = float(missed @ gradient)
         result[:, k] = missed @ missed, excess, fold.residuals[k] @ solved[:, k] - excess
     return result
 
 
-def _shrunk(residuals: Floats, shrinkage: float) -> Floats:
+def _solved_or_least(matrix: Floats, right: Floats) -> Floats:
+    """matrix^-1 right; the shortest solution where two or three movements say nothing about a direction of theta."""
+    try:
+        return np.linalg.solve(matrix, right).astype(np.float64)
+    except np.linalg.LinAlgError:
+        return np.linalg.lstsq(matrix, right)[0].astype(np.float64)
+
+
+def deviations_of(residuals: Floats) -> Floats:
+    """Standard deviations of residuals (K, n), none much below the mean one. Shape (n,)."""
+    deviation = np.sqrt((residuals**2).mean(axis=0))
+    result: Floats = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
+    return result
+
+
+def shrunk(residuals: Floats, shrinkage: float) -> Floats:
     """Second moments of standardised residuals (K, n), correlations shrunk. Shape (n, n)."""
     moments = residuals.T @ residuals / len(residuals)
     diagonal = np.diag(np.maximum(np.diagonal(moments), 1e-6))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,6 +45,14 @@ class Monomials:
         """Degree of each monomial. Shape (F,)."""
         result: Ints = self.exponents.sum(axis=1)
         return result
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Scaled places where theta is looked for: the middle, and half-way to the corners unless linear. (S, P)."""
+        middle = np.zeros((1, len(self.centre)))
+        if self.degrees.max() <= 1:
+            return middle
+        return np.concatenate([middle, list(itertools.product((-0.5, 0.5), repeat=len(self.centre)))])
 
     def __len__(self) -> int:
         return len(self.exponents)

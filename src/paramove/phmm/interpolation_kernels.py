@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from paramove.hmm.compilation import compiled, compiled_sums
 from paramove.hmm.kernels import feasible_ends, stacked_segments
+from paramove.hmm.vector_functions import dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -120,14 +121,6 @@ def _squares(columns: Floats, n: int, out: Floats) -> None:
             out[f] += source[f] * source[f]
 
 
-@compiled_sums
-def _dot(first: Floats, second: Floats) -> float:
-    total = 0.0
-    for k in range(len(first)):
-        total += first[k] * second[k]
-    return total
-
-
 @compiled
 def outputs_at(
     columns: Floats, ends: Ints, numbers: Ints, weights: Floats, clamped: Floats, means: Floats, covariances: Floats,
@@ -231,7 +224,7 @@ def expectation_at(
                 pulled[k, n] = white[i, k, f]
             n += 1
         for k in range(dim):
-            score[k, 0] = smoothing * _dot(pulled[k, :n], shares[:n])
+            score[k, 0] = smoothing * dot(pulled[k, :n], shares[:n])
         for p in range(dimension):
             for k in range(dim):
                 moved[k, p] = 0.0
@@ -245,8 +238,8 @@ def expectation_at(
         _spread_score(roots[i], dim, pulled, shares, n, weight / smoothing, spread, flat)
         _backward_substituted(roots[i], dim, 1, score)
         for c in range(len(numbers)):
-            from_means[c] += _dot(means[numbers[c], i], score[:, 0])
-            from_spread[c] += 0.5 * smoothing * _dot(flat, covariances[numbers[c], i])
+            from_means[c] += dot(means[numbers[c], i], score[:, 0])
+            from_spread[c] += 0.5 * smoothing * dot(flat, covariances[numbers[c], i])
             for d in range(d_min - 1, d_max):
                 if counted[i, d] > 0.0:
                     from_spread[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])

@@ -15,6 +15,8 @@ Ints = NDArray[np.int64]
 
 BORDER = 1e-9
 MOST_STEPS, TOLERANCE = 40, 1e-3
+PROMISE = 1e-5
+"""A step that promises a smaller gain is not tried."""
 COARSE = 30.0
 """Tolerance of the search with widened covariances."""
 NEAREST, FURTHEST = 4.0, 32.0
@@ -92,6 +94,8 @@ def climbed(
         if not value > -np.inf:
             break
         step = _step(place, gradient, curvature, lower, upper)
+        if 0.0 <= np.dot(gradient, step) < 2.0 * PROMISE:
+            break
         share, gain = 1.0, -np.inf
         for _ in range(8):
             candidate = np.minimum(np.maximum(place + share * step, lower), upper)

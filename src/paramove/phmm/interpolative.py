@@ -1,6 +1,7 @@
 """The interpolative parametric HMM: multilinear interpolation of synchronised local HMMs on a grid (thesis 3.4)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Self, cast
 
 import numpy as np
@@ -14,6 +15,7 @@ from paramove.phmm.bending import bending
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
+from paramove.phmm.noise import AddedNoise, expected_responsibilities
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance import state_averages
 from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity, left_out_of_groups
@@ -130,7 +132,8 @@ class InterpolativePHMM(ParametricHMM):
         numbers = self.grid_.nearest(theta)[0]
         evaluators = [Evaluator.of(one) for one in self.local_models()]
         averages = [
-            state_averages(evaluators[g], x)[0].ravel() for g, x in zip(numbers.tolist(), sequences, strict=True)
+            state_averages(evaluators[g].expectation(x)[1].T, x)[0].ravel()
+            for g, x in zip(numbers.tolist(), sequences, strict=True)
         ]
         residuals = np.stack(averages) - self.means_[numbers].reshape(len(numbers), -1)
         counts = self._kernel_arrays()[1]
@@ -184,8 +187,12 @@ class InterpolativePHMM(ParametricHMM):
             raise ValueError(
                 "an InterpolativePHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings"
             )
-        checked = self._resampled(checked_sequence(sequence, self._learned_dimensions()))
+        recorded = checked_sequence(sequence, self._learned_dimensions())
+        checked = self._resampled(recorded)
         check_length(len(checked), self.n_states, self.d_min, self.d_max)
+        model = self._expecting_noise_of(recorded)
+        if model is not self:
+            return model.estimate(recorded)
         best, value, cell = interpolation_search.likeliest(
             self.search_margin, SMOOTHING, np.ascontiguousarray(checked.T), *self._kernel_arrays()
         )
@@ -199,6 +206,14 @@ class InterpolativePHMM(ParametricHMM):
         edges = self.grid_.edges
         spread = self.covariance_inflation * (edges.T @ covariance @ edges)
         return ParameterEstimate(self.grid_.theta(best), spread, float(value))
+
+    def _expect(self, noise: AddedNoise) -> None:
+        self.covariances_ = self.covariances_ + noise.of_states
+        self._prepared = None
+        if self.spread_ is not None:
+            gamma = expected_responsibilities(self.durations_.mean(axis=0), noise.seen)
+            of_states = noise.of_averages(lambda frames: state_averages(gamma, frames)[0])
+            self.spread_ = replace(self.spread_, own=self.spread_.own + np.diagonal(of_states))
 
     def _learned_dimensions(self) -> int:
         self._check_trained()

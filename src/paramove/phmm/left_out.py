@@ -1,5 +1,7 @@
 """Which movements are left out together, and how much wider regions of theta must be for errors seen on them."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri  # scipy.stats would take half a second to import
@@ -18,6 +20,15 @@ def fold_numbers(groups: Ints) -> Ints:
     different = np.unique(groups)
     numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(groups))
     return np.asarray(numbers % MOST_FOLDS, dtype=np.int64)
+
+
+def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Tested movements and the others, for each fold of `fold_numbers` that leaves at least two others."""
+    numbers = fold_numbers(groups)
+    for fold in np.unique(numbers):
+        tested, others = np.flatnonzero(numbers == fold), np.flatnonzero(numbers != fold)
+        if len(others) > 1:
+            yield tested, others
 
 
 def inflation_of(excess: Floats, dimension: int, n_groups: int, least: float) -> float:

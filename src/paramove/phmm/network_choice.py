@@ -51,7 +51,7 @@ def chosen_units(
         n_hidden = fewest  # nothing says that the rest is not noise
     numbers = NUMBERS_OF_UNITS if n_hidden is None else (n_hidden,)
     best = Choice(0, DECAYS[0], np.zeros((shape[0], 0, shape[1] + 1)))
-    least = _left_out_error(targets, groups, best) if n_hidden is None and fewest == 0 else np.inf
+    known = _left_out_errors(targets, groups, best) if n_hidden is None and fewest == 0 else None
     for number in numbers if n_hidden != 0 else ():
         if n_hidden is None and number > 2 * max(1, best.n_hidden):
             break  # half as many were not worth it
@@ -59,9 +59,10 @@ def chosen_units(
         for decay in DECAYS:
             choice, start = _trained(targets, Choice(number, decay, starts[0]), starts)
             # Left-out groups must not be known to the start either, so it is the drawn one again.
-            error = _left_out_error(targets, groups, replace(choice, inner=start)) if n_groups > 1 else -decay
-            if error < least * (1.0 - (WORTH if number > best.n_hidden and np.isfinite(least) else 0.0)):
-                best, least = choice, error
+            again = replace(choice, inner=start)
+            errors = _left_out_errors(targets, groups, again) if n_groups > 1 else np.array([-decay])
+            if known is None or _better(errors, known, more=number > best.n_hidden):
+                best, known = choice, errors
     return best
 
 
@@ -95,21 +96,39 @@ def _trained(targets: StateTargets, choice: Choice, starts: list[Floats]) -> tup
     return replace(choice, inner=reached[best]), starts[best]
 
 
-def _left_out_error(targets: StateTargets, groups: Ints, choice: Choice) -> float:
-    """Mean over states and dimensions of the logarithm of squared misses of left-out groups, exponentiated."""
+def _better(errors: Floats, known: Floats, more: bool) -> bool:
+    """Whether the last of `errors`, of all folds together, is less.
+
+    With more units by `WORTH`, and in the folds (all but the last) by more than one standard error: else one fold of a
+    few groups would decide.
+    """
+    if not more:
+        return bool(errors[-1] < known[-1])
+    gains = known[:-1] - errors[:-1]
+    by_chance = float(gains.std(ddof=1)) / np.sqrt(len(gains)) if len(gains) > 1 else 0.0
+    return bool(errors[-1] < known[-1] + np.log(1.0 - WORTH) and gains.mean() > by_chance)
+
+
+def _left_out_errors(targets: StateTargets, groups: Ints, choice: Choice) -> Floats:
+    """Mean over states and dimensions of the logarithm of squared misses, of each left-out fold and of all together.
+
+    Dimensions are those of the movements: which way the targets are turned is arbitrary where covariances are alike.
+    """
     different = np.unique(groups)
     folds = np.searchsorted(different, groups) % MOST_FOLDS
-    whole = with_decay(targets, choice)
-    missed = np.zeros(targets.rotated.shape[1:])
+    whole, back = with_decay(targets, choice), np.linalg.inv(targets.rotation)
+    missed = []
     for fold in np.unique(folds):
         seen, tested = folds != fold, folds == fold
         if not seen.any():
             continue
         part = _part(whole, seen)
         found = part.networks(part.improved(choice.inner, STEPS))
-        rotated = _rotated_means(found, _part(whole, tested))
-        missed += (((targets.rotated[tested] - rotated) ** 2) * targets.weights[tested][:, :, None]).sum(axis=0)
-    return float(np.exp(np.log(missed + 1e-300).mean()))
+        turned = targets.rotated[tested] - _rotated_means(found, _part(whole, tested))
+        squared = np.einsum("nde,kne->knd", back, turned) ** 2
+        missed.append((squared * targets.weights[tested][:, :, None]).sum(axis=0))
+    everything = np.stack([*missed, np.sum(missed, axis=0)])
+    return np.asarray(np.log(everything + 1e-300).mean(axis=(1, 2)))
 
 
 def _part(targets: StateTargets, chosen: NDArray[np.bool_]) -> StateTargets:

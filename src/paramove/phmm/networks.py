@@ -34,6 +34,16 @@ class StateNetworks:
     outer: Floats
     inner: Floats
 
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, Floats], n_states: int, n_features: int, n_components: int) -> StateNetworks:
+        """From a file's "skip", "outer" and "inner". Raises ValueError for shapes that do not fit together."""
+        dim, hidden = arrays["skip"].shape[1], arrays["inner"].shape[1]
+        expected = {"skip": (dim, n_features), "outer": (dim, hidden), "inner": (hidden, n_components + 1)}
+        for name, shape in expected.items():
+            if arrays[name].shape != (n_states, *shape):
+                raise ValueError(f"expected {name} of shape {(n_states, *shape)}, found {arrays[name].shape}")
+        return cls(arrays["skip"], arrays["outer"], arrays["inner"])
+
     def means(self, places: Floats, features: Floats) -> Floats:
         """Means of all states at scaled theta (M, P) with monomials (M, F). Shape (M, N, D)."""
         hidden = hidden_units(self.inner, places)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +18,13 @@ from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.network_choice import chosen_units, with_decay
+from paramove.phmm.network_performance import NetworkPerformances, StateAverages, parts_of
 from paramove.phmm.network_training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
-from paramove.phmm.networks import StateNetworks, hidden_units
+from paramove.phmm.networks import StateNetworks
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity
+from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed
-from paramove.phmm.ridge import chosen_ridge, residuals_left_out
+from paramove.phmm.ridge import chosen_ridge
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +33,7 @@ SMOOTHNESS = 0.05
 MOST_STARTS = 32
 CLIMBED = 3
 MOST_STEPS, TOLERANCE = 40, 1e-6
+REALIGNMENTS = 2
 
 
 class NeuralPHMM(ParametricHMM):
@@ -51,7 +54,7 @@ class NeuralPHMM(ParametricHMM):
         networks_: the StateNetworks; of scaled theta.
         n_hidden_: hidden units of each state.
         covariances_: shape (N, D, D). durations_: p_i(d) in column d - 1, shape (N, d_max).
-        spread_: how whole training performances vary.
+        performances_: how whole training performances vary.
     """
 
     def __init__(
@@ -119,7 +122,7 @@ class NeuralPHMM(ParametricHMM):
             begin, prior, data.sequences, places, features, options, self.gradient_steps
         )
         self._set_learned(monomials, trained.networks, trained.covariances, trained.durations)
-        self.spread_ = self._performance_spread(data, places, features, prior.ridge)
+        self.performances_ = self._performances(data, places, features, prior.ridge)
 
     def _aligned(self, data: TrainingData, options: TrainingOptions) -> tuple[RegressedParameters, Monomials]:
         """A polynomial model that says which frames belong to which states."""
@@ -132,23 +135,13 @@ class NeuralPHMM(ParametricHMM):
         trained, _ = train_regressed(initial, data.sequences, features, monomials.degrees, options, SMOOTHNESS)
         return trained, monomials
 
-    def _performance_spread(
-        self, data: TrainingData, places: Floats, features: Floats, ridge: Floats
-    ) -> PerformanceSpread:
+    def _performances(self, data: TrainingData, places: Floats, features: Floats, ridge: Floats) -> NetworkPerformances:
         learned = NetworkParameters(self.networks_, self.covariances_, self.durations_, self.d_min)
         found = SequenceMoments.gathered(learned, data.sequences, self.networks_.means(places, features))
-        hidden = hidden_units(self.networks_.inner, places)
-        alone = np.arange(len(places))
-        residuals = np.empty_like(found.averages)
-        for i in range(self.n_states):
-            design = np.concatenate([features, hidden[:, i]], axis=1)
-            held = np.diag(ridge / found.weights[:, i].mean() + 1e-9)
-            residuals[:, i] = residuals_left_out(found.averages[:, i], design, held, alone)
-        sensitivities = [
-            self._sensitivity(place, len(sequence)) for place, sequence in zip(places, data.sequences, strict=True)
-        ]
-        n_groups = len(np.unique(data.groups))
-        return PerformanceSpread.fitted(residuals.reshape(len(places), -1), sensitivities, n_groups)
+        jacobians = np.stack([self._jacobian(place) for place in places])
+        averages = np.concatenate([found.averages, [sequence[-1:] for sequence in data.sequences]], axis=1)
+        shown = StateAverages(places, features, jacobians, averages, found.weights, ridge, data.groups)
+        return NetworkPerformances.fitted(shown, self.networks_.inner)
 
     def _set_learned(
         self, monomials: Monomials, networks: StateNetworks, covariances: Floats, durations: Floats
@@ -181,11 +174,13 @@ class NeuralPHMM(ParametricHMM):
         return value, gradient / self.monomials_.scale
 
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """Maximum likelihood theta by generalised EM from several starts (thesis 3.3.2.2); its covariance from how
-        whole training performances differ from their means.
+        """Theta of a complete movement and its covariance.
+
+        Maximum likelihood by generalised EM from several starts (thesis 3.3.2.2) tells where the states are; theta then
+        follows from their averages, by how whole training performances differ from their means.
 
         Raises ValueError for `finished=False`: networks of complete movements know nothing of beginnings.
-        """  # fmt: skip
+        """
         if not finished:
             raise ValueError("a NeuralPHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings")
         checked = self._checked(sequence)
@@ -193,10 +188,30 @@ class NeuralPHMM(ParametricHMM):
         starts = self._starts()
         values = [self._value(start, prepared) for start in starts]
         reached = [self._climbed(starts[number], prepared) for number in np.argsort(values)[: -CLIMBED - 1 : -1]]
-        best, value = max(reached, key=lambda one: one[1])
-        covariance = self.spread_.covariance(self._sensitivity(best, len(checked)), self._widest)
+        likeliest = max(reached, key=lambda one: one[1])[0]
+        best, covariance = self._refined(likeliest, checked)
         scale = self.monomials_.scale
-        return ParameterEstimate(self.monomials_.centre + scale * best, covariance * np.outer(scale, scale), value)
+        theta = self.monomials_.centre + scale * best
+        return ParameterEstimate(theta, covariance * np.outer(scale, scale), self._value(best, prepared))
+
+    def _refined(self, place: Floats, checked: Floats) -> tuple[Floats, Floats]:
+        """Scaled theta by whole performances, beginning with the likeliest, and its covariance."""
+        for _ in range(REALIGNMENTS):
+            evaluator = replace(self._common(), means=self._means_and_slopes(place)[0])
+            averages, weights = state_averages(evaluator.expectation(checked)[1].T, checked)
+            observed = parts_of(np.concatenate([averages, checked[-1:]]), weights)
+            missed = partial(self._missed, observed, weights)
+            place, covariance = self.performances_.nearest(place, self._widest, missed)
+        return place, covariance
+
+    def _missed(self, observed: Floats, weights: Floats, place: Floats) -> tuple[Floats, Floats]:
+        """Parts of a movement (n,) minus those of the networks at a place, and the slopes of the latter (n, P)."""
+        last, jacobian = self.performances_.last, self._jacobian(place)
+        means, slopes = self._means_and_slopes(place)
+        end = last.means(place[None], self._features(place)[None])[0]
+        slopes = np.concatenate([slopes, last.slopes(place, jacobian)])
+        wide = np.stack([parts_of(one, weights) for one in np.moveaxis(slopes, 2, 0)], axis=1)
+        return observed - parts_of(np.concatenate([means, end]), weights), wide
 
     @property
     def _widest(self) -> float:
@@ -209,7 +224,7 @@ class NeuralPHMM(ParametricHMM):
         line = np.linspace(-1.0, 1.0, 2 * lines + 1)[1::2]
         return np.array(list(itertools.product(line, repeat=dimension)) if dimension < 6 else [np.zeros(dimension)])
 
-    def _climbed(self, place: Floats, prepared: tuple[Any, ...]) -> tuple[Floats, float]:
+    def _climbed(self, place: Floats, prepared: search_kernels.Movement) -> tuple[Floats, float]:
         """Gauss-Newton steps with exact gradients, shortened while the likelihood would fall, within the bounds."""
         bounds = np.full(len(place), self._widest)
         value, gradient, information = self._expectation(place, prepared)
@@ -228,7 +243,7 @@ class NeuralPHMM(ParametricHMM):
                 break
         return place, value
 
-    def _expectation(self, place: Floats, prepared: tuple[Any, ...]) -> tuple[float, Floats, Floats]:
+    def _expectation(self, place: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
         """ln p, its gradient and the information of the means in scaled theta, at one place.
 
         At a place the means and their slopes are those of a linear model, and so are value and derivatives.
@@ -236,42 +251,45 @@ class NeuralPHMM(ParametricHMM):
         means, slopes = self._means_and_slopes(place)
         linear = np.concatenate([(means - slopes @ place)[..., None], slopes], axis=2)
         exponents = np.concatenate([np.zeros((1, len(place)), np.int64), np.eye(len(place), dtype=np.int64)])
-        frames, present, whitening, *rest = prepared
-        white = np.ascontiguousarray(whitening @ linear)
-        value, gradient, information = search_kernels.expectation_at(place, exponents, frames, present, white, *rest)
+        own = prepared._replace(white=np.ascontiguousarray(prepared.white @ linear), exponents=exponents)
+        value, gradient, information = search_kernels.expectation_at(place, own)
         return float(value), gradient, information
 
-    def _value(self, place: Floats, prepared: tuple[Any, ...]) -> float:
+    def _value(self, place: Floats, prepared: search_kernels.Movement) -> float:
         means = self.networks_.means(place[None], self._features(place)[None])[0]
-        frames, present, whitening, *rest = prepared
-        white, exponents = np.ascontiguousarray(whitening @ means[..., None]), np.zeros((1, len(place)), np.int64)
-        return float(search_kernels.log_likelihood_at(place, exponents, frames, present, white, *rest))
+        own = prepared._replace(
+            white=np.ascontiguousarray(prepared.white @ means[..., None]),
+            exponents=np.zeros((1, len(place)), np.int64),
+        )
+        return float(search_kernels.log_likelihood_at(place, own))
 
     def _means_and_slopes(self, place: Floats) -> tuple[Floats, Floats]:
-        theta = self.monomials_.centre + self.monomials_.scale * place
-        jacobian = self.monomials_.jacobian(theta) * self.monomials_.scale
         means = self.networks_.means(place[None], self._features(place)[None])[0]
-        return means, self.networks_.slopes(place, jacobian)
+        return means, self.networks_.slopes(place, self._jacobian(place))
+
+    def _jacobian(self, place: Floats) -> Floats:
+        """Slopes of the monomials in scaled theta. Shape (F, P)."""
+        theta = self.monomials_.centre + self.monomials_.scale * place
+        return self.monomials_.jacobian(theta) * self.monomials_.scale
 
     def _features(self, place: Floats) -> Floats:
         return self.monomials_.at(self.monomials_.centre + self.monomials_.scale * place)
 
-    def _sensitivity(self, place: Floats, n_frames: int) -> Sensitivity:
-        means, slopes = self._means_and_slopes(place)
-        return Sensitivity.of(Parameters(means, self.covariances_, self.durations_, self.d_min), slopes, n_frames)
+    def _prepared(self, sequence: Floats) -> search_kernels.Movement:
+        """What the kernels need beside a place; `white` holds the whitening, and exponents those of no place."""
+        evaluator = self._common()
+        ends = evaluator.ends(len(sequence))
+        frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
+        none = np.zeros((0, 0), np.int64)
+        return search_kernels.Movement(
+            frames, rows, evaluator.whitening, none, evaluator.log_norm, evaluator.log_duration, self.d_min, ends
+        )
 
-    def _prepared(self, sequence: Floats) -> tuple[Any, ...]:
-        """What the kernels need beside a place: whitened frames, whitening, and the rest in their order."""
+    def _common(self) -> Evaluator:
+        """Everything but the means."""
         if self._evaluator is None:
             self._evaluator = Evaluator.of(self.at(self.monomials_.centre).parameters)
-        evaluator = self._evaluator
-        ends = evaluator.ends(len(sequence))
-        present = np.ones(len(sequence), dtype=np.bool_)
-        frames = search_kernels.whitened_frames(sequence, present, evaluator.whitening, ends)
-        return (
-            frames, present, evaluator.whitening, evaluator.log_norm, evaluator.log_duration, self.d_min, ends,
-            len(sequence),
-        )  # fmt: skip
+        return self._evaluator
 
     def _checked(self, sequence: ArrayLike) -> Floats:
         self._check_trained()
@@ -304,7 +322,7 @@ class NeuralPHMM(ParametricHMM):
             "durations": self.durations_,
             "theta_centre": self.monomials_.centre,
             "theta_scale": self.monomials_.scale,
-            **self.spread_.arrays(),
+            **self.performances_.arrays(),
         }
 
     def _set_arrays(self, arrays: dict[str, Floats]) -> None:
@@ -313,22 +331,15 @@ class NeuralPHMM(ParametricHMM):
             raise ValueError(f"expected theta_scale above 0 as long as theta_centre, found {scale.shape}: {scale}")
         spanned = _monomials(self.skip_degree, np.stack([centre - scale, centre + scale]))
         monomials = Monomials(spanned.exponents, centre, scale)
-        dim, hidden = arrays["skip"].shape[1], arrays["inner"].shape[1]
-        expected: dict[str, tuple[int, ...]] = {
-            "skip": (self.n_states, dim, len(monomials)),
-            "outer": (self.n_states, dim, hidden),
-            "inner": (self.n_states, hidden, len(centre) + 1),
-            "covariances": (self.n_states, dim, dim),
-            "durations": (self.n_states, self.d_max),
-        }
-        for name, shape in expected.items():
+        networks = StateNetworks.from_arrays(arrays, self.n_states, len(monomials), len(centre))
+        dim = networks.skip.shape[1]
+        for name, shape in {"covariances": (self.n_states, dim, dim), "durations": (self.n_states, self.d_max)}.items():
             if arrays[name].shape != shape:
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
-        local = (arrays["skip"][None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
+        local = (networks.skip[None, ..., 0], arrays["covariances"][None], arrays["durations"][None])
         check_local_models(*local, self.d_min)
-        networks = StateNetworks(arrays["skip"], arrays["outer"], arrays["inner"])
         self._set_learned(monomials, networks, arrays["covariances"], arrays["durations"])
-        self.spread_ = PerformanceSpread.from_arrays(arrays, self.n_states * dim)
+        self.performances_ = NetworkPerformances.from_arrays(arrays, networks)
 
 
 def _monomials(degree: int, theta: Floats) -> Monomials:

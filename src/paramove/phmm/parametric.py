@@ -3,6 +3,7 @@
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -15,6 +16,7 @@ from paramove.hmm.sequences import checked_sequence, checked_sequences
 from paramove.hmm.synthesis import Path as PathKind
 from paramove.hmm.synthesis import Timing, at_progress
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 from paramove.phmm.training_checks import check_training
@@ -60,6 +62,7 @@ class ParametricHMM(ABC):
     Attributes:
         parameter_bounds_: least and greatest theta of the training, shape (2, P).
         training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
+        training_noise_: how noisy the training is; None in files of earlier releases, where noise is not looked for.
         training_: what training did.
     """
 
@@ -81,6 +84,7 @@ class ParametricHMM(ABC):
         self.description = description
         self.parameter_bounds_: Floats | None = None
         self.training_theta_: Floats | None = None
+        self.training_noise_: NoiseLevel | None = None
         self.training_: TrainingSummary | None = None
 
     @abstractmethod
@@ -130,6 +134,7 @@ class ParametricHMM(ABC):
         check_training(recorded, checked, labels, (self.n_states, self.d_min, self.d_max), floor)
         self.parameter_bounds_ = np.stack([labels.min(axis=0), labels.max(axis=0)])
         self.training_theta_ = np.unique(labels, axis=0)
+        self.training_noise_ = NoiseLevel.of(recorded)
         self._fit(TrainingData(checked, recorded, labels, groups_of(groups, labels)))
         return self
 
@@ -201,6 +206,8 @@ class ParametricHMM(ABC):
         arrays = {"parameter_bounds": self.parameter_bounds_, **self._arrays()}
         if self.training_theta_ is not None:
             arrays["training_theta"] = self.training_theta_
+        if self.training_noise_ is not None:
+            arrays["training_noise"] = self.training_noise_.array()
         write_record(Path(path), ModelRecord(type(self).__name__, self.get_params(), self.training_, arrays))
 
     @classmethod
@@ -220,6 +227,8 @@ class ParametricHMM(ABC):
             arrays = dict(record.arrays)
             model.parameter_bounds_ = arrays.pop("parameter_bounds")
             model.training_theta_ = arrays.pop("training_theta", None)
+            noise = arrays.pop("training_noise", None)
+            model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
             model._set_arrays(arrays)
         except KeyError as error:
             found = ", ".join(sorted(record.arrays)) or "none"
@@ -228,6 +237,21 @@ class ParametricHMM(ABC):
             raise ModelFileError(f"{path}: {error}") from error
         model.training_ = record.training
         return model
+
+    def _expecting_noise_of(self, recorded: Floats) -> Self:
+        """This model, or if a recorded sequence has more noise than the training, one that expects as much."""
+        noise = None
+        if self.training_noise_ is not None:
+            noise = self.training_noise_.added(recorded, self.resampled_frames)
+        if noise is None:
+            return self
+        model = copy(self)
+        model.training_noise_ = None
+        model._expect(noise)
+        return model
+
+    def _expect(self, noise: AddedNoise) -> None:  # noqa: B027 (a model may leave noise to the likelihood)
+        """Take sequences for so noisy; changes a copy of a trained model."""
 
     def _check_counts(self) -> None:
         counts = {name: getattr(self, name) for name in ("n_states", "d_min", "d_max")}

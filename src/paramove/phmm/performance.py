@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import log_ndtr
 
 from paramove.hmm import resample
-from paramove.hmm.estimation import Evaluator
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
+from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
+from paramove.phmm.typicality import PredictiveDistribution
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,7 +22,8 @@ Ints = NDArray[np.int64]
 FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""
 BEGINNING_POINTS = 5
-MOVEMENT_PARTS = 10
+MOVEMENT_PARTS = (5, 3, 10)
+"""How many parts of a movement theta is told by: whichever tells it best of groups that are left out."""
 BEGINNING_SHRINKAGES = (0.1, 0.3)
 PACE_PARTS, PACE_SHRINKAGE, PACE_SHARE = 10, 0.1, 0.35
 
@@ -33,11 +35,13 @@ class Pace:
     Attributes:
         mean: of `pace_features`, shape (10,). root: triangular root of their covariance, shape (10, 10).
         distances: squared Mahalanobis distances of training movements, their group left out. Shape (K,).
+        noise: variance of noise beyond that of the training that is expected of each coordinate of each frame.
     """
 
     mean: Floats
     root: Floats
     distances: Floats
+    noise: float = 0.0
 
     @classmethod
     def fitted(cls, sequences: Sequence[Floats], groups: Ints) -> Pace:
@@ -53,9 +57,20 @@ class Pace:
         white = np.linalg.solve(root, deviations.T)
         return cls(features.mean(axis=0), root, (white**2).sum(axis=0))
 
+    def expecting(self, noise: float, sequence: Floats) -> Pace:
+        """The same for a sequence with noise of that variance on each coordinate of each frame."""
+        seen, own = noisy_pace(sequence, noise), self.root @ self.root.T
+        mean = np.maximum(self.mean, seen.least)
+        # As a genuine movement has it: a person who rests is seen to rest as well as noise allows.
+        squared = np.exp(2.0 * mean)
+        errors = (squared * seen.of_steps + 0.5 * seen.of_steps**2) / (sequence.shape[1] * squared**2)
+        distances = distances_with_noise(self.distances, own, own, np.diag(errors))
+        return Pace(mean, np.linalg.cholesky(own + np.diag(errors)).astype(np.float64), distances, noise)
+
     def distance(self, sequence: Floats) -> float:
         """Squared Mahalanobis distance."""
-        white = np.linalg.solve(self.root, pace_features(sequence) - self.mean)
+        features = pace_features(sequence) if self.noise <= 0.0 else noisy_pace(sequence, self.noise).features
+        white = np.linalg.solve(self.root, features - self.mean)
         return float(white @ white)
 
 
@@ -67,18 +82,20 @@ class Performances:
         complete: of `part_averages`.
         beginnings: number of frames, increasing, with the regression of `beginning_features`.
         pace: of complete movements.
+        noise: beyond that of the training that is expected of sequences.
     """
 
     complete: CorrelatedRegression
     beginnings: tuple[tuple[int, CorrelatedRegression], ...]
     pace: Pace
+    noise: AddedNoise | None = None
 
     @classmethod
     def fitted(
-        cls, parts: Floats, sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints
+        cls, parts: Sequence[Floats], sequences: Sequence[Floats], theta: Floats, monomials: Monomials, groups: Ints
     ) -> Performances:
-        """From `part_averages` (K, n) and the movements as they were recorded, in their own time."""
-        complete = CorrelatedRegression.fitted(parts, theta, monomials, groups)
+        """From `part_averages` (K, n) for each of `MOVEMENT_PARTS`, and movements as recorded, in their own time."""
+        complete = CorrelatedRegression.best_fitted(parts, theta, monomials, groups)
         lengths = np.array([len(sequence) for sequence in sequences])
         beginnings = []
         for n_frames in beginning_lengths(lengths):
@@ -91,6 +108,17 @@ class Performances:
             )  # fmt: skip
         return cls(complete, tuple(beginnings), Pace.fitted(sequences, groups))
 
+    def expecting(self, noise: AddedNoise, gamma: Floats) -> Performances:
+        """The same for a sequence with noise, whose frames are in the states with responsibilities (N, T)."""
+        n_parts = self.n_parts(noise.sequence.shape[1])
+        of_parts = noise.of_averages(lambda frames: part_averages(*state_averages(gamma, frames), frames, n_parts))
+        pace = self.pace.expecting(noise.variance, noise.sequence)
+        return replace(self, complete=self.complete.widened(of_parts), pace=pace, noise=noise)
+
+    def n_parts(self, dimension: int) -> int:
+        """In how many parts complete movements of so many coordinates are described."""
+        return len(self.complete.coefficients) // dimension - 1
+
     def strangeness(self, distance: float, pace_distance: float) -> float:
         """How unlike the training a complete movement is; genuine ones have about 1.3.
 
@@ -100,12 +128,19 @@ class Performances:
         return float(_strangeness(distance, pace_distance, self.complete.distances, self.pace.distances))
 
     def log_typicality(self, strangeness: float) -> float:
-        """Logarithm of the probability that a genuine movement is so strange or stranger, from unseen training ones."""
-        known = np.log(_strangeness(
-            self.complete.distances, self.pace.distances, self.complete.distances, self.pace.distances
-        ))  # fmt: skip
-        deviation = max(float(known.std()), 1e-3) if len(known) > 1 else np.inf
-        return float(log_ndtr(-(np.log(strangeness) - known.mean()) / deviation))
+        """Logarithm of the probability that a genuine movement is so strange or stranger, from unseen training ones.
+
+        The logarithms of their strangeness are taken for normally distributed, in a group that was not seen about
+        another mean.
+        """
+        return self._usual.log_above(float(np.log(strangeness + 1e-9)))
+
+    @cached_property
+    def _usual(self) -> PredictiveDistribution:
+        """Of the logarithm of the strangeness of a genuine movement."""
+        distances, paces = self.complete.distances, self.pace.distances
+        known = np.log(_strangeness(distances, paces, distances, paces) + 1e-9)
+        return PredictiveDistribution.of(known, self.complete.groups)
 
     def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
         """The longest modelled beginning of at most so many frames. Raises ValueError where that is too short."""
@@ -114,7 +149,11 @@ class Performances:
             raise ValueError(
                 f"a beginning has at least {FIRST_FRAMES} frames, found {n_frames}: wait for more of the movement"
             )
-        return known[-1]
+        if self.noise is None:
+            return known[-1]
+        length, regression = known[-1]
+        noise = replace(self.noise, sequence=self.noise.sequence[:length], n_frames=None)
+        return length, regression.widened(noise.of_averages(lambda frames: beginning_features(frames, length)))
 
     def arrays(self) -> dict[str, Floats]:
         """Everything learned, for a file."""
@@ -156,24 +195,55 @@ def pace_features(sequence: Floats) -> Floats:
     return result
 
 
-def state_averages(evaluator: Evaluator, sequence: Floats) -> tuple[Floats, Floats]:
-    """Mean of the frames in each state, by their responsibilities, (N, D), and how many frames those are, (N,)."""
-    gamma = evaluator.expectation(sequence)[1]
-    weights = gamma.sum(axis=0)
-    return (gamma.T @ sequence) / weights[:, None], weights
+class NoisyPace(NamedTuple):
+    """`pace_features` of a sequence without its noise, the least that is seen of them, and the noise of its steps."""
+
+    features: Floats
+    least: Floats
+    of_steps: Floats
 
 
-def part_averages(averages: Floats, weights: Floats, sequence: Floats) -> Floats:
-    """Mean of the frames in each of at most ten parts of the movement, each of several states, and the last frame.
+def noisy_pace(sequence: Floats, noise: float) -> NoisyPace:
+    """Of a sequence with noise of that variance. Each of shape (10,).
+
+    Steps are those between averages of as many frames as the noise asks for. What noise adds to the square of a step on
+    average is taken away; where less remains than noise scatters, the step may as well be nothing.
+    """
+    for width in (1, len(sequence) // (2 * PACE_PARTS), len(sequence) // PACE_PARTS):
+        averages, counts = moving_average(sequence, width)
+        of_points = noise / resample(counts[:, None], PACE_PARTS + 1)[:, 0]
+        of_steps = of_points[:-1] + of_points[1:]
+        squared = (np.diff(resample(averages, PACE_PARTS + 1), axis=0) ** 2).mean(axis=1)
+        if of_steps.mean() < 0.1 * squared.mean():
+            break
+    least = of_steps * np.sqrt(2.0 / sequence.shape[1])
+    without = np.maximum(squared - of_steps, least)
+    small = 0.02 * np.sqrt(without).mean() + 1e-12
+    return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(least) + small), of_steps)
+
+
+def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:
+    """Mean of the frames in each state by responsibilities (N, T), (N, D), and how many frames those are, (N,)."""
+    weights = gamma.sum(axis=1)
+    return (gamma @ sequence) / weights[:, None], weights
+
+
+def part_averages(averages: Floats, weights: Floats, sequence: Floats, n_parts: int) -> Floats:
+    """Mean of the frames in each of at most so many parts of the movement, of several states each, and the last frame.
 
     Correlations between many states would have to be learned from few movements, and they say the same many times. The
-    last frame is there since movements end where theta says, more exactly than they get there. Shape (11 D,).
+    last frame is there since movements end where theta says, more exactly than they get there. Shape ((n + 1) D,).
     """
-    n_parts = min(MOVEMENT_PARTS, len(averages))
-    begins = np.arange(n_parts) * len(averages) // n_parts
+    begins = part_begins(len(averages), n_parts)
     sums = np.add.reduceat(averages * weights[:, None], begins, axis=0)
     parts = sums / np.add.reduceat(weights, begins)[:, None]
     return np.concatenate([parts, sequence[-1:]]).ravel()
+
+
+def part_begins(n_states: int, n_parts: int) -> Ints:
+    """First state of each of at most so many parts."""
+    n_parts = min(n_parts, n_states)
+    return np.arange(n_parts) * n_states // n_parts
 
 
 def beginning_lengths(lengths: Ints) -> list[int]:

@@ -17,8 +17,16 @@ from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
+from paramove.phmm.noise import AddedNoise, expected_responsibilities
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
-from paramove.phmm.performance import Performances, beginning_features, part_averages, state_averages
+from paramove.phmm.performance import (
+    MOVEMENT_PARTS,
+    Performances,
+    beginning_features,
+    part_averages,
+    part_begins,
+    state_averages,
+)
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
 
@@ -26,8 +34,9 @@ Floats = NDArray[np.float64]
 
 Residuals = Literal["independent", "correlated"]
 MOST_STEPS = 40
-STEP_TOLERANCE = 1e-7
-REALIGNMENTS = 2
+STEP_TOLERANCE = 1e-5
+"""Predicted gain in nats below which the search ends."""
+ALIGNMENTS = 3
 
 
 class Examination(NamedTuple):
@@ -129,11 +138,14 @@ class PolynomialPHMM(ParametricHMM):
     ) -> tuple[Floats, Performances]:
         """State averages (K, N D), and what they and the recorded movements say about performances."""
         common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
-        found = [
-            state_averages(replace(common, means=trained.coefficients @ monomials.at(theta)), sequence)
-            for sequence, theta in zip(data.sequences, data.theta, strict=True)
+        found = []
+        for sequence, theta in zip(data.sequences, data.theta, strict=True):
+            own = replace(common, means=trained.coefficients @ monomials.at(theta))
+            found.append(state_averages(own.expectation(sequence)[1].T, sequence))
+        parts = [
+            np.stack([part_averages(*one, x, n_parts) for one, x in zip(found, data.sequences, strict=True)])
+            for n_parts in MOVEMENT_PARTS
         ]
-        parts = np.stack([part_averages(*one, x) for one, x in zip(found, data.sequences, strict=True)])
         averages = np.stack([one.ravel() for one, _ in found])
         return averages, Performances.fitted(parts, data.recorded, data.theta, monomials, data.groups)
 
@@ -159,23 +171,26 @@ class PolynomialPHMM(ParametricHMM):
     def log_likelihood_and_gradient(self, sequence: ArrayLike, theta: ArrayLike) -> tuple[float, Floats]:
         """ln p(X | lambda^theta) and its derivative with respect to theta (P,), exact."""
         place = (self._checked_theta(theta) - self.monomials_.centre) / self.monomials_.scale
-        value, gradient, _ = search_kernels.expectation_at(place, *self._prepared(self._checked(sequence)))
+        value, gradient, _ = search_kernels.expectation_at(place, self._prepared(self._checked(sequence)))
         return float(value), gradient / self.monomials_.scale
 
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
         """The most likely theta, its covariance, and the log-likelihood there, of a movement or of its beginning.
 
         With independent residuals the maximum of the likelihood, by EM (3.5), generalised where means are not linear.
-        With correlated ones that is where the states are found; theta then follows from their averages. A beginning
+        With correlated ones theta follows from the averages of the states, by generalised least squares. A beginning
         (`finished=False`) has the frame rate of the training; its log-likelihood is that of `beginning_features`.
         """
         if not finished:
             return self.examine(sequence, finished=False).estimate
+        model = self._expecting_noise_of(checked_sequence(sequence, self.covariances_.shape[-1]))
+        if model is not self:
+            return model.estimate(sequence)
         if self.performances_ is not None:
             return self._refined(self._checked(sequence), self.performances_)[0]
         prepared = self._prepared(self._checked(sequence))
-        best, value = self._likeliest(prepared)
-        information = search_kernels.information_at(best, *prepared)
+        best, value, gradient = self._likeliest(prepared)
+        information = search_kernels.information_at(best, gradient, prepared)
         scale = self.monomials_.scale
         covariance = _inverse_information(information, self._widest) * np.outer(scale, scale)
         return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
@@ -188,67 +203,65 @@ class PolynomialPHMM(ParametricHMM):
         """
         if self.performances_ is None:
             raise ValueError("this model has independent residuals: train it with residuals='correlated'")
+        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
+        model = self._expecting_noise_of(recorded)
+        if model is not self:
+            return model.examine(recorded, finished=finished)
         if not finished:
-            checked = checked_sequence(sequence, self.covariances_.shape[-1])
-            n_frames, regression = self.performances_.beginning(len(checked))
-            features = beginning_features(checked, n_frames)
-            theta, covariance, distance = regression.estimate(features, self.search_margin)
+            n_frames, regression = self.performances_.beginning(len(recorded))
+            features = beginning_features(recorded, n_frames)
+            theta, covariance = regression.estimate(features, self.search_margin)
+            distance = regression.distance(features, theta)
             density = regression.log_density(features, distance)
             strangeness = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
             found = ParameterEstimate(theta, covariance, density)
             return Examination(found, strangeness, density, regression.log_typicality(distance))
-        recorded = checked_sequence(sequence, self.covariances_.shape[-1])
-        found, parts, distance = self._refined(self._checked(recorded), self.performances_)
+        found, parts = self._refined(self._checked(recorded), self.performances_)
+        distance = self.performances_.complete.distance(parts, found.theta)
         strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
         density = self.performances_.complete.log_density(parts, distance)
         return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
 
-    def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats, float]:
-        """Estimate by whole performances, the parts of this one, and their squared Mahalanobis distance there.
+    def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
+        """Estimate by whole performances, and the averages of the parts of this one.
 
-        The likeliest theta tells where the states are; theta from their averages then moves the states a little.
+        When a movement is where hardly depends on theta: the middle tells which frames belong to which states, theta
+        follows from the averages of these, and moves them a little.
         """
-        prepared = self._prepared(checked)
-        place, _ = self._likeliest(prepared)
-        theta = self.monomials_.centre + self.monomials_.scale * place
-        for _ in range(REALIGNMENTS):
-            evaluator = replace(self._whitened()[0], means=self.state_means(theta))
-            parts = part_averages(*state_averages(evaluator, checked), checked)
-            theta, covariance, distance = performances.complete.estimate(parts, self.search_margin)
-        value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, *prepared)
-        return ParameterEstimate(theta, covariance, float(value)), parts, distance
+        prepared, regression = self._prepared(checked), performances.complete
+        begins = part_begins(self.n_states, performances.n_parts(checked.shape[1]))
+        parts = regression.aligned_parts(checked, prepared, begins, ALIGNMENTS, self.search_margin)
+        theta, covariance = regression.estimate(parts, self.search_margin)
+        value = search_kernels.log_likelihood_at((theta - self.monomials_.centre) / self.monomials_.scale, prepared)
+        return ParameterEstimate(theta, covariance, float(value)), parts
+
+    def _expect(self, noise: AddedNoise) -> None:
+        self.covariances_ = self.covariances_ + noise.of_states
+        self._white = None
+        if self.performances_ is not None:
+            gamma = expected_responsibilities(self.durations_, noise.seen)
+            self.performances_ = self.performances_.expecting(noise, gamma)
 
     @property
     def _widest(self) -> float:
         return 1.0 + 2.0 * self.search_margin
 
-    def _likeliest(self, prepared: tuple[Any, ...]) -> tuple[Floats, float]:
-        """Scaled theta with the greatest likelihood, and its logarithm."""
+    def _likeliest(self, prepared: search_kernels.Movement) -> tuple[Floats, float, Floats]:
+        """Scaled theta with the greatest likelihood, its logarithm, and the gradient there."""
         bounds = np.full(len(self.monomials_.centre), self._widest)
-        best, value = search_kernels.best_climbed(
-            self._starts(), -bounds, bounds, MOST_STEPS, STEP_TOLERANCE, *prepared
+        best, value, gradient = search_kernels.best_climbed(
+            self.monomials_.starts, -bounds, bounds, MOST_STEPS, STEP_TOLERANCE, prepared
         )
-        return best, float(value)
+        return best, float(value), gradient
 
-    def _starts(self) -> Floats:
-        """Where the search begins: the middle, and the corners half-way out if means are not linear. Shape (S, P)."""
-        n_components = len(self.monomials_.centre)
-        middle = np.zeros((1, n_components))
-        if self.degree == 1:
-            return middle
-        corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * n_components, indexing="ij"), axis=-1).reshape(-1, n_components)
-        return np.concatenate([middle, corners])
-
-    def _prepared(self, sequence: Floats) -> tuple[Any, ...]:
+    def _prepared(self, sequence: Floats) -> search_kernels.Movement:
         """What the kernels need beside a place."""
         evaluator, white = self._whitened()
         ends = evaluator.ends(len(sequence))
-        present = np.ones(len(sequence), dtype=np.bool_)
-        frames = search_kernels.whitened_frames(sequence, present, evaluator.whitening, ends)
-        return (
-            self.monomials_.exponents, frames, present, white, evaluator.log_norm, evaluator.log_duration, self.d_min,
-            ends, len(sequence),
-        )  # fmt: skip
+        frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)
+        return search_kernels.Movement(
+            frames, rows, white, self.monomials_.exponents, evaluator.log_norm, evaluator.log_duration, self.d_min, ends
+        )
 
     def _whitened(self) -> tuple[Evaluator, Floats]:
         """Everything that depends neither on a sequence nor on theta: an evaluator, and the whitened coefficients."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +14,58 @@ Ints = NDArray[np.int64]
 STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
 """Candidates for the ridge of each degree, as a share of the number of movements."""
 MOST_ROUNDS = 4
-SIMPLER = 0.02
+SIMPLER = 0.005
 """A degree above 1 is held back as far as possible while errors grow by no more than this share."""
+OFFSETS = (0.0, 0.1, 0.3, 1.0, 3.0)
+"""Candidates for the variance of `GroupOffsets`."""
+
+
+@dataclass(frozen=True)
+class GroupOffsets:
+    """Movements of a group have an offset in common that theta does not explain: covariance 1 + variance 1 1'.
+
+    Persons sit and reach differently, and what theta is differs between them too. Were their movements independent,
+    a habit would be taken for an effect of theta; with offsets, differences within persons count for more.
+
+    Attributes:
+        groups: of each movement, (K,).
+        variance: of the offsets, as a share of a movement's own; 0 is independent movements.
+    """
+
+    groups: Ints
+    variance: float
+
+    def whitened(self, rows: Floats) -> Floats:
+        """Rows (K, n) so that generalised least squares is ordinary: a share of the group's mean taken off."""
+        return self._moved(rows, lambda share: -share)
+
+    def restored(self, rows: Floats) -> Floats:
+        """Inverse of `whitened`."""
+        return self._moved(rows, lambda share: share / (1.0 - share))
+
+    def missed(self, y: Floats, features: Floats, penalty: Floats) -> Floats:
+        """What generalised least squares without a movement's group misses of it. Shape (K, n)."""
+        return self.restored(residuals_left_out(self.whitened(y), self.whitened(features), penalty, self.groups))
+
+    def _moved(self, rows: Floats, factor: Callable[[float], float]) -> Floats:
+        if self.variance == 0.0:
+            return rows
+        result = rows.copy()
+        for members in members_of(self.groups):
+            share = 1.0 - 1.0 / float(np.sqrt(1.0 + self.variance * len(members)))
+            result[members] += factor(share) * rows[members].mean(axis=0)
+        return result
 
 
 def smoothed(features: Floats, degrees: Ints, values: Floats, groups: Ints) -> Floats:
-    """Coefficients (m, F) that predict the values (K, m) of left-out groups best.
+    """Coefficients (m, F) that predict the values (K, m) of left-out groups best, by generalised least squares.
 
     Every value is the same weighted mean of training values, so what was smooth in training stays so.
     """
-    penalty = penalties(chosen_ridge(values, features, degrees, groups, relative=False), degrees, len(values))
-    solved = np.linalg.solve(features.T @ features + penalty, features.T @ values)
+    offsets, ridge = _chosen_offsets(values, features, degrees, groups)
+    seen = offsets.whitened(features)
+    penalty = penalties(ridge, degrees, len(values))
+    solved = np.linalg.solve(seen.T @ seen + penalty, seen.T @ offsets.whitened(values))
     return np.ascontiguousarray(solved.T, dtype=np.float64)
 
 
@@ -46,20 +88,28 @@ def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relat
     """The ridge per degree, as a share of the number of movements, that predicts left-out groups best.
 
     Relative errors let a fingertip that is a millimetre off at the target count as one that is a centimetre off on the
-    way, which theta is found by; a movement that is to be made should be near in centimetres.
+    way, which theta is found by; a movement that is to be made should be near in centimetres: by its root mean square
+    error, averaged over movements, so that one odd person does not decide.
 
     One degree after the other, until none changes; a higher degree is never held back less than a lower one.
     """
+    return _best_ridge(y, features, degrees, GroupOffsets(groups, 0.0), relative)
+
+
+def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffsets, relative: bool) -> tuple[float, ...]:
+    """`chosen_ridge` with these offsets."""
     ridge = tuple(float(STRENGTHS[min(3 + 2 * degree, len(STRENGTHS) - 1)]) for degree in range(int(degrees.max())))
-    if len(np.unique(groups)) < 3:
+    if len(np.unique(offsets.groups)) < 3:
         return ridge
     known: dict[tuple[float, ...], float] = {}
 
     def error(candidate: tuple[float, ...]) -> float:
         if candidate not in known:
-            penalty = penalties(candidate, degrees, len(y))
-            squared = (residuals_left_out(y, features, penalty, groups) ** 2).sum(axis=0)
-            known[candidate] = float(np.log(squared + 1e-12).mean() if relative else np.log(squared.sum() + 1e-12))
+            squared = offsets.missed(y, features, penalties(candidate, degrees, len(y))) ** 2
+            if relative:
+                known[candidate] = float(np.log(squared.sum(axis=0) + 1e-12).mean())
+            else:
+                known[candidate] = 2.0 * float(np.log(np.sqrt(squared.sum(axis=1)).mean() + 1e-12))
         return known[candidate]
 
     for _ in range(MOST_ROUNDS):
@@ -76,6 +126,31 @@ def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relat
         if ridge == before:
             break
     return ridge
+
+
+def _chosen_offsets(y: Floats, features: Floats, degrees: Ints, groups: Ints) -> tuple[GroupOffsets, tuple[float, ...]]:
+    """Offsets with which left-out groups are predicted best, and the ridge per degree.
+
+    Errors of few groups differ by chance: the least variance within one standard error of the best, group by group.
+
+    None where theta does not vary within groups: nothing tells offsets from an effect of theta. Errors are relative
+    then, since to leave out a place at the border is to extrapolate, and centimetres there would decide all.
+    """
+    members = list(members_of(groups))
+    within = max(float(np.ptp(features[own], axis=0).max()) for own in members)
+    candidates = [GroupOffsets(groups, variance) for variance in OFFSETS]
+    if within < 1e-6 or len(members) < 3:
+        return candidates[0], chosen_ridge(y, features, degrees, groups)
+    if y.shape[1] > len(y):  # as many numbers as movements have the same sums of squares
+        y = np.asarray(np.linalg.qr(y.T, mode="r"), dtype=np.float64).T
+    ridges = [_best_ridge(y, features, degrees, one, relative=False) for one in candidates]
+    errors = np.empty((len(candidates), len(members)))
+    for i, (offsets, ridge) in enumerate(zip(candidates, ridges, strict=True)):
+        squared = (offsets.missed(y, features, penalties(ridge, degrees, len(y))) ** 2).sum(axis=1)
+        errors[i] = [float(np.sqrt(squared[own]).sum()) for own in members]
+    worse = errors - errors[np.argmin(errors.sum(axis=1))]
+    chosen = int(np.argmax(worse.sum(axis=1) <= worse.std(axis=1, ddof=1) * np.sqrt(len(members))))
+    return candidates[chosen], ridges[chosen]
 
 
 def penalties(ridge: tuple[float, ...], degrees: Ints, count: int) -> Floats:

@@ -4,157 +4,193 @@ Everything that does not depend on theta is done once: the frames are whitened b
 the coefficients; then one evaluation costs little more than its recursions. u is theta centred and scaled.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled
-from paramove.hmm.kernels import backward, forward, posteriors
+from paramove.hmm.compilation import compiled, compiled_sums
+from paramove.hmm.kernels import filled, segments_log_likelihood, stacked_segments
+from paramove.hmm.vector_functions import add_multiple, dot
 from paramove.phmm.features import monomials_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+
+NEGLIGIBLE = 1e-15  # of a responsibility
+WIDTH = 1e-5
+"""Of differences of gradients."""
+
+
+class Movement(NamedTuple):
+    """What the search needs of one movement and one model, none of which depends on theta.
+
+    Attributes:
+        frames: whitened, of state i from the first frame that it can have on, (N, D, room).
+        rows: the same as (N, room, D).
+        white: whitened coefficients of the means, (N, D, F). exponents: of the monomials, (F, P).
+        log_norm: ln of the output densities at the means, (N,). log_duration: (N, d_max). d_min: in frames.
+        ends: feasible numbers of frames used after each state, (N + 1, 2).
+    """
+
+    frames: Floats
+    rows: Floats
+    white: Floats
+    exponents: Ints
+    log_norm: Floats
+    log_duration: Floats
+    d_min: int
+    ends: Ints
+
+
+@compiled_sums
+def _add_whitened(matrix: Floats, frames: Floats, result: Floats) -> None:
+    """Add lower triangular `matrix` times `frames`, both filled up with zeros to a multiple of three rows."""
+    for row in range(result.shape[0]):
+        target = result[row]
+        for k in range(0, row + 1, 3):
+            first, second, third = matrix[row, k], matrix[row, k + 1], matrix[row, k + 2]
+            x, y, z = frames[k], frames[k + 1], frames[k + 2]
+            for f in range(len(target)):
+                target[f] += first * x[f] + second * y[f] + third * z[f]
 
 
 @compiled
-def whitened_frames(sequence: Floats, present: Flags, whitening: Floats, ends: Ints) -> Floats:
-    """U_i x_t of the feasible pairs, state by state. Shape (pairs, D); zero for frames that are not present."""
+def whitened_frames(columns: Floats, whitening: Floats, ends: Ints) -> tuple[Floats, Floats]:
+    """U_i x_t of the feasible pairs from frames (D, T): state i from the first frame it can have on.
+
+    In both orders, (N, D, room) to compute with all frames of a state at once, and (N, room, D).
+    """
     n_states, dim = whitening.shape[0], whitening.shape[1]
-    count = 0
+    widest, size = 0, (dim + 2) // 3 * 3
     for i in range(n_states):
-        count += max(0, ends[i + 1, 1] - ends[i, 0])
-    frames = np.zeros((count, dim))
-    pair = 0
+        widest = max(widest, ends[i + 1, 1] - ends[i, 0])
+    room = filled(widest)
+    result, frames, matrix = np.zeros((n_states, dim, room)), np.zeros((size, room)), np.zeros((dim, size))
     for i in range(n_states):
-        for t in range(ends[i, 0], ends[i + 1, 1]):
-            if present[t]:
-                for row in range(dim):
-                    value = 0.0
-                    for k in range(row + 1):
-                        value += whitening[i, row, k] * sequence[t, k]
-                    frames[pair, row] = value
-            pair += 1
-    return frames
+        n = ends[i + 1, 1] - ends[i, 0]
+        frames[:dim, :n] = columns[:, ends[i, 0] : ends[i + 1, 1]]
+        matrix[:, :dim] = whitening[i]
+        _add_whitened(matrix, frames, result[i])
+    return result, np.ascontiguousarray(result.transpose(0, 2, 1))
+
+
+@compiled_sums
+def _squared_distances(frames: Floats, mean: Floats, result: Floats) -> None:
+    """From the mean (D,) to frames (D, room)."""
+    for f in range(len(result)):
+        result[f] = 0.0
+    for row in range(len(mean)):
+        source, place = frames[row], mean[row]
+        for f in range(len(result)):
+            result[f] += (source[f] - place) * (source[f] - place)
+
+
+@compiled_sums
+def _log_densities(squared: Floats, log_norm: float, result: Floats) -> None:
+    for f in range(len(result)):
+        result[f] = log_norm - 0.5 * squared[f]
 
 
 @compiled
-def log_outputs_at(
-    frames: Floats, present: Flags, white: Floats, log_norm: Floats, ends: Ints, features: Floats, n_frames: int
-) -> tuple[Floats, Floats]:
-    """ln b_i(x_t) of the feasible pairs (T, N), 0 for frames not present, and whitened means (N, D)."""
-    n_states, dim, n_features = white.shape
-    out = np.full((n_frames, n_states), -np.inf)
-    means = np.zeros((n_states, dim))
-    pair = 0
+def log_outputs_at(features: Floats, movement: Movement) -> tuple[Floats, Floats]:
+    """ln b_i(x_t) of the feasible pairs, other entries have no meaning, (N, T), and whitened means (N, D)."""
+    n_states, dim, room = movement.frames.shape
+    means = np.dot(movement.white.reshape(n_states * dim, len(features)), features).reshape(n_states, dim)
+    out, squared = np.empty((n_states, movement.ends[n_states, 1])), np.empty(room)
     for i in range(n_states):
-        for row in range(dim):
-            value = 0.0
-            for f in range(n_features):
-                value += white[i, row, f] * features[f]
-            means[i, row] = value
-        for t in range(ends[i, 0], ends[i + 1, 1]):
-            if present[t]:
-                squared = 0.0
-                for row in range(dim):
-                    difference = frames[pair, row] - means[i, row]
-                    squared += difference * difference
-                out[t, i] = log_norm[i] - 0.5 * squared
-            else:
-                out[t, i] = 0.0
-            pair += 1
+        first, n = movement.ends[i, 0], movement.ends[i + 1, 1] - movement.ends[i, 0]
+        _squared_distances(movement.frames[i], means[i], squared)
+        _log_densities(squared, movement.log_norm[i], out[i, first : first + n])
     return out, means
 
 
 @compiled
-def log_likelihood_at(
-    u: Floats, exponents: Ints, frames: Floats, present: Flags, white: Floats, log_norm: Floats,
-    log_duration: Floats, d_min: int, ends: Ints, n_frames: int
-) -> float:  # fmt: skip
+def log_likelihood_at(u: Floats, movement: Movement) -> float:
     """ln p(X | lambda^u)."""
-    features, slopes = np.empty(len(exponents)), np.empty(exponents.shape)
-    monomials_at(u, exponents, features, slopes)
-    out, _ = log_outputs_at(frames, present, white, log_norm, ends, features, n_frames)
-    return float(forward(out, log_duration, d_min, ends)[-1, -1])
+    features, slopes = np.empty(len(movement.exponents)), np.empty(movement.exponents.shape)
+    monomials_at(u, movement.exponents, features, slopes)
+    out, _ = log_outputs_at(features, movement)
+    return float(segments_log_likelihood(out, movement.log_duration, movement.d_min))
 
 
 @compiled
-def expectation_at(
-    u: Floats, exponents: Ints, frames: Floats, present: Flags, white: Floats, log_norm: Floats,
-    log_duration: Floats, d_min: int, ends: Ints, n_frames: int
-) -> tuple[float, Floats, Floats]:  # fmt: skip
+def _responsibilities(features: Floats, movement: Movement) -> tuple[float, Floats, Floats]:
+    """ln p with these monomials, gamma_i(t) (N, T), zero where that is -inf, and whitened means (N, D)."""
+    out, means = log_outputs_at(features, movement)
+    gamma, counts = np.zeros(out.shape), np.zeros(movement.log_duration.shape)
+    value = stacked_segments(out, np.array([0, out.shape[1]]), movement.log_duration, movement.d_min, gamma, counts)[0]
+    return value, gamma, means
+
+
+@compiled
+def responsibilities_at(u: Floats, movement: Movement) -> Floats:
+    """gamma_i(t) (2.14). Shape (N, T)."""
+    features, slopes = np.empty(len(movement.exponents)), np.empty(movement.exponents.shape)
+    monomials_at(u, movement.exponents, features, slopes)
+    return _responsibilities(features, movement)[1]
+
+
+@compiled
+def _aligned(features: Floats, movement: Movement) -> tuple[float, Floats, Floats, Floats]:
+    """ln p with these monomials, how many frames each state has (N,), the sum of these (N, D), and the means (N, D)."""
+    value, gamma, means = _responsibilities(features, movement)
+    taken, sums = np.zeros(len(means)), np.zeros(means.shape)
+    if value > -np.inf:
+        for i in range(len(means)):
+            for t in range(movement.ends[i, 0], movement.ends[i + 1, 1]):
+                if gamma[i, t] > NEGLIGIBLE:
+                    taken[i] += gamma[i, t]
+                    add_multiple(gamma[i, t], movement.rows[i, t - movement.ends[i, 0]], sums[i])
+    return value, taken, sums, means
+
+
+@compiled
+def expectation_at(u: Floats, movement: Movement) -> tuple[float, Floats, Floats]:
     """ln p, its gradient with respect to u (P,), and the information of the complete data (P, P).
 
     The gradient is exact (Fisher's identity); the information is that of known states, so it is never too small.
     """
-    n_features, n_components = exponents.shape
-    n_states, dim = white.shape[0], white.shape[1]
+    n_features, n_components = movement.exponents.shape
+    n_states, dim = movement.white.shape[0], movement.white.shape[1]
     features, slopes = np.empty(n_features), np.empty((n_features, n_components))
-    monomials_at(u, exponents, features, slopes)
-    out, means = log_outputs_at(frames, present, white, log_norm, ends, features, n_frames)
-    ending = forward(out, log_duration, d_min, ends)
-    value = ending[-1, -1]
+    monomials_at(u, movement.exponents, features, slopes)
+    value, taken, sums, means = _aligned(features, movement)
     gradient, information = np.zeros(n_components), np.zeros((n_components, n_components))
-    if not value > -np.inf:
-        return value, gradient, information
-    following = backward(out, log_duration, d_min, ends)
-    gamma, _ = posteriors(out, log_duration, d_min, ends, ending, following)
-    pair = 0
-    residual, moved = np.empty(dim), np.empty((dim, n_components))
+    moved = np.ascontiguousarray(np.dot(movement.white.reshape(n_states * dim, n_features), slopes).T)
     for i in range(n_states):
-        weight = 0.0
-        residual[:] = 0.0
-        for t in range(ends[i, 0], ends[i + 1, 1]):
-            if present[t] and gamma[t, i] > 0.0:
-                weight += gamma[t, i]
-                for row in range(dim):
-                    residual[row] += gamma[t, i] * (frames[pair, row] - means[i, row])
-            pair += 1
-        if weight == 0.0:
-            continue
-        for row in range(dim):
-            for p in range(n_components):
-                total = 0.0
-                for f in range(n_features):
-                    total += white[i, row, f] * slopes[f, p]
-                moved[row, p] = total
-                gradient[p] += total * residual[row]
-        for p in range(n_components):
-            for other in range(p + 1):
-                total = 0.0
-                for row in range(dim):
-                    total += moved[row, p] * moved[row, other]
-                information[p, other] += weight * total
+        add_multiple(-taken[i], means[i], sums[i])
     for p in range(n_components):
-        for other in range(p):
-            information[other, p] = information[p, other]
+        gradient[p] = dot(moved[p], sums.ravel())
+        weighted = (moved[p].reshape(n_states, dim) * taken.reshape(n_states, 1)).ravel()
+        for other in range(n_components):
+            information[p, other] = dot(weighted, moved[other])
     return value, gradient, information
 
 
 @compiled
 def climbed(
-    start: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, exponents: Ints, frames: Floats,
-    present: Flags, white: Floats, log_norm: Floats, log_duration: Floats, d_min: int, ends: Ints, n_frames: int
-) -> tuple[Floats, float]:  # fmt: skip
-    """EM (linear models) or generalised EM from a start, within bounds: the place reached and its log-likelihood.
+    start: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, movement: Movement
+) -> tuple[Floats, float, Floats]:
+    """EM (linear models) or generalised EM from a start, within bounds: the place reached, its log-likelihood, and the
+    gradient there.
 
     A step solves for the parameter with the responsibilities of the last (thesis 3.3.1, (3.5)); where means are not
     linear it is a Gauss-Newton step, halved while the likelihood would fall.
     """
     place = np.minimum(np.maximum(start, lower), upper)
-    value, gradient, information = expectation_at(
-        place, exponents, frames, present, white, log_norm, log_duration, d_min, ends, n_frames
-    )
+    value, gradient, information = expectation_at(place, movement)
     for _ in range(most_steps):
         if not value > -np.inf:
             break
         step = bounded_step(place, gradient, information, lower, upper)
+        if 0.5 * np.dot(gradient, step) < tolerance:
+            break
         gain = -np.inf
         share = 1.0
         for _ in range(8):
             candidate = np.minimum(np.maximum(place + share * step, lower), upper)
-            new_value, new_gradient, new_information = expectation_at(
-                candidate, exponents, frames, present, white, log_norm, log_duration, d_min, ends, n_frames
-            )
+            new_value, new_gradient, new_information = expectation_at(candidate, movement)
             gain = new_value - value
             if gain >= 0.0:
                 break
@@ -162,9 +198,7 @@ def climbed(
         if not gain >= 0.0:
             break
         place, value, gradient, information = candidate, new_value, new_gradient, new_information
-        if gain < tolerance:
-            break
-    return place, value
+    return place, value, gradient
 
 
 @compiled
@@ -186,52 +220,60 @@ def bounded_step(place: Floats, gradient: Floats, information: Floats, lower: Fl
 
 
 @compiled
-def best_climbed(
-    starts: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, exponents: Ints, frames: Floats,
-    present: Flags, white: Floats, log_norm: Floats, log_duration: Floats, d_min: int, ends: Ints, n_frames: int
-) -> tuple[Floats, float]:  # fmt: skip
-    """The best place that is reached from the start with the greatest likelihood, or from the middle one (first)."""
-    best, value = starts[0], -np.inf
+def _likeliest_start(starts: Floats, movement: Movement) -> tuple[int, float]:
+    """Number of the start that is likeliest for the states that the frames have at the first one, and ln p there.
+
+    Where a movement is depends much on theta, when it is there little.
+    """
+    features, slopes = np.empty(len(movement.exponents)), np.empty(movement.exponents.shape)
+    monomials_at(starts[0], movement.exponents, features, slopes)
+    value, taken, sums, means = _aligned(features, movement)
+    flat = movement.white.reshape(means.size, len(movement.exponents))
+    best, largest = 0, -np.inf
     for s in range(len(starts)):
-        found = log_likelihood_at(
-            starts[s], exponents, frames, present, white, log_norm, log_duration, d_min, ends, n_frames
-        )
-        if found > value:
-            best, value = starts[s], found
-    return climbed(
-        best, lower, upper, most_steps, tolerance, exponents, frames, present, white, log_norm, log_duration, d_min,
-        ends, n_frames
-    )  # fmt: skip
+        monomials_at(starts[s], movement.exponents, features, slopes)
+        means = np.dot(flat, features).reshape(means.shape)
+        expected = 0.0
+        for i in range(len(means)):
+            for row in range(means.shape[1]):
+                expected += means[i, row] * (sums[i, row] - 0.5 * taken[i] * means[i, row])
+        if expected > largest:
+            best, largest = s, expected
+    return best, value
 
 
 @compiled
-def information_at(
-    u: Floats, exponents: Ints, frames: Floats, present: Flags, white: Floats, log_norm: Floats,
-    log_duration: Floats, d_min: int, ends: Ints, n_frames: int
-) -> Floats:  # fmt: skip
-    """Observed information: minus the Hessian by central differences of the exact gradient, symmetric. (P, P)."""
+def best_climbed(
+    starts: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, movement: Movement
+) -> tuple[Floats, float, Floats]:
+    """`climbed` from the best of the starts (S, P); from the first one where the likelihood contradicts."""
+    best, first = 0, -np.inf
+    if len(starts) > 1:
+        best, first = _likeliest_start(starts, movement)
+    found = climbed(starts[best], lower, upper, most_steps, tolerance, movement)
+    if best > 0 and not found[1] >= first:
+        found = climbed(starts[0], lower, upper, most_steps, tolerance, movement)
+    return found
+
+
+@compiled
+def information_at(u: Floats, gradient: Floats, movement: Movement) -> Floats:
+    """Observed information: minus the Hessian by differences of the exact gradient, which is given for u. (P, P)."""
     n_components = len(u)
     hessian = np.empty((n_components, n_components))
-    width = 1e-4
     for p in range(n_components):
-        above, below = u.copy(), u.copy()
-        above[p] += width
-        below[p] -= width
-        _, up, _ = expectation_at(
-            above, exponents, frames, present, white, log_norm, log_duration, d_min, ends, n_frames
-        )
-        _, down, _ = expectation_at(
-            below, exponents, frames, present, white, log_norm, log_duration, d_min, ends, n_frames
-        )
-        hessian[p] = (down - up) / (2.0 * width)
+        beside = u.copy()
+        beside[p] += WIDTH
+        _, found, _ = expectation_at(beside, movement)
+        hessian[p] = (gradient - found) / WIDTH
     return 0.5 * (hessian + hessian.T)
 
 
 @compiled
 def nearest(
     starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, most_steps: int
-) -> tuple[Floats, float, Floats]:
-    """The place u within +-bound with the least |right - triangle phi(u)|^2, that sum, and triangle dphi/du there.
+) -> tuple[Floats, Floats]:
+    """The place u within +-bound with the least |right - triangle phi(u)|^2, and triangle dphi/du there.
 
     Gauss-Newton with shorter steps where a whole one leads up, from the best of the starts (S, P).
     """
@@ -263,4 +305,37 @@ def nearest(
         if gained < 1e-9 * (1.0 + misfit):
             break
     monomials_at(place, exponents, features, slopes)
-    return place, ((right - triangle @ features) ** 2).sum(), triangle @ slopes
+    return place, triangle @ slopes
+
+
+@compiled
+def aligned_parts(
+    sequence: Floats, movement: Movement, begins: Ints, alignments: int, starts: Floats, bound: float,
+    projector: Floats, triangle: Floats, most_steps: int,
+) -> Floats:  # fmt: skip
+    """Averages of the parts of a movement and its last frame, ((parts + 1) D,).
+
+    States are found at the first of the starts, and then at the place where the averages say that theta is.
+
+    Args:
+        sequence: the frames, (T, D). begins: first state of each part. alignments: how often states are found.
+        starts, bound, triangle, most_steps: of `nearest`; projector: makes its `right` of the averages.
+    """
+    parts, place = np.empty((len(begins) + 1, sequence.shape[1])), starts[0]
+    parts[-1] = sequence[-1]
+    for alignment in range(alignments):
+        if alignment > 0:
+            right = np.dot(projector, parts.ravel())
+            place = nearest(starts, bound, movement.exponents, right, triangle, most_steps)[0]
+        gamma = responsibilities_at(place, movement)
+        parts[:-1] = 0.0
+        for part in range(len(begins)):
+            end = begins[part + 1] if part + 1 < len(begins) else len(gamma)
+            weight = 0.0
+            for i in range(begins[part], end):
+                for t in range(movement.ends[i, 0], movement.ends[i + 1, 1]):
+                    if gamma[i, t] > NEGLIGIBLE:
+                        weight += gamma[i, t]
+                        add_multiple(gamma[i, t], sequence[t], parts[part])
+            parts[part] /= weight
+    return parts.ravel()
