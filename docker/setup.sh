@@ -101,7 +101,7 @@ fi
 
 # --- Compiled kernels ------------------------------------------------------------------------------------------------
 if [ -f src/paramove/cli/warm.py ]; then
-    say "compiles the numerical kernels (a minute, once)"
+    say "compiles the numerical kernels (two or three minutes, once)"
     .venv/bin/paramove warm
 fi
 

@@ -14,7 +14,14 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "reference" / "api.md"
-PACKAGES = ("paramove.phmm", "paramove.hmm", "paramove.alignment", "paramove.demonstrations")
+PACKAGES = (
+    "paramove.phmm",
+    "paramove.hmm",
+    "paramove.alignment",
+    "paramove.demonstrations",
+    "paramove.action_space",
+    "paramove.observation",
+)
 HEAD = """\
 # API
 

@@ -23,7 +23,14 @@ from urllib.parse import unquote
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("paramove.hmm", "paramove.phmm", "paramove.alignment", "paramove.demonstrations")
+PACKAGES = (
+    "paramove.hmm",
+    "paramove.phmm",
+    "paramove.alignment",
+    "paramove.demonstrations",
+    "paramove.action_space",
+    "paramove.observation",
+)
 MARK = ".built-from-docs"
 """File in the output, which may be made anew only where it lies."""
 STYLE = """

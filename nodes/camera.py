@@ -1,4 +1,4 @@
-"""Camera: reads frames from a camera, a video file or a topic, checks them and says them compressed.
+"""Camera: reads frames from a camera, a file or a topic, checks them and says them compressed.
 
 Hears   camera/light   foxglove.RawImage          15 Hz   camera_optical   only with source topic:camera/light
 Says    camera/image   foxglove.CompressedImage   15 Hz   camera_optical
@@ -16,7 +16,7 @@ SAYS = (topics.CAMERA_IMAGE,)
 
 
 class Config(NodeConfig):
-    source: str = "topic:camera/light"  # or file:PATH, or device:PATH
+    source: str = "topic:camera/light"  # or file:PATH, device:PATH, folder:PATH@RATE, recording:PATH#TOPIC
     width: int = Field(480, gt=0)
     height: int = Field(360, gt=0)
     jpeg_quality: int = Field(95, ge=1, le=100)

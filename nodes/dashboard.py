@@ -1,7 +1,7 @@
 """Dashboard: shows the running application on a page in the browser, on this machine only, with a stop button.
 
 Hears   camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech, relocation/goal,
-        relocation/status, arm/joint_states, arm/safety, and the status of every node
+        relocation/status, arm/joint_states, arm/safety, action/outline, and the status of every node
 Says    operator/stop   StopRequest   when a person presses stop
 """
 
@@ -19,7 +19,7 @@ from paramove.robots.description import RobotDescription
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
-HEARS = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY)
+HEARS = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ACTION_OUTLINE)
 SAYS = (topics.OPERATOR_STOP,)
 
 

@@ -1,8 +1,11 @@
-"""Recognizer: tells from tracked objects what happens on the table: moved, rested, vanished, appeared, pointed at.
+"""Recognizer: tells what happens on the table, from tracked objects, and where a tracked arm points.
 
 Hears   objects/tracked     TrackedObjects     15 Hz   image plane, pixels
         calibration/plane   PlaneCalibration   event   right_shoulder
+        action/estimate     ActionEstimate     15 Hz   table
+        human/arm_pose      ArmPose            event   table
 Says    gestures            Gesture            event   pixels, and metres once calibrated
+        gestures/scene      SceneUpdate        15 Hz   table; the ball where arm poses point
 """
 
 from paramove.bus import topics
@@ -11,13 +14,14 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.vision.homography import HomographyError, PlaneHomography
 from paramove.vision.object_motion import MotionThresholds
 from paramove.vision.pointing import PointingThresholds
+from paramove.vision.pointing_source import PointingSetup
 from paramove.vision.recognizer import Recognizer, RecognizerOptions
 
-HEARS = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE)
-SAYS = (topics.GESTURES,)
+HEARS = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE, topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE)
+SAYS = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
-class Config(NodeConfig):
+class Config(NodeConfig, PointingSetup):
     rim_clearance: float = RecognizerOptions.rim_clearance  # m
     motion: MotionThresholds = MotionThresholds()
     pointing: PointingThresholds = PointingThresholds()
@@ -26,9 +30,14 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
     recognizer = Recognizer(RecognizerOptions(config.motion, config.pointing, config.rim_clearance))
+    pointing = config.pointing_source(bus.run_folder)
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")
-    for heard in bus.events(topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE):
+    for heard in bus.events(*HEARS):
+        for topic, message in pointing.hear(heard.topic, heard.message):
+            bus.publish(topic, message, heard.captured_ns)
+        if heard.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
+            continue
         if heard.topic.name == topics.CALIBRATION_PLANE.name:
             try:
                 PlaneHomography.from_message(heard.message)

@@ -13,7 +13,7 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.rules.rule_learner import RuleLearner
-from paramove.rules.stage import RuleLearnerOptions
+from paramove.rules.stage import Pointing, RuleLearnerOptions
 from paramove.rules.table import Surface
 
 HEARS = (topics.GESTURES, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
@@ -21,7 +21,7 @@ SAYS = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.A
 
 
 class Config(NodeConfig):
-    """Places in the right shoulder's frame, m; `arm_patience_s`: how long the arm may wait to be armed again."""
+    """Places in the right shoulder's frame, m; the rest: see `RuleLearnerOptions`."""
 
     objects: tuple[str, ...] = ("yellow", "green", "blue")
     corners: tuple[tuple[float, float], ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
@@ -30,6 +30,7 @@ class Config(NodeConfig):
     surface_x: tuple[float, float] = (0.100, 0.240)
     surface_y: tuple[float, float] = (-0.170, 0.130)
     arm_patience_s: float = 10.0
+    pointing: Pointing = "nearness"
 
 
 def run(bus: Bus, config: Config) -> None:

@@ -189,13 +189,17 @@ class Instructor:
             yield Step(1.0)
             return
         self.doing, self.pointed_at = f"points at {name}", name
+        yield from self._point_at(name)
+        yield from self._withdraw()
+
+    def _point_at(self, name: str) -> Script:
+        """The hand goes to a cylinder, stays until the robot has understood, and leaves it a little."""
         fingertip, backward = self._sees.pointing_pose(name, self._paths)
         yield self._move(fingertip + 0.05 * backward / np.linalg.norm(backward), backward, (1.0, 2.0))
         yield self._move(fingertip, backward, (0.5, 0.8), straight=True)
         self._acknowledged = False
         yield Step(POINTING_S, until=lambda: self._acknowledged)
         yield self._move(fingertip + 0.06 * backward / np.linalg.norm(backward), backward, (0.4, 0.7), straight=True)
-        yield from self._withdraw()
 
     def _help(self, name: str) -> Script:
         yield from self._empty_hand()

@@ -62,7 +62,11 @@ def run(bus: Bus, config: Config) -> None:
                 if sentence:
                     bus.ready(sentence)
             if recording is not None:
-                kept = _compressed(heard.message, config) if heard.topic is topics.TRUTH_VIEW else heard.message
+                kept = (
+                    compressed(heard.message, config.jpeg_quality)
+                    if heard.topic is topics.TRUTH_VIEW
+                    else heard.message
+                )
                 recording.write(heard.topic.name, kept, heard.captured_ns, heard.published_ns, heard.sequence)
     finally:
         judge.write()
@@ -130,11 +134,10 @@ class Judge:
         return summary
 
 
-def _compressed(image: RawImage, config: Config) -> CompressedImage:
+def compressed(image: RawImage, jpeg_quality: int) -> CompressedImage:
+    """An RGB image as JPEG."""
     pixels = np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
-    _, encoded = cv2.imencode(
-        ".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality]
-    )
+    _, encoded = cv2.imencode(".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
     return CompressedImage(timestamp=image.timestamp, frame_id=image.frame_id, data=encoded.tobytes(), format="jpeg")
 
 

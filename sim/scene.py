@@ -5,6 +5,7 @@ World frame: the torso frame of the robot's model. The files of the robot are ta
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,11 @@ AMBIENT_SHARE = 0.35
 LIGHT_PLACES = ((0.5, 0.9, 1.4), (0.7, -1.0, 1.3))
 
 
-def build(world_looks: Looks) -> mujoco.MjModel:
+Furnish = Callable[[mujoco.MjSpec, FloatArray], None]
+"""Adds more to a world, which it is given with the place of the right shoulder in it, [3], m."""
+
+
+def build(world_looks: Looks, furnish: Furnish | None = None) -> mujoco.MjModel:
     """The compiled model of a seed's world."""
     spec = mujoco.MjSpec.from_file(str(ROBOT_MODEL))
     _set_options(spec)
@@ -60,6 +65,8 @@ def build(world_looks: Looks) -> mujoco.MjModel:
     _add_cylinders(spec, world_from_shoulder)
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
+    if furnish is not None:
+        furnish(spec, world_from_shoulder)
     return spec.compile()
 
 
@@ -290,16 +297,19 @@ def _add_cameras(spec: mujoco.MjSpec, world_looks: Looks, world_from_shoulder: F
         quat=quaternion_of(camera.shoulder_from_optical @ flip),
         fovy=float(np.rad2deg(2 * np.arctan(RENDERED_PX[1] / 2 / camera.focal_px))),
     )
-    eye, target = np.array((0.62, -0.62, 0.36)), np.array((0.09, -0.13, 0.02))
-    backward = (eye - target) / np.linalg.norm(eye - target)
+    place_view(spec, (0.62, -0.62, 0.36), (0.09, -0.13, 0.02))
+
+
+def place_view(spec: mujoco.MjSpec, eye: Any, target: Any) -> None:
+    """The view for people is from `eye` to `target`, both [3], m, world."""
+    backward = (np.array(eye) - np.array(target)) / np.linalg.norm(np.array(eye) - np.array(target))
     right = np.cross((0.0, 0.0, 1.0), backward)
     right /= np.linalg.norm(right)
-    spec.worldbody.add_camera(
-        name="view",
-        pos=eye,
-        quat=quaternion_of(np.column_stack((right, np.cross(backward, right), backward))),
-        fovy=42.0,
-    )
+    turned = quaternion_of(np.column_stack((right, np.cross(backward, right), backward)))
+    view = spec.camera("view")
+    if view is None:
+        view = spec.worldbody.add_camera(name="view", fovy=42.0)
+    view.pos, view.quat = eye, turned
 
 
 def quaternion_of(rotation: FloatArray) -> FloatArray:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from numpy.typing import NDArray
 
 from paramove.bus import topics
 from paramove.bus.subscriber import Heard
@@ -53,11 +55,11 @@ class Simulation:
         self._firmware_log = firmware_log
         draws = looks.streams(seed)
         self.looks = Looks.draw(seed)
-        self.world = World(self.looks, description)
+        self.world = self._new_world(description)
         self.firmware = Firmware(description)
         self.firmware.reset(description.base_pose)
         self.stream = StreamReader(description, description.units.to_counts(description.base_pose))
-        self.instructor = Instructor(self.world, self.looks.rules, draws)
+        self.instructor = self._new_instructor(draws)
         self.description = description
         self._eye = Eye(self.world.model, *scene.RENDERED_PX) if camera else None
         self._view = Eye(self.world.model, *scene.VIEW_PX) if video else None
@@ -65,10 +67,29 @@ class Simulation:
         self.physics_s = 0.0
         self.rendering_s = 0.0
 
+    def _new_world(self, description: RobotDescription) -> World:
+        return World(self.looks, description)
+
+    def _new_instructor(self, draws: dict[str, np.random.Generator]) -> Instructor:
+        return Instructor(self.world, self.looks.rules, draws)
+
     @property
     def now_ns(self) -> int:
         """Simulated time since the start."""
         return self.world.steps * 1_000_000
+
+    @property
+    def tick(self) -> int:
+        """Number of the newest tick of 1/15 s."""
+        return self.world.steps * CAMERA_HZ // 1000
+
+    @property
+    def world_from_table(self) -> NDArray[np.float64] | None:
+        """Pose [4, 4] of the table frame of a tracked arm; None where there is none."""
+        return None
+
+    def write_measures(self, folder: Path) -> None:
+        """Writes what people measure before the run: nothing in this world."""
 
     def hear(self, heard: Heard) -> None:
         """Take in a message of the stream or of what the robot says."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from pydantic import Field
@@ -68,20 +69,26 @@ class Config(NodeConfig):
     firmware_log: bool = False
 
 
-def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes or the simulated time is up."""
+def run(
+    bus: Bus,
+    config: Config,
+    kind: type[Simulation] = Simulation,
+    say_more: Callable[[Bus, Simulation], None] = lambda bus, simulation: None,
+) -> None:
+    """Loop until the bus closes or the simulated time is up. What `say_more` says belongs to the tick."""
     log_warnings_of_mujoco()
     with contextlib.ExitStack() as open_files:
         log = None
         if config.firmware_log:  # without a buffer: nothing is lost when the process is killed
             log = open_files.enter_context((bus.run_folder / FIRMWARE_LOG).open("xb", buffering=0))
         description = RobotDescription.load(config.robot)
-        simulation = Simulation(config.seed, description, config.camera, config.video, log)
+        simulation = kind(config.seed, description, config.camera, config.video, log)
         open_files.callback(simulation.close)
-        _loop(bus, config, simulation)
+        simulation.write_measures(bus.run_folder)
+        _loop(bus, config, simulation, say_more)
 
 
-def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
+def _loop(bus: Bus, config: Config, simulation: Simulation, say_more: Callable[[Bus, Simulation], None]) -> None:
     barrier = LockstepBarrier(bus)
     bus.publish(topics.TRUTH_LAYOUT, truth.layout(simulation))
     bus.ready("waits for the members of the lockstep" if bus.settings.lockstep else "runs in real time")
@@ -92,6 +99,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation) -> None:
     started_s = due_s = time.perf_counter()
     while not bus.stopped and simulation.world.time_s < config.max_duration_s:
         _say(bus, simulation)
+        say_more(bus, simulation)
         for heard in barrier.advance(simulation.now_ns):
             simulation.hear(heard)
         if bus.stopped:

@@ -25,6 +25,8 @@ def layout(simulation: Simulation) -> TruthLayout:
         light_levels=looks.brightness,
         pixel_noise=looks.pixel_noise,
     )
+    if simulation.world_from_table is not None:
+        message.world_from_table.extend(simulation.world_from_table.ravel().tolist())
     for item in tool_box.OPENINGS:
         x, y, _ = item.centre + origin
         message.openings.add(name=item.name, x=x, y=y, radius=tool_box.OPENING_RADIUS)

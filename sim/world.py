@@ -35,10 +35,11 @@ class World:
     Args:
         looks: How it looks; lights and cameras are part of the model.
         description: The robot's joints, in the order in which torques come.
+        furnish: Adds what else is there.
     """
 
-    def __init__(self, looks: Looks, description: RobotDescription) -> None:
-        self.model = scene.build(looks)
+    def __init__(self, looks: Looks, description: RobotDescription, furnish: scene.Furnish | None = None) -> None:
+        self.model = scene.build(looks, furnish)
         self.data = mujoco.MjData(self.model)
         self.description = description
         model = self.model

@@ -18,7 +18,12 @@ def test_names_are_unique_and_well_formed() -> None:
 
 
 def test_truth_and_raw_light_are_never_recorded() -> None:
-    assert {topic.name for topic in topics.TOPICS if topic.truth} == {"truth/layout", "truth/state", "truth/view"}
+    assert {topic.name for topic in topics.TOPICS if topic.truth} == {
+        "truth/layout",
+        "truth/state",
+        "truth/arm",
+        "truth/view",
+    }
     assert not any(topic.recorded for topic in topics.TOPICS if topic.truth)
 
 

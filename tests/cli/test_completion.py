@@ -40,8 +40,9 @@ def offered(line, cwd=ROOT, **variables):
     ("line", "expected"),
     [
         ("paramove la", {"launch"}),
-        ("paramove launch ", {"rule_learning"}),
+        ("paramove launch ", {"pointing", "relocate_by_pointing", "rule_learning"}),
         ("paramove launch rule_learning --with re", {"real", "real_time"}),
+        ("paramove launch pointing --with rep", {"replay"}),
         ("paramove launch rule_learning --set camera.w", {"camera.width="}),
         ("paramove launch rule_learning --set simulator.se", {"simulator.seed="}),
         ("paramove launch rule_learning --with real --set simulator.", set()),

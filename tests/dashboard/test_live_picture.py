@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from numpy.testing import assert_allclose
 
 from paramove.bus import topics
@@ -49,6 +50,21 @@ def test_the_middle_of_a_run_is_shown() -> None:
     goal = shown["goal"]
     assert (goal["kind"], goal["object"], goal["phase"], goal["ended"]) == ("relocate", "green", "carry", False)
     assert goal["from"] == [0.171, -0.078, -0.098]
+
+
+def test_a_tracked_arm_is_drawn_with_its_ball() -> None:
+    outline = ImageAnnotations()
+    line = outline.points.add()
+    line.outline_color.g = 1.0
+    for x, y in ((10.04, 20.0), (30.0, 40.0)):
+        line.points.add(x=x, y=y)
+    ball = outline.circles.add(diameter=9.0)
+    ball.position.x, ball.position.y = 50.0, 60.0
+    ball.fill_color.r = 2.0  # no such colour
+    assert sections((topics.ACTION_OUTLINE, outline))["arm"] == {
+        "lines": [{"points": [[10.0, 20.0], [30.0, 40.0]], "colour": "rgb(0 255 0)"}],
+        "balls": [{"place": [50.0, 60.0], "diameter": 9.0, "colour": "rgb(255 0 0)"}],
+    }
 
 
 def test_objects_are_where_the_robot_believes_them() -> None:

@@ -13,6 +13,8 @@ MODULES = [
     *(f"nodes.{path.stem}" for path in sorted((ROOT / "nodes").glob("*.py")) if path.stem != "__init__"),
     "sim.simulator",
     "sim.judge",
+    "sim.pointing_simulator",
+    "sim.arm_judge",
 ]
 INTERFACES = {module.partition(".")[2]: read_interface(module, ROOT) for module in MODULES}
 

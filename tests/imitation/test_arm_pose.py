@@ -260,3 +260,17 @@ def test_points_too_near_are_moved_straight_outward_and_others_stay() -> None:
     assert (np.diff(found) >= -1e-12).all()
     far = distances >= least + margin + width
     np.testing.assert_allclose(found[far], distances[far], rtol=0, atol=1e-12)
+
+
+def test_what_overshoots_a_limit_is_pressed_into_the_margin_and_the_rest_is_left() -> None:
+    middle, half = 0.5 * (LOWER + UPPER), 0.5 * (UPPER - LOWER)
+    along = np.linspace(-1.0, 1.0, 2001)[:, None]
+    over = np.deg2rad([0.0, 0.3, 0.0, -0.1, 1.0])  # beyond the limits of the safety gate
+    curve = middle + along * (half + over - np.deg2rad([5.0, 0.0, 5.0, 0.0, 0.0]))
+    pressed = solver().pressed_inside(curve)
+    assert (pressed > LOWER).all()
+    assert (pressed < UPPER).all()
+    np.testing.assert_array_equal(pressed[:, [0, 2]], curve[:, [0, 2]])
+    near = np.abs(curve - middle) < half - np.deg2rad(0.7)
+    np.testing.assert_array_equal(pressed[near], curve[near])
+    assert (np.diff(pressed, axis=0) > 0).all()

@@ -13,9 +13,10 @@ from paramove.imitation import recorded_reaching
 from paramove.imitation.modelled_movement import ModelledMovement, robot_movement
 from paramove.imitation.reaching_file import check_reaching_model
 from paramove.imitation.recorded_reaching import people_model, train_people_model
+from paramove.imitation.relocation import RelocationPlanner
 from paramove.phmm import ModelFileError, PolynomialPHMM
 from tests.demonstrations.made_up_recordings import write_table
-from tests.imitation.reaching import solver
+from tests.imitation.reaching import ARM, GRASP_Z, HOAP3, JOINTS, at, solver
 
 DATA = Path(os.environ.get("PARAMOVE_DATA") or Path(__file__).parents[3] / "shared" / "data")
 NAME = "table_reach"
@@ -119,3 +120,14 @@ def test_left_of_the_shoulder_is_within_their_training_and_right_of_it_is_not(mo
     assert movement.within_training([0.18, 0.03, -0.098]) is True
     assert movement.within_training([0.18, -0.08, -0.098]) is False
     assert movement.within_training([0.135, 0.019, -0.098]) is False
+
+
+@needs_people
+def test_motions_whose_elbow_turns_at_a_limit_stay_within_it(model: PolynomialPHMM) -> None:
+    velocity, acceleration = HOAP3.operating_velocity[JOINTS], HOAP3.operating_acceleration[JOINTS]
+    base = HOAP3.base_pose[JOINTS]
+    planner = RelocationPlanner(robot_movement(model, solver().length), solver(), ARM, base, velocity, acceleration)
+    held = at((0.173, -0.0587), GRASP_Z + planner.options.lift)
+    angles = planner.deliver(held, at((0.12774, -0.093111))).angles[:, :5]
+    assert (angles < HOAP3.soft_upper[ARM.indices]).all()
+    assert (angles > HOAP3.soft_lower[ARM.indices]).all()

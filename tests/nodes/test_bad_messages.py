@@ -15,22 +15,40 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from nodes import arm_driver, camera, colour_tracker, operator, recognizer, recorder, rule_learner, synthesizer
+from nodes import (
+    action_tracker,
+    arm_driver,
+    body_tracker,
+    camera,
+    colour_tracker,
+    operator,
+    recognizer,
+    recorder,
+    relocator,
+    rule_learner,
+    synthesizer,
+)
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
+from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
+from paramove.observation.cameras import write_cameras
 from paramove.vision.frames import Frame, encode
 from paramove.vision.homography import PlaneHomography
+from tests.action_space import drawn_arm
 from tests.imitation.fake_driver import Cell, goal
 from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 from tests.nodes.bad_messages import first_not_finite, variants
 from tests.robots.hoap3.fake_robot import FakeRobot, trajectory
 from tests.robots.hoap3.movements import HOAP3
+from tests.rules.pointing_story import PointingStory
 from tests.rules.story import Story
+from tests.vision.persons import performed, poses
+from tests.vision.test_markers import EYES, with_markers
 from tests.vision.tracks import hand_with_tip, image_of, standing
 
 PERIOD_NS = 66_666_667
@@ -116,7 +134,35 @@ def of_recognizer() -> list[Event]:
             n * PERIOD_NS, standing("blue", u, 250), standing("green", 260, 250), hand_with_tip(u - 20, 250)
         )
         said.append((topics.OBJECTS_TRACKED, seen))
+        said.append((topics.ACTION_ESTIMATE, _estimate(n)))
     return timed(said)
+
+
+def _estimate(number: int) -> ActionEstimate:
+    message = ActionEstimate(frame="table", progress=[0.5, 0.5], effective_sample_size=100.0, particles=400, views=1)
+    message.captured.FromNanoseconds(number * PERIOD_NS)
+    message.actions.add(action="pointing", probability=1.0).parameters.add(name="u", mean=0.5, covariance=[0.1])
+    message.target.number, message.target.action = 1 + number // 40, "pointing"
+    message.target.arrived.FromNanoseconds((number - number % 40) * PERIOD_NS)
+    message.target.location.x, message.target.location.x_deviation = 0.1, 0.01
+    return message
+
+
+def of_action_tracker() -> list[Event]:
+    images = drawn_arm.drawn(drawn_arm.pointing()[1][:30], drawn_arm.camera(1))
+    frames = [encode(Frame(image, 0, number)) for number, image in enumerate(images)]
+    return timed((topics.CAMERA_IMAGES[number % 4], frame) for number, frame in enumerate(frames))
+
+
+def of_pointing_poses() -> list[Event]:
+    """A recognizer that hears poses; what it hears besides is as in `of_recognizer`."""
+    said: list[Said] = [(event.topic, event.message) for event in of_recognizer()[:12] if isinstance(event, Heard)]
+    return timed([*said, *((topics.HUMAN_ARM_POSE, pose) for pose in poses(performed("pointing", [(0.4, 0.5)])))])
+
+
+def of_body_tracker() -> list[Event]:
+    frames = [encode(Frame(with_markers(eye), 0, number)) for number, eye in enumerate(EYES)]
+    return timed((topics.CAMERA_IMAGES[number % 4], frames[number % 2]) for number in range(24))
 
 
 def of_rule_learner() -> list[Event]:
@@ -129,6 +175,13 @@ def of_rule_learner() -> list[Event]:
             now_ns = events[place].now_ns
             events.insert(place + 1, Heard(topics.ARM_SAFETY, safety, now_ns, now_ns, 1))
     return events
+
+
+def of_relocator() -> list[Event]:
+    story = PointingStory("goal-0", aligns=True)
+    story.safety(SafetyState.STATE_ARMED, "sentence")
+    assert story.run()
+    return list(story.events)
 
 
 def of_synthesizer() -> list[Event]:
@@ -167,8 +220,12 @@ def of_recorder() -> list[Event]:
 NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
     "camera": (camera, of_camera, {"width": 48, "height": 36}),
     "colour_tracker": (colour_tracker, of_colour_tracker, {}),
-    "recognizer": (recognizer, of_recognizer, {}),
+    "recognizer": (recognizer, lambda: [*of_recognizer(), *of_pointing_poses()[-40:]], {}),
+    "recognizer of poses": (recognizer, of_pointing_poses, {"pointing_from": "poses"}),
+    "body_tracker": (body_tracker, of_body_tracker, {}),
+    "action_tracker": (action_tracker, of_action_tracker, {}),
     "rule_learner": (rule_learner, of_rule_learner, {}),
+    "relocator": (relocator, of_relocator, {}),
     "synthesizer": (synthesizer, of_synthesizer, {"robot": ROBOT_FOLDER}),
     "arm_driver": (arm_driver, of_arm_driver, {"robot": ROBOT_FOLDER}),
     "operator": (operator, of_operator, {"arms_at_start": True}),
@@ -181,6 +238,11 @@ def _config(node: str, folder: Path) -> Any:
     if node == "synthesizer":
         reaching_model().save(folder / "reaching.npz")
         parameters = {**parameters, "movement": {"file": folder / "reaching.npz"}}
+    if node == "body_tracker":
+        write_cameras(folder / "cameras.yaml", EYES)
+        parameters = {"cameras": folder / "cameras.yaml"}
+    if node == "action_tracker":
+        parameters = drawn_arm.write_setup(folder, 2)
     return module.Config.model_validate(parameters)
 
 

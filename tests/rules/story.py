@@ -45,8 +45,8 @@ class Story:
         answers: Request -> what the instructor does then.
     """
 
-    def __init__(self, run_name: str = "run") -> None:
-        self.learner = RuleLearner(OPTIONS, run_name)
+    def __init__(self, run_name: str = "run", options: RuleLearnerOptions = OPTIONS) -> None:
+        self.learner = RuleLearner(options, run_name)
         self.events: list[Heard | Tick] = []
         self.now_ns = 0
         self._number = 0

@@ -13,6 +13,7 @@ from paramove.supervision.environment import examined
 
 ROOT = Path(__file__).parents[2]
 FILE = str(Path(__file__))
+RUNTIME = tempfile.TemporaryDirectory(prefix="pm-", dir="/tmp")  # others may have folders of this name in /tmp itself
 DECIDING = ("PARAMOVE_DOMAIN", "XDG_RUNTIME_DIR", "XDG_CACHE_HOME", "HOME", "TMPDIR", "TZ", "PYTHONPATH", "LC_ALL")
 
 
@@ -118,7 +119,7 @@ def test_root_in_the_clone_of_another_is_told(environment, monkeypatch):
 
 
 def launch(*arguments, cwd=ROOT, **variables):
-    kept = {"PATH": os.environ["PATH"], "XDG_RUNTIME_DIR": tempfile.gettempdir()}
+    kept = {"PATH": os.environ["PATH"], "XDG_RUNTIME_DIR": RUNTIME.name}
     return subprocess.run(
         [sys.executable, "-m", "paramove.cli.launch", *arguments],
         cwd=cwd,
@@ -144,7 +145,7 @@ def test_check_prints_what_a_run_would_use(variables):
     told = {line.split()[0]: line.split(maxsplit=1)[1] for line in lines}
     assert told["overlays"] == "sim, seed 7"
     assert told["clock"] == "simulated, lockstep"
-    assert told["domain"] == f"second, sockets in {tempfile.gettempdir()}/paramove/second"
+    assert told["domain"] == f"second, sockets in {RUNTIME.name}/paramove/second"
     assert told["python"] == sys.executable
 
 

@@ -88,6 +88,14 @@ def test_wrong_setting_is_named(folder, setting, message):
     assert setting in str(caught.value)
 
 
+def test_an_overlay_of_this_launch_file_comes_before_one_for_all(folder):
+    (folder / "overlays" / "good").mkdir()
+    (folder / "overlays" / "good" / "slow.yaml").write_text("nodes: {camera: {parameters: {rate_hz: 2}}}\n")
+    assert load(folder, "good").file.nodes["camera"].parameters["rate_hz"] == 2
+    (folder / "other.yaml").write_text((folder / "good.yaml").read_text())
+    assert load(folder, "other", ["slow"]).file.nodes["camera"].parameters["rate_hz"] == 5
+
+
 @pytest.mark.parametrize(
     ("name", "overlays", "message"),
     [

@@ -18,8 +18,16 @@ def test_nodes_fit_together(name, overlay):
     application.check(launch, ROOT)
 
 
-def test_only_simulator_and_judge_get_the_truth():
-    launch = load(ROOT / "launch", "rule_learning", ["sim"])
+def test_an_arm_that_is_tracked_fits_on_top_of_the_simulation():
+    launch = load(ROOT / "launch", "rule_learning", ["sim", "action_space"])
+    application.check(launch, ROOT)
+    assert launch.file.nodes["rule_learner"].parameters["pointing"] == "action_space"
+    assert launch.file.nodes["simulator"].parameters["video"]  # what the overlay sim sets stays
+
+
+@pytest.mark.parametrize("overlays", [["sim"], ["sim", "action_space"]])
+def test_only_simulator_and_judge_get_the_truth(overlays):
+    launch = load(ROOT / "launch", "rule_learning", overlays)
     assert {name for name, node in launch.file.nodes.items() if node.truth} == {"simulator", "judge"}
 
 

@@ -8,13 +8,16 @@ from __future__ import annotations
 import difflib
 import enum
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
+from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
@@ -26,7 +29,7 @@ from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState, StopRequest
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
-from paramove.msgs.truth_pb2 import TruthLayout, TruthState
+from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
 
 
 class Profile(enum.Enum):
@@ -102,10 +105,17 @@ CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical", ma
 CAMERA_IMAGE = Topic(
     "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=_IMAGE_BYTES
 )
+CAMERA_LIGHTS = tuple(replace(CAMERA_LIGHT, name=f"camera_{number}/light") for number in range(1, 5))
+CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
+"""Of the calibrated cameras that look at a person."""
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
 GESTURES = Topic("gestures", Gesture, None, _QUEUE, recorded=True)
+GESTURES_SCENE = Topic("gestures/scene", SceneUpdate, 15, _QUEUE, "table", recorded=True)
 CALIBRATION_PLANE = Topic("calibration/plane", PlaneCalibration, None, _LATCHED, "right_shoulder", recorded=True)
 HUMAN_ARM_POSE = Topic("human/arm_pose", ArmPose, None, _QUEUE, recorded=True)
+ACTION_ESTIMATE = Topic("action/estimate", ActionEstimate, 15, _QUEUE, "table", recorded=True)
+ACTION_OUTLINE = Topic("action/outline", ImageAnnotations, 15, _QUEUE, "camera_1", recorded=True)
+ACTION_SCENE = Topic("action/scene", SceneUpdate, 15, _QUEUE, "table", recorded=True)
 RULES = Topic("rules", Rules, None, _LATCHED, "right_shoulder", recorded=True)
 APPLICATION_STAGE = Topic("application/stage", ApplicationStage, 1, _LATCHED, recorded=True)
 SPEECH = Topic("speech", Speech, None, _QUEUE, recorded=True)
@@ -121,9 +131,15 @@ WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, record
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
 TRUTH_STATE = Topic("truth/state", TruthState, 15, _QUEUE, "world")
+TRUTH_ARM = Topic("truth/arm", TruthArm, 15, _QUEUE, "table")
 TRUTH_VIEW = Topic("truth/view", RawImage, 15, _LATEST, "view", max_bytes=_IMAGE_BYTES)
 
-TOPICS: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
+TOPICS: tuple[Topic, ...] = tuple(
+    topic
+    for value in list(globals().values())
+    for topic in (value if isinstance(value, tuple) else (value,))
+    if isinstance(topic, Topic)
+)
 """Every topic but the status topics, which exist once per node: see `status`."""
 
 _STATUS_PREFIX = "status/"

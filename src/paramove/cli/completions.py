@@ -21,8 +21,10 @@ def launch_files(incomplete: str) -> list[str]:
 
 
 def overlays(incomplete: str) -> list[str]:
-    """Overlays of the workspace."""
-    return _beginning(incomplete, _names(_workspace() / "launch" / "overlays"))
+    """Overlays of the workspace: those for every launch file, and those for the one that was typed."""
+    folder = _workspace() / "launch" / "overlays"
+    name, _ = _typed_launch()
+    return _beginning(incomplete, sorted({*_names(folder), *(_names(folder / name) if name else ())}))
 
 
 def schemas(incomplete: str) -> list[str]:
@@ -32,14 +34,19 @@ def schemas(incomplete: str) -> list[str]:
 
 def parameters(incomplete: str) -> list[str]:
     """`node.parameter=` of the launch file that was typed, with its overlays."""
-    name, chosen, before = "", [], ""
+    return _beginning(incomplete, sorted(_parameters(_workspace(), *_typed_launch())))
+
+
+def _typed_launch() -> tuple[str, list[str]]:
+    """The launch file that was typed, "" if none was, and its overlays."""
+    name, chosen, before = "", list[str](), ""
     for word in typed_words(os.environ)[2:]:
         if before == "--with":
             chosen.append(word)
         elif not name and before not in _WITH_VALUE and not word.startswith("-"):
             name = word
         before = word
-    return _beginning(incomplete, sorted(_parameters(_workspace(), name, chosen)))
+    return name, chosen
 
 
 def typed_words(environment: Mapping[str, str]) -> list[str]:
@@ -113,6 +120,7 @@ def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Ite
 
 def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
+    from paramove.supervision.names import overlay_folder
     from paramove.supervision.positions import LaunchFileError, read_mapping
 
     modules: dict[str, str] = {}
@@ -120,7 +128,7 @@ def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str,
         document = read_mapping((folder / f"{name}.yaml").read_text(encoding="utf-8-sig"), name)
         names = chosen or document.data.get("default_overlays", [])
         for overlay in names if isinstance(names, list | tuple) else []:
-            path = folder / "overlays" / f"{overlay}.yaml"
+            path = overlay_folder(folder, name, overlay) / f"{overlay}.yaml"
             document = document.overlaid(read_mapping(path.read_text(encoding="utf-8-sig"), str(path)))
         found = document.data.get("nodes")
         for node, settings in found.items() if isinstance(found, dict) else ():

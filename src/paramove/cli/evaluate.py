@@ -16,6 +16,8 @@ from paramove.cli.evaluate_chapters import chapter2, chapter4
 from paramove.cli.evaluate_faults import faults, kills
 from paramove.cli.evaluate_imitation import imitation
 from paramove.cli.evaluate_movements import peers, real
+from paramove.cli.evaluate_real_images import real_images
+from paramove.cli.evaluate_tracking import chapter6
 from paramove.cli.evaluation_io import (
     JUDGED_A_FAILURE,
     PROGRESS,
@@ -34,6 +36,8 @@ app.command("real")(real)
 app.command("peers")(peers)
 app.command("chapter2")(chapter2)
 app.command("chapter4")(chapter4)
+app.command("chapter6")(chapter6)
+app.command("real-images")(real_images)
 
 RUNS = Path("runs/evaluation")
 

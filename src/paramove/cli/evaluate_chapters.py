@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from platformdirs import user_cache_path
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, PROGRESS, JsonFileOption, seeds_in, write_numbers
+from paramove.cli.evaluation_io import JUDGED_A_FAILURE, JsonFileOption, seeds_in, stored_results, write_numbers
 from paramove.supervision import exit_codes
-
-if TYPE_CHECKING:
-    from paramove.evaluation.chapter4.experiments import Experiment
 
 CHAPTER2_FOLDER = Path("runs/evaluation/chapter2")
 CHAPTER4_FOLDER = Path("runs/evaluation/chapter4")
@@ -80,7 +76,8 @@ def chapter4(
     if not with_hmmlearn and not quick:
         console.print("hmmlearn is not installed: its plain HMM is left out (pip install hmmlearn brings it)")
     work = experiments(wanted, QUICK if quick else Scale(), with_hmmlearn=with_hmmlearn)
-    results = _stored_results(work, jobs, scheduler, console)
+    cache = user_cache_path("paramove") / "chapter4"
+    results = stored_results(work, cache, "experiments", console, jobs=jobs, scheduler=scheduler)
     folder = out.resolve()
     numbers, targets = write_results(results, folder)
     for title, heads, rows in (
@@ -100,26 +97,3 @@ def chapter4(
 
 def _rows(findings: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
     return [tuple(one.values()) for one in findings]
-
-
-def _stored_results(
-    work: Sequence[Experiment], jobs: int, scheduler: str | None, console: Console
-) -> list[dict[str, Any]]:
-    from paramove.evaluation.movements.sweep import ClusterMissingError, run_stored
-
-    cache = user_cache_path("paramove") / "chapter4"
-    with Progress(*PROGRESS, console=console) as progress:
-        shown = progress.add_task("experiments", total=None)
-
-        def finished(done: int, total: int, last: str) -> None:
-            progress.update(shown, completed=done, total=total, description=last[:60] or "experiments")
-
-        try:
-            keys = [one.key() for one in work]
-            return run_stored(work, keys, cache, workers=jobs, scheduler=scheduler, finished=finished)
-        except ClusterMissingError as error:
-            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-            raise typer.Exit(exit_codes.INPUT_MISSING) from error
-        except KeyboardInterrupt:
-            console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
-            raise typer.Exit(130) from None

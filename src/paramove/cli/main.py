@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
     "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
+    "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import, split and synthesize demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "models": ("paramove.cli.models", "List, show, plot and compare movement models."),

@@ -13,14 +13,14 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def warm() -> None:
-    """Compile the numerical kernels and train the reaching model; both are kept on disk, and again costs seconds."""
+    """Compile the numerical kernels and train the models of the demonstrations; both are kept on disk."""
     began_s = time.perf_counter()
-    typer.echo("compiling the kernels of hidden Markov models and time warping ...")
+    typer.echo("compiling the kernels of hidden Markov models, time warping and tracking ...")
     _compile()
     compiled_s = time.perf_counter()
     typer.echo(f"  {compiled_s - began_s:.1f} s; kept beside the installed package")
     cache = user_cache_path("paramove")
-    typer.echo(f"training the reaching model from synthetic demonstrations (kept in {cache}) ...")
+    typer.echo(f"training reaching and pointing from synthetic demonstrations (kept in {cache}) ...")
     trained = _train()
     typer.echo(f"  {time.perf_counter() - compiled_s:.1f} s{'' if trained else ', it was there already'}")
 
@@ -49,16 +49,40 @@ def _compile() -> None:
     frames = QuadraticPHMM(5, 2, 8, options=once, residuals="independent").fit(sequences, theta)
     frames.estimate(sequences[0])
     InterpolativePHMM(5, 2, 8, options=once).fit(sequences, theta).estimate(sequences[0])
+    _track()
+
+
+def _track() -> None:
+    """A tracker of one camera sees one image."""
+    import tempfile
+
+    import numpy as np
+
+    from paramove.action_space.setup import TrackingSetup
+    from paramove.observation.cameras import CalibratedCamera, write_cameras
+
+    place = np.array([[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
+    lens = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cameras.yaml"
+        write_cameras(path, [CalibratedCamera("camera", 320, 240, lens, np.zeros(4), place)])
+        TrackingSetup(cameras=path).video_tracker()
 
 
 def _train() -> bool:
     """True if the model was trained now."""
+    from paramove.action_space.training import table_action
     from paramove.imitation.setup import MovementSource
 
     cache: Path = user_cache_path("paramove")
-    before = {path: path.stat().st_mtime_ns for path in cache.glob("reaching_*.npz")}
+    before = _kept(cache)
     MovementSource().trained()
-    return {path: path.stat().st_mtime_ns for path in cache.glob("reaching_*.npz")} != before
+    table_action("pointing")
+    return _kept(cache) != before
+
+
+def _kept(cache: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in (*cache.glob("reaching_*.npz"), *cache.glob("actions/*.npz"))}
 
 
 if __name__ == "__main__":

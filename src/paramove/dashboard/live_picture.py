@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from foxglove_schemas_protobuf.Color_pb2 import Color
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from pydantic import BaseModel, ConfigDict
 
 from paramove.bus import topics
@@ -61,6 +63,7 @@ class LivePicture:
         self._given: dict[str, Any] = {}
         self._joints: Any = None
         self._safety: dict[str, Any] = {}
+        self._arm: dict[str, Any] = {}
         self._image: bytes | None = None
         self._world = {
             "title": title,
@@ -87,6 +90,8 @@ class LivePicture:
             self._hear[heard.topic.name](heard.message, heard.captured_ns * 1e-9)
         elif heard.topic.name == topics.CAMERA_IMAGE.name:
             self._image = bytes(heard.message.data)
+        elif heard.topic.name == topics.ACTION_OUTLINE.name:
+            self._arm = _drawn_arm(heard.message)
         elif heard.topic.name == topics.ARM_JOINT_STATES.name:
             self._joints = heard.message
         elif heard.topic.name == topics.ARM_SAFETY.name:
@@ -109,6 +114,7 @@ class LivePicture:
             "clock": round(now_ns * 1e-9, 1),
             **self._beliefs.sections(now_ns * 1e-9),
             "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._sites.gripper))},
+            "arm": self._arm,
             "safety": self._safety,
             "stop": stop,
             "nodes": self._nodes.section(self._wall_s()),
@@ -130,6 +136,34 @@ def _safety(message: SafetyState) -> dict[str, Any]:
         "faults": [{"joint": fault.joint, "sentence": fault.sentence} for fault in message.faults],
         "refused": message.refused_trajectories,
     }
+
+
+def _drawn_arm(message: ImageAnnotations) -> dict[str, Any]:
+    """Lines and balls in the image, px, each with its colour as the page's style sheet writes it."""
+    return {
+        "lines": [
+            {
+                "points": [[round(point.x, 1), round(point.y, 1)] for point in line.points],
+                "colour": _css(line.outline_color),
+            }
+            for line in message.points
+        ],
+        "balls": [
+            {
+                "place": [round(ball.position.x, 1), round(ball.position.y, 1)],
+                "diameter": ball.diameter,
+                "colour": _css(ball.fill_color),
+            }
+            for ball in message.circles
+        ],
+    }
+
+
+def _css(colour: Color) -> str:
+    parts = (colour.r, colour.g, colour.b)
+    return (
+        "rgb(" + " ".join(str(round(255 * min(max(part, 0.0), 1.0))) if part == part else "0" for part in parts) + ")"
+    )
 
 
 def _rounded(values: Any) -> list[float]:

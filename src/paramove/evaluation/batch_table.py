@@ -28,6 +28,15 @@ COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
 )
 """Heading, keys in run.json, and how the column is summed up."""
 
+POINTING_COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("pointed", ("pointings",), "total"),
+    ("right", ("pointings_right",), "total"),
+    ("error\nmm", ("pointing_error_mm", "median"), "median"),
+    ("max\nmm ", ("pointing_error_mm", "max"), "max"),
+    ("max of\nspacing", ("pointing_error_of_spacing", "max"), "max"),
+)
+"""The same for runs in which pointing is tracked in action space."""
+
 HULL_COLUMNS: tuple[tuple[str, str], ...] = (("inside\nhull", "inside"), ("outside\nhull", "outside"))
 """Heading, and which fetches: "succeeded/tried", by where they fetch."""
 
@@ -35,8 +44,9 @@ LEGEND = (
     "unw. cont.: contacts with anything but the handled object; penetr.: deepest penetration; homogr., max: the "
     "robot's own calibration; comm.: commanded gripper to its target; phys.: gripper to the commanded one, both the "
     "largest while grasping and placing; inside, outside hull: relocations that succeeded of those tried, by whether "
-    "the object is fetched within the convex hull of the targets that the movement model was trained with; yellow: not "
-    "within its goal"
+    "the object is fetched within the convex hull of the targets that the movement model was trained with; pointed, "
+    "right: pointings that were tracked, and those whose object was told rightly, with the error of the place, also "
+    "as a share of the distance to the next object; yellow: not within its goal"
 )
 NEEDED_SHARE = 0.9
 TABLE_WIDTH = 140
@@ -55,10 +65,16 @@ def totals_of(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Counts, and for each column its total, median or largest value, under the path of its keys."""
     succeeded = sum(bool(result.get("success")) for result in results)
     found: dict[str, Any] = {"runs": len(results), "succeeded": succeeded, "needed_share": NEEDED_SHARE}
-    for _, keys, way in COLUMNS:
+    for _, keys, way in columns_of(results):
         values = [value for result in results if (value := value_of(result, keys)) is not None]
         found[f"{'.'.join(keys)} ({way})"] = _summed_up(values, way) if values else None
     return found | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
+
+
+def columns_of(results: Sequence[dict[str, Any]]) -> tuple[tuple[str, tuple[str, ...], str], ...]:
+    """The columns that these results fill."""
+    tracked = any("pointings" in result for result in results)
+    return (*COLUMNS, *POINTING_COLUMNS) if tracked else COLUMNS
 
 
 def _hull_total(results: Sequence[dict[str, Any]], where: str) -> dict[str, int]:
@@ -99,13 +115,14 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
     table.add_column("success", footer=f"{totals['succeeded']}/{totals['runs']}")
     for heading, where in HULL_COLUMNS:
         table.add_column(heading, justify="right", footer=_share(totals["training_hull.from"][where]))
-    for heading, keys, way in COLUMNS:
+    columns = columns_of(results)
+    for heading, keys, way in columns:
         foot = totals[f"{'.'.join(keys)} ({way})"]
         footer = f"{shown(foot)}\n{way}" if foot is not None else "–"
         table.add_column(heading, justify="right", footer=footer)
     for result in sorted(results, key=lambda item: int(item["seed"])):
         verdict = "[green]yes[/]" if result.get("success") else "[red]no[/]"
-        cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in COLUMNS]
+        cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in columns]
         hulls = [_share(hull_counts(result, where)) for _, where in HULL_COLUMNS]
         table.add_row(str(result["seed"]), verdict, *hulls, *cells)
     return table

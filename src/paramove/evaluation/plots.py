@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -37,12 +37,14 @@ STYLE: dict[str, Any] = {
 }
 THINNING = 3
 
+Shown = TypeVar("Shown")
 
-def svg_of(draw: Callable[[RunEvaluation, Figure], None], evaluation: RunEvaluation, size: tuple[float, float]) -> str:
-    """A plot as an SVG element; `size` in inches."""
+
+def svg_of(draw: Callable[[Shown, Figure], None], shown: Shown, size: tuple[float, float]) -> str:
+    """A plot of what is shown as an SVG element; `size` in inches."""
     with mpl.rc_context(cast(Any, STYLE)):
         figure = Figure(figsize=size, layout="constrained")
-        draw(evaluation, figure)
+        draw(shown, figure)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     svg = text.getvalue()

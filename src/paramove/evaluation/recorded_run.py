@@ -24,7 +24,13 @@ from paramove.recording.reader import Recorded
 
 FloatArray = NDArray[np.float64]
 
-HEAVY = frozenset({topics.CAMERA_IMAGE.name, topics.WIRE_HOAP3_STREAM.name})
+HEAVY = frozenset(
+    topic.name
+    for topic in (
+        *(topics.CAMERA_IMAGE, *topics.CAMERA_IMAGES, topics.WIRE_HOAP3_STREAM),
+        *(topics.ACTION_OUTLINE, topics.ACTION_SCENE),
+    )
+)
 """Topics of which only the traffic is kept."""
 SAID_AT_THE_END = frozenset({topics.APPLICATION_STAGE.name, topics.SPEECH.name})
 

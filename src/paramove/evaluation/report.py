@@ -11,7 +11,7 @@ from typing import Any
 from paramove.evaluation import plots
 from paramove.evaluation.plots import svg_of
 from paramove.evaluation.run_summary import RunEvaluation
-from paramove.evaluation.verdict_table import rows_of
+from paramove.evaluation.verdict_table import percent, rows_of
 
 STYLE = """
 :root{--ink:#1d2530;--soft:#5b6470;--line:#e3e7ec;--good:#1f7a45;--bad:#b3372b;--warn:#a86a00;--card:#fff}
@@ -78,6 +78,7 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
             svg_of(plots.homography, evaluation, (5.6, 3.7)),
         ),
         "</div><p></p>",
+        _pointings(summary),
         _grasps(summary),
         _plot(
             "The arm",
@@ -144,10 +145,40 @@ def _rules(summary: dict[str, Any]) -> str:
         for rule in summary["rules"]
     ]
     heads = ("object", "in its own words", "believed, cm", "true, cm", "error, mm", "right")
-    return _section(
+    return section(
         "What the robot believes, beside the truth",
         "The robot saw the instructor carry each object into an opening; nobody told it where the openings are.",
         _table(heads, rows, numbers=(2, 3, 4)),
+    )
+
+
+def _pointings(summary: dict[str, Any]) -> str:
+    """With tracking in action space, each place that was pointed at or believed to be."""
+    rows = [
+        (
+            f"{one['time_s']:.1f}",
+            _dot(one["meant"]) if one["meant"] else "<span class=soft>nobody pointed</span>",
+            _place(one["true"]),
+            _place(one["believed"]),
+            _dot(one["nearest"]) if one["nearest"] else "–",
+            _number(one["error_mm"], 1),
+            _number(one["spacing_mm"], 0),
+            percent(one["error_of_spacing"]),
+            percent(one["confidence"]),
+        )
+        for one in summary.get("pointing_list", ())
+    ]
+    if not rows:
+        return ""
+    heads = (
+        *("s", "meant", "true, cm", "believed, cm", "nearest", "error, mm", "next object, mm", "error of that"),
+        "certain",
+    )
+    return section(
+        "Where the person pointed",
+        "Believed: the target of the arm tracked in action space, in the robot's frame. True: the object's middle. "
+        "The error is small enough while it is less than half of the distance to the next object.",
+        _table(heads, rows, numbers=(0, 2, 3, 5, 6, 7, 8)),
     )
 
 
@@ -175,7 +206,7 @@ def _grasps(summary: dict[str, Any]) -> str:
         *("s", "stage", "object", "try", "from, cm", "off, mm", "to, cm", "result", "elbow, °"),
         *("grasp: target, mm", "world, mm", "place: target, mm", "world, mm"),
     )
-    return _section(
+    return section(
         "Every grasp",
         "Off: how far the object truly stood from where the robot believed it. Elbow: turned because of a joint limit. "
         "Target: commanded gripper from its target. World: gripper from the commanded one.",
@@ -202,7 +233,7 @@ def _contacts(evaluation: RunEvaluation) -> str:
         for item in found
     ]
     table = _table(("s", "new", "in contact then"), rows, numbers=(0, 1)) if rows else ""
-    return _section(
+    return section(
         "What the robot touched",
         "It may touch the object that it handles, and nothing else. Deeper than 0.7 mm would be no physical grasp.",
         svg_of(plots.contacts, evaluation, (11, 2.2)) + table,
@@ -224,7 +255,7 @@ def _topics(summary: dict[str, Any]) -> str:
         for topic, rate in sorted(summary["topic_rates"].items(), key=lambda item: (item[1]["node"], item[0]))
     ]
     heads = ("node", "topic", "declared, Hz", "measured, Hz", "messages", "longest gap, s", "lost")
-    return _section(
+    return section(
         "What was said on the bus",
         "Rates in simulated time. Lost: gaps in the sequence numbers of the recording." + _gaps(summary),
         _table(heads, rows, numbers=(2, 3, 4, 5, 6)),
@@ -253,7 +284,8 @@ def _folded(title: str, content: str) -> str:
     return f"<section><details><summary>{escape(title)}</summary>{content}</details></section>"
 
 
-def _section(title: str, why: str, content: str) -> str:
+def section(title: str, why: str, content: str) -> str:
+    """A part of a page; `content` is HTML already."""
     return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p><div class=scroll>{content}</div></section>"
 
 

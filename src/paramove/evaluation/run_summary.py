@@ -15,6 +15,7 @@ import numpy as np
 from paramove.bus import topics
 from paramove.evaluation.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
 from paramove.evaluation.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
+from paramove.evaluation.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
 from paramove.evaluation.recorded_run import RecordedRun
 from paramove.evaluation.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
 from paramove.evaluation.spread import spread
@@ -72,6 +73,11 @@ class RunEvaluation:
         return grid_error(self.run)
 
     @cached_property
+    def pointings(self) -> list[PointedPlace]:
+        """What the person pointed at, with tracking in action space."""
+        return pointed_places(self.run)
+
+    @cached_property
     def seen(self) -> list[SeenAtRest]:
         """Objects seen at rest."""
         return seen_at_rest(self.run)
@@ -116,6 +122,7 @@ class RunEvaluation:
             "unwanted_contacts": int(truth.unwanted_contacts[-1]),
             "contact_list": unwanted_contacts(run),
             "deepest_penetration_mm": float(truth.penetration_mm[-1]),
+            **self._pointing(),
             "homography_error_mm": spread(self.grid.errors_mm if self.grid is not None else ()),
             "seen_at_rest_error_mm": spread(item.error_mm for item in self.seen),
             "gripper_error_commanded_mm": self._gripper_error("commanded_error_mm"),
@@ -138,6 +145,11 @@ class RunEvaluation:
             "versions": _versions(run.facts),
             "wall": self._wall(),
         }
+
+    def _pointing(self) -> dict[str, Any]:
+        if not self.pointings:
+            return {}
+        return pointing_summary(self.pointings, unasked_fetches(self.run, self.relocations))
 
     def _reason(self) -> str:
         run = self.run

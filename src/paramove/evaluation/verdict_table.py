@@ -55,6 +55,7 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
             "3, 3",
             summary["grasps"] == summary["grasps_first_try"] > 0,
         ),
+        *_pointing_rows(summary),
         ("unwanted contacts", str(summary["unwanted_contacts"]), "0", summary["unwanted_contacts"] == 0),
         (
             "deepest penetration",
@@ -84,6 +85,30 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
         *((f"not recorded ({gap['recording']})", seconds_of(gap), "", False) for gap in summary["gaps"]),
         ("times real time", "–" if factor is None else f"{factor:.1f}", "", True),
     ]
+
+
+def _pointing_rows(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
+    """With tracking in action space: what the arm was believed to point at."""
+    if "pointings" not in summary:
+        return []
+    count, right, unasked = summary["pointings"], summary["pointings_right"], len(summary["unasked_fetches"])
+    error, share = summary["pointing_error_mm"], summary["pointing_error_of_spacing"]
+    return [
+        ("pointings, object told rightly", f"{count}, {right}", "all", count == right > 0),
+        ("fetched without being pointed at", str(unasked), "0", unasked == 0),
+        ("error of pointing, median (max)", f"{mm(error['median'])} ({mm(error['max'])})", "", True),
+        (
+            "of the spacing of the objects",
+            f"{percent(share['median'])} ({percent(share['max'])})",
+            "< 50 %",
+            below(share["max"], 0.5) or not share["samples"],
+        ),
+    ]
+
+
+def percent(value: float | None) -> str:
+    """A share; a dash where there is none."""
+    return "–" if value is None else f"{100 * value:.0f} %"
 
 
 def all_right(summary: dict[str, Any]) -> bool:

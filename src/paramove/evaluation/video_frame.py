@@ -51,8 +51,8 @@ class VideoFrame:
         draw_mind(seen, moment)
         body[:, : PANEL[0]] = seen
         body[:, PANEL[0] :] = cv2.resize(view, PANEL)
-        _put(body, _label("camera: what the robot sees", 12, TEXT), 8, PANEL[1] - 22, shade=True)
-        _put(body, _label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, shade=True)
+        paste(body, label("camera: what the robot sees", 12, TEXT), 8, PANEL[1] - 22, shade=True)
+        paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, shade=True)
         self._top(frame[:TOP_PX], moment, time_s)
         _captions(frame[TOP_PX + PANEL[1] :], moment)
         done = round(SIZE[0] * min(1.0, time_s / end_s)) if end_s > 0 else 0
@@ -60,7 +60,7 @@ class VideoFrame:
         return frame
 
     def _top(self, bar: Picture, moment: Moment, time_s: float) -> None:
-        _put(bar, _label(self._title, 15, TEXT, bold=True), 12, 9)
+        paste(bar, label(self._title, 15, TEXT, bold=True), 12, 9)
         reached = (
             len(STAGES) if moment.stage == "done" else STAGES.index(moment.stage) if moment.stage in STAGES else -1
         )
@@ -69,11 +69,11 @@ class VideoFrame:
             now = place == reached
             colour = ACCENT if now else TEXT if place < reached else FAINT
             text = f"{'✓' if place < reached else place + 1} {stage}"
-            sprite = _label(text, 15, colour, bold=now)
-            _put(bar, sprite, x, 9)
+            sprite = label(text, 15, colour, bold=now)
+            paste(bar, sprite, x, 9)
             x += sprite.shape[1] + 26
-        clock = _label(f"{time_s:6.1f} s   {self._factor:g}× speed", 14, FAINT)
-        _put(bar, clock, SIZE[0] - clock.shape[1] - 12, 10)
+        clock = label(f"{time_s:6.1f} s   {self._factor:g}× speed", 14, FAINT)
+        paste(bar, clock, SIZE[0] - clock.shape[1] - 12, 10)
 
 
 class SteadyImage:
@@ -131,25 +131,25 @@ def _draw_object(image: Picture, item: Any, moment: Moment) -> None:
     gesture = moment.gesture
     fresh = gesture is not None and gesture.object == item.name
     text = moment.seeing if fresh else item.name
-    sprite = _label(text, 12, colour, bold=fresh)
-    _put(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
+    sprite = label(text, 12, colour, bold=fresh)
+    paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
 
 
 def _captions(panel: Picture, moment: Moment) -> None:
     if moment.sentence:
-        _put(panel, _label(f"“{_shortened(moment.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
-    _put(panel, _label("believes", 13, FAINT), 14, 46)
+        paste(panel, label(f"“{_shortened(moment.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
+    paste(panel, label("believes", 13, FAINT), 14, 46)
     x = 84
     for name, (u, v) in moment.rules.items():
-        sprite = _label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 14, COLOURS.get(name, TEXT))
-        _put(panel, sprite, x, 45)
+        sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 14, COLOURS.get(name, TEXT))
+        paste(panel, sprite, x, 45)
         x += sprite.shape[1] + 26
     if not moment.rules:
-        _put(panel, _label("nothing yet", 14, FAINT), x, 45)
-    _put(panel, _label("does", 13, FAINT), 14, 74)
-    _put(panel, _label(moment.doing or "waits", 14, ACCENT if moment.doing else FAINT), 84, 73)
-    _put(panel, _label("notices", 13, FAINT), 494, 74)
-    _put(panel, _label(moment.seeing or "–", 14, TEXT if moment.seeing else FAINT), 560, 73)
+        paste(panel, label("nothing yet", 14, FAINT), x, 45)
+    paste(panel, label("does", 13, FAINT), 14, 74)
+    paste(panel, label(moment.doing or "waits", 14, ACCENT if moment.doing else FAINT), 84, 73)
+    paste(panel, label("notices", 13, FAINT), 494, 74)
+    paste(panel, label(moment.seeing or "–", 14, TEXT if moment.seeing else FAINT), 560, 73)
 
 
 def _shortened(text: str, length: int) -> str:
@@ -168,7 +168,7 @@ def _font(size: int, bold: bool) -> ImageFont.FreeTypeFont:
 
 
 @lru_cache(maxsize=1024)
-def _label(text: str, size: int, colour: Colour, bold: bool = False) -> Picture:
+def label(text: str, size: int, colour: Colour, bold: bool = False) -> Picture:
     """A text as RGBA [h, w, 4]."""
     font = _font(size, bold)
     left, _, right, _ = font.getbbox(text)
@@ -178,7 +178,7 @@ def _label(text: str, size: int, colour: Colour, bold: bool = False) -> Picture:
     return np.asarray(image)
 
 
-def _put(image: Picture, sprite: Picture, x: int, y: int, shade: bool = False) -> None:
+def paste(image: Picture, sprite: Picture, x: int, y: int, shade: bool = False) -> None:
     """Blend a sprite in at (x, y), in place, cut at the borders; with `shade` onto a darkened ground."""
     left, top = max(0, x), max(0, y)
     part = image[top : max(0, y + sprite.shape[0]), left : max(0, x + sprite.shape[1])]

@@ -134,6 +134,19 @@ class ArmPoseSolver:
         """By how much each joint of angles [K, 5] lies outside the limits that `solve` keeps, rad; 0 inside."""
         return np.asarray(np.clip(np.maximum(self._lower - angles, angles - self._upper), 0.0, None))
 
+    def pressed_inside(self, angles: FloatArray) -> FloatArray:
+        """A curve [K, 5] through solved poses with what overshoots their limits pressed into the margin beyond them.
+
+        A curve overshoots where the elbow begins to turn at a limit. Joints that stay within half of the margin are
+        left as they are; of the others the last two margins before the limit of the safety gate are compressed.
+        """
+        over = (self.outside_limits(angles) > 0.5 * _MARGIN).any(axis=0)
+        room = 1.8 * _MARGIN
+        low, high = self._lower + _MARGIN, self._upper - _MARGIN
+        pressed = np.where(angles > high, high + room * np.tanh((angles - high) / room), angles)
+        pressed = np.where(pressed < low, low + room * np.tanh((pressed - low) / room), pressed)
+        return np.asarray(np.where(over, pressed, angles))
+
     def _smoothed(self, poses: _Poses, solution: JointSolution, smoothing: int) -> JointSolution:
         """The turn begun a little earlier and ended later, so that the elbow does not jerk; limits still hold."""
         turn = solution.elbow_turn

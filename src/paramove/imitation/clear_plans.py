@@ -91,6 +91,12 @@ class ClearPlans:
         ]
         return self._first(ways, standing, choices)
 
+    def hold(self, start: FloatArray, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Carry a held object to `place` and stay there: straight, else over the start or over the place."""
+        corners = [np.array([*side[:2], max(start[2], place[2])]) for side in (start, place)]
+        ways = [[], *([self.planner.far_enough(corner)] for corner in corners)]
+        return self._first([partial(self.planner.hold, start, place, via) for via in ways], standing)
+
     def leave(self, here: FloatArray, opening: float, standing: FloatArray) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
         return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)

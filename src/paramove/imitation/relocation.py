@@ -96,17 +96,15 @@ class RelocationPlanner:
         path = self._new_path()
         here = np.asarray(start, dtype=np.float64)
         above = t + o.lift * _UP
-        self._stay(path, "carry", here, o.closed_opening, holding=True)
-        self._move(
-            path,
-            "carry",
-            [*(np.asarray(v, dtype=np.float64) for v in via), above],
-            o.speed,
-            o.closed_opening,
-            holding=True,
-        )
+        self._carry(path, here, [*via, above])
         self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
         self._leave(path, t, o.closed_opening, upward, o.work_opening if opened is None else opened)
+        return self._finish(path)
+
+    def hold(self, start: ArrayLike, place: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `place` and stay there."""
+        path = self._new_path()
+        self._carry(path, np.asarray(start, dtype=np.float64), [*via, place])
         return self._finish(path)
 
     def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
@@ -218,6 +216,11 @@ class RelocationPlanner:
             path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
             here = point
 
+    def _carry(self, path: Path, here: FloatArray, points: Sequence[ArrayLike]) -> None:
+        o, along = self.options, [np.asarray(point, dtype=np.float64) for point in points]
+        self._stay(path, "carry", here, o.closed_opening, holding=True)
+        self._move(path, "carry", along, o.speed, o.closed_opening, holding=True)
+
     def _stay(self, path: Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
         path.add(name, self._reached(here[None]), opening, holding=holding)
 
@@ -285,13 +288,13 @@ class RelocationPlanner:
         stretched = slowed_times(angles, path.period, share * self.velocity, share * self.acceleration)
         holding = np.concatenate(path.holding).astype(np.float64)
         columns = np.concatenate([angles, poses.gripper], axis=1)
-        times, values = resampled(stretched, columns, path.period)
+        times, values = self._sampled(stretched, columns, path.period)
         for _ in range(_SLOWING_ROUNDS):
             excess = largest_excess(values[:, :6], path.period, self.velocity, self.acceleration) / _FINAL_SHARE
             if excess <= 1.0:
                 break
             stretched = 1.01 * excess * stretched
-            times, values = resampled(stretched, columns, path.period)
+            times, values = self._sampled(stretched, columns, path.period)
         planned = path.period * np.arange(len(poses))
         phases = [(name, float(np.interp(start, planned, stretched))) for name, start in path.phases]
         return PlannedMotion(
@@ -302,6 +305,12 @@ class RelocationPlanner:
             phases=tuple(phases),
             elbow_turn=float(np.abs(solution.elbow_turn).max()),
         )
+
+    def _sampled(self, times: FloatArray, columns: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+        """Joint angles and gripper positions at even times, the arm's joints within their limits."""
+        even, values = resampled(times, columns, period)
+        values[:, :5] = self.solver.pressed_inside(values[:, :5])
+        return even, values
 
 
 def _crossfaded(first: FloatArray, second: FloatArray, n: int) -> FloatArray:

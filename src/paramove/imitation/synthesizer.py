@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +92,8 @@ class Synthesizer:
         self._trajectories: list[JointTrajectory] = []
         self._now_ns = 0
         self._courses: dict[int, Callable[[RelocationGoal], _Course]] = {
-            RelocationGoal.KIND_RELOCATE: self._relocate,
+            RelocationGoal.KIND_RELOCATE: partial(self._fetch, then=self._plans.deliver),
+            RelocationGoal.KIND_FETCH: partial(self._fetch, then=self._plans.hold),
             RelocationGoal.KIND_OFFER_HAND: self._offer_hand,
             RelocationGoal.KIND_TAKE: self._take,
             RelocationGoal.KIND_RELEASE: self._release,
@@ -183,18 +185,20 @@ class Synthesizer:
 
     # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
 
-    def _relocate(self, goal: RelocationGoal) -> _Course:
+    def _fetch(
+        self, goal: RelocationGoal, then: Callable[[FloatArray, FloatArray, FloatArray], PlannedMotion]
+    ) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         if not self._hand.at_base:
             raise GoalRefusedError(NOT_AT_BASE)
         fetch = self._plans.fetch(source, standing)
         lifted = fetch.gripper[-1]
-        deliver = self._plans.deliver(lifted, target, standing)  # known to be possible before the arm moves
+        onwards = then(lifted, target, standing)  # known to be possible before the arm moves
         yield fetch
         if not self.holding:
             yield self._plans.leave(lifted, self._hand.opening, standing)
             return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm")
-        yield deliver
+        yield onwards
         return self._placed(target)
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:

@@ -18,6 +18,7 @@ class RelocationGoal(_message.Message):
         KIND_PLACE_HELD: _ClassVar[RelocationGoal.Kind]
         KIND_REST: _ClassVar[RelocationGoal.Kind]
         KIND_RELEASE: _ClassVar[RelocationGoal.Kind]
+        KIND_FETCH: _ClassVar[RelocationGoal.Kind]
     KIND_UNSPECIFIED: RelocationGoal.Kind
     KIND_RELOCATE: RelocationGoal.Kind
     KIND_OFFER_HAND: RelocationGoal.Kind
@@ -25,6 +26,7 @@ class RelocationGoal(_message.Message):
     KIND_PLACE_HELD: RelocationGoal.Kind
     KIND_REST: RelocationGoal.Kind
     KIND_RELEASE: RelocationGoal.Kind
+    KIND_FETCH: RelocationGoal.Kind
     ID_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     OBJECT_FIELD_NUMBER: _ClassVar[int]

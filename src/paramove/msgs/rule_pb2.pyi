@@ -75,6 +75,7 @@ class Speech(_message.Message):
         REQUEST_POINT_AT_OBJECT: _ClassVar[Speech.Request]
         REQUEST_HELP: _ClassVar[Speech.Request]
         REQUEST_THANK_YOU: _ClassVar[Speech.Request]
+        REQUEST_POINT_AT_PLACE: _ClassVar[Speech.Request]
     REQUEST_UNSPECIFIED: Speech.Request
     REQUEST_HAND_ME_AN_OBJECT: Speech.Request
     REQUEST_LET_GO: Speech.Request
@@ -83,6 +84,7 @@ class Speech(_message.Message):
     REQUEST_POINT_AT_OBJECT: Speech.Request
     REQUEST_HELP: Speech.Request
     REQUEST_THANK_YOU: Speech.Request
+    REQUEST_POINT_AT_PLACE: Speech.Request
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     REQUEST_FIELD_NUMBER: _ClassVar[int]
     OBJECT_FIELD_NUMBER: _ClassVar[int]

@@ -6,7 +6,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class TruthLayout(_message.Message):
-    __slots__ = ("seed", "openings", "rules", "world_from_shoulder", "camera_from_world", "camera_intrinsics", "surface_z", "light_levels", "pixel_noise")
+    __slots__ = ("seed", "openings", "rules", "world_from_shoulder", "camera_from_world", "camera_intrinsics", "surface_z", "light_levels", "pixel_noise", "world_from_table")
     SEED_FIELD_NUMBER: _ClassVar[int]
     OPENINGS_FIELD_NUMBER: _ClassVar[int]
     RULES_FIELD_NUMBER: _ClassVar[int]
@@ -16,6 +16,7 @@ class TruthLayout(_message.Message):
     SURFACE_Z_FIELD_NUMBER: _ClassVar[int]
     LIGHT_LEVELS_FIELD_NUMBER: _ClassVar[int]
     PIXEL_NOISE_FIELD_NUMBER: _ClassVar[int]
+    WORLD_FROM_TABLE_FIELD_NUMBER: _ClassVar[int]
     seed: int
     openings: _containers.RepeatedCompositeFieldContainer[TruthOpening]
     rules: _containers.RepeatedCompositeFieldContainer[TruthRule]
@@ -25,7 +26,8 @@ class TruthLayout(_message.Message):
     surface_z: float
     light_levels: _containers.RepeatedScalarFieldContainer[float]
     pixel_noise: float
-    def __init__(self, seed: _Optional[int] = ..., openings: _Optional[_Iterable[_Union[TruthOpening, _Mapping]]] = ..., rules: _Optional[_Iterable[_Union[TruthRule, _Mapping]]] = ..., world_from_shoulder: _Optional[_Iterable[float]] = ..., camera_from_world: _Optional[_Iterable[float]] = ..., camera_intrinsics: _Optional[_Iterable[float]] = ..., surface_z: _Optional[float] = ..., light_levels: _Optional[_Iterable[float]] = ..., pixel_noise: _Optional[float] = ...) -> None: ...
+    world_from_table: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, seed: _Optional[int] = ..., openings: _Optional[_Iterable[_Union[TruthOpening, _Mapping]]] = ..., rules: _Optional[_Iterable[_Union[TruthRule, _Mapping]]] = ..., world_from_shoulder: _Optional[_Iterable[float]] = ..., camera_from_world: _Optional[_Iterable[float]] = ..., camera_intrinsics: _Optional[_Iterable[float]] = ..., surface_z: _Optional[float] = ..., light_levels: _Optional[_Iterable[float]] = ..., pixel_noise: _Optional[float] = ..., world_from_table: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class TruthOpening(_message.Message):
     __slots__ = ("name", "x", "y", "radius")
@@ -88,3 +90,19 @@ class TruthBody(_message.Message):
     held_by_instructor: bool
     last_touched_by: str
     def __init__(self, name: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., z: _Optional[float] = ..., quaternion_xyzw: _Optional[_Iterable[float]] = ..., held_by_instructor: bool = ..., last_touched_by: _Optional[str] = ...) -> None: ...
+
+class TruthArm(_message.Message):
+    __slots__ = ("time_ns", "points", "action", "target", "performance", "at_target")
+    TIME_NS_FIELD_NUMBER: _ClassVar[int]
+    POINTS_FIELD_NUMBER: _ClassVar[int]
+    ACTION_FIELD_NUMBER: _ClassVar[int]
+    TARGET_FIELD_NUMBER: _ClassVar[int]
+    PERFORMANCE_FIELD_NUMBER: _ClassVar[int]
+    AT_TARGET_FIELD_NUMBER: _ClassVar[int]
+    time_ns: int
+    points: _containers.RepeatedCompositeFieldContainer[TruthBody]
+    action: str
+    target: TruthBody
+    performance: int
+    at_target: bool
+    def __init__(self, time_ns: _Optional[int] = ..., points: _Optional[_Iterable[_Union[TruthBody, _Mapping]]] = ..., action: _Optional[str] = ..., target: _Optional[_Union[TruthBody, _Mapping]] = ..., performance: _Optional[int] = ..., at_target: bool = ...) -> None: ...

@@ -5,10 +5,13 @@ from __future__ import annotations
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from paramove.rules.pointed_object import object_at
 from paramove.rules.stage import Mind, Place, Stage, cm
 
 HAND_AWAY_S = 0.3
 HAND_PATIENCE_S = 6.0
+SETTLED_S = 1.0
+"""A person points at what has stood for so long: before, the hand has just put it there."""
 
 
 class Applying(Stage):
@@ -32,8 +35,13 @@ class Applying(Stage):
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Remember who is pointed at while waiting for that."""
-        if gesture.kind == Gesture.KIND_POINTED_AT and self.state == "waiting":
-            self._pointed_at(gesture.object)
+        if gesture.kind != Gesture.KIND_POINTED_AT or self.state != "waiting":
+            return
+        if self.mind.options.pointing == "nearness":
+            if gesture.object or not gesture.located:
+                self._pointed_at(gesture.object)
+        elif not gesture.object and gesture.captured.ToNanoseconds() * 1e-9 > self.mind.now_s - self.for_s:
+            self._pointed_at_place(gesture)
 
     def step(self) -> ApplicationStage.Stage | None:
         """One tick."""
@@ -63,6 +71,22 @@ class Applying(Stage):
         self._object, self._source, self._attempt = name, place, 0
         self.mind.tell(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.mind.rules[name])}.")
         self.go("letting_hand_leave")
+
+    def _pointed_at_place(self, gesture: Gesture) -> None:
+        """The object at rest there. Beside the table, and while it is being arranged, nobody points at anything."""
+        mind = self.mind
+        if not gesture.located or gesture.frame != mind.options.frame:
+            mind.tell(
+                f"You point at a place in the frame {gesture.frame!r}; I only know places in {mind.options.frame!r}."
+            )
+            return
+        settled = mind.table.standing(settled_s=gesture.captured.ToNanoseconds() * 1e-9 - SETTLED_S)
+        found = object_at((gesture.x, gesture.y), settled)
+        if found.name:
+            self._pointed_at(found.name)
+        elif mind.options.surface.contains((gesture.x, gesture.y)) and set(mind.rules) - mind.done <= set(settled):
+            mind.tell(f"{found.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
+            self.go("waiting")
 
     def _letting_hand_leave(self) -> None:
         away = self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S

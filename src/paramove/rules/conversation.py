@@ -1,4 +1,4 @@
-"""What the rule learner says: goals to the arm, requests to the instructor, and its beliefs."""
+"""What an application says: goals to the arm, requests to the person, and its beliefs."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Errand:
         goal.avoid.extend(self._goals.position(place) for place in avoid)
         self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
         self._heard_s = now_s
-        if kind == RelocationGoal.KIND_RELOCATE:
+        if kind in (RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_FETCH):
             self.grasps += 1
             self.retries += attempt > 1
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from typing import Literal
 
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -14,6 +15,7 @@ from paramove.rules.table import Surface, Table
 _log = logging.getLogger(__name__)
 
 Place = tuple[float, float]
+Pointing = Literal["nearness", "action_space"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,8 @@ class RuleLearnerOptions:
         offer: Where the open hand waits for an object: x, y, and height of the gripper.
         grasp_z: Height at which standing objects are grasped.
         surface: The working surface.
+        pointing: What tells who is pointed at: the "nearness" of the hand to an object, or the place that a tracked arm
+            points at, by tracking in "action_space".
         attempts: How often an object is tried before the instructor is asked.
         settle_s: The view of an object is trusted so long after the arm has left.
         patience_s: A request to the instructor is repeated after so long without an answer.
@@ -38,6 +42,7 @@ class RuleLearnerOptions:
     grasp_z: float
     surface: Surface
     frame: str = "right_shoulder"
+    pointing: Pointing = "nearness"
     attempts: int = 3
     settle_s: float = 2.6
     patience_s: float = 25.0

@@ -69,10 +69,10 @@ class Table:
         """How long the hand has been out of view, s; 0 while it is in view."""
         return 0.0 if self.hand_in_view else now_s - self.hand_changed_s
 
-    def standing(self, but: str = "") -> dict[str, tuple[float, float]]:
-        """Places of the objects seen at rest, m, without `but`."""
+    def standing(self, but: str = "", settled_s: float = float("inf")) -> dict[str, tuple[float, float]]:
+        """Places of the objects seen at rest, m, without `but`, and without those that came to rest after a time, s."""
         return {
             name: sighting.place
             for name, sighting in self.objects.items()
-            if sighting.at_rest and sighting.place is not None and name != but
+            if sighting.at_rest and sighting.place is not None and name != but and sighting.time_s <= settled_s
         }

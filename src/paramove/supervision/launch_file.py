@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
-from paramove.supervision.names import closest, nearest
+from paramove.supervision.names import closest, nearest, overlay_folder
 from paramove.supervision.positions import (
     MAX_CHARACTERS,
     Document,
@@ -58,7 +58,8 @@ def load(
     """Reads `<folder>/<name>.yaml` with its overlays and settings and checks the result.
 
     Args:
-        folder: Holds the launch files; overlays lie in its sub-folder `overlays`.
+        folder: Holds the launch files; overlays lie in its sub-folder `overlays`, those for this launch file alone in
+            a folder of its name there.
         name: Of the launch file without `.yaml`, or a path that ends in `.yaml`.
         overlays: Names or paths likewise; None takes the file's `default_overlays`, which are names.
         settings: Each `node.parameter=value`; the value is YAML.
@@ -67,7 +68,8 @@ def load(
 
     Raises LaunchFileMissingError, or LaunchFileError with all that is wrong.
     """
-    document, chosen = _with_overlays(folder, _read(path_of(folder, name, "launch file")), overlays)
+    path = path_of(folder, name, "launch file")
+    document, chosen = _with_overlays(folder, path.stem, _read(path), overlays)
     document, findings = with_values(document, settings, seed, headless)
     try:
         file = validated(document)
@@ -78,7 +80,9 @@ def load(
     return Launch(Path(name).stem, tuple(chosen), file, document, seed)
 
 
-def _with_overlays(folder: Path, document: Document, overlays: Sequence[str] | None) -> tuple[Document, list[str]]:
+def _with_overlays(
+    folder: Path, name: str, document: Document, overlays: Sequence[str] | None
+) -> tuple[Document, list[str]]:
     """The document with its overlays, and their names; raises LaunchFileError with what is wrong in any of them."""
     paths, findings = [], []
     if overlays is None:
@@ -86,7 +90,7 @@ def _with_overlays(folder: Path, document: Document, overlays: Sequence[str] | N
         if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
             raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
         for index, overlay in enumerate(chosen):
-            path = folder / "overlays" / f"{overlay}.yaml"
+            path = overlay_folder(folder, name, overlay) / f"{overlay}.yaml"
             if not _PLAIN_NAME.fullmatch(overlay):
                 message = f"{overlay!r}: expected the plain name of an overlay in {folder / 'overlays'}, no path"
                 findings.append(document.error(("default_overlays", str(index)), message))
@@ -97,7 +101,7 @@ def _with_overlays(folder: Path, document: Document, overlays: Sequence[str] | N
                 paths.append(path)
     else:
         chosen = list(overlays)
-        paths = [path_of(folder / "overlays", overlay, "overlay") for overlay in chosen]
+        paths = [path_of(overlay_folder(folder, name, overlay), overlay, "overlay") for overlay in chosen]
     for path in paths:
         try:
             top = _read(path)

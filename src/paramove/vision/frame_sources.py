@@ -1,4 +1,4 @@
-"""Where frames come from: a topic, a video file, or a V4L2 device. One protocol, so a camera node has one code path."""
+"""Where frames come from: a topic, a file, or a V4L2 device. One protocol, so a camera node has one code path."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.input_error import InputError
 from paramove.vision.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
+from paramove.vision.replayed_frames import FolderFrames, RecordingFrames
 
 _log = logging.getLogger(__name__)
 
-SOURCES = "topic:camera/light, file:PATH or device:PATH"
+SOURCES = "topic:camera/light, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
 PATIENCE_NS = 1_000_000_000
 """A source that is silent for longer has a fault."""
 
@@ -231,7 +232,7 @@ class _Reader:
 
 
 def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
-    """The source that the text names. Raises SourceError if there is none like it or it cannot be opened."""
+    """The source that the text names. Raises InputError if there is none like it or it cannot be opened."""
     kind, _, rest = source.partition(":")
     if kind == "topic" and rest == "camera/light":
         return TopicFrames()
@@ -239,6 +240,16 @@ def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
         return FileFrames(Path(rest))
     if kind == "device" and rest:
         return DeviceFrames(rest, width_px, height_px)
+    if kind == "folder" and rest:
+        path, _, rate = rest.rpartition("@")
+        try:
+            rate_hz = float(rate)
+        except ValueError as error:
+            raise SourceError(f"camera source {source!r}: folder:PATH@RATE expected, as folder:pictures@10") from error
+        return FolderFrames(Path(path), rate_hz)
+    if kind == "recording" and "#" in rest:
+        path, _, topic = rest.rpartition("#")
+        return RecordingFrames(Path(path), topic)
     raise SourceError(f"camera source {source!r}: {SOURCES} expected")
 
 

@@ -19,6 +19,7 @@ BLIND_S = 0.35
 """Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
 LONGEST_STEP_S = 0.2
 """More time than this between two images is no time of watching."""
+MOST_PX = 1e6
 CLOCK_BACK_S = 5.0
 """An image older than this is no late one: the clock, or an image's time, was wrong."""
 
@@ -71,6 +72,9 @@ class Recognizer:
         self._watched_s += min(step_s, LONGEST_STEP_S)
         now_s = self._watched_s
         homography = self._homography(calibration)
+        if not all(_in_some_image(one) for one in tracked.objects):
+            usable = [one for one in tracked.objects if _in_some_image(one)]
+            tracked = TrackedObjects(captured=tracked.captured, objects=usable)
         hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
         said: list[Gesture] = []
         for name, happening in self._follow_objects(tracked, hand, now_s):
@@ -164,6 +168,14 @@ class _HandPresence:
         self._present, self._change_s = not self._present, None
         kind = Gesture.KIND_HAND_APPEARED if self._present else Gesture.KIND_HAND_VANISHED
         return [Happening(kind, *self._place, confidence=1.0)]
+
+
+def _in_some_image(seen: TrackedObject) -> bool:
+    """Whether its numbers can be pixels: what is not, nobody has seen."""
+    box = (seen.left_px, seen.top_px, seen.width_px, seen.height_px)
+    outline = (number for point in seen.outline for number in (point.u_px, point.v_px))
+    numbers = (seen.u_px, seen.v_px, seen.area_px, *box, *outline)
+    return all(abs(number) < MOST_PX for number in numbers)  # NaN is not below
 
 
 def _touch(hand: TrackedObject, place: Sample) -> bool:

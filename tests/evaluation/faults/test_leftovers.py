@@ -29,9 +29,12 @@ def test_nothing_is_left_of_nothing(runtime: Path) -> None:
 
 
 def test_a_living_process_of_the_domain_is_found(runtime: Path) -> None:
-    waits = [sys.executable, "-c", "import sys; sys.stdin.read()"]
-    process = subprocess.Popen(waits, stdin=subprocess.PIPE, env=os.environ | {"PARAMOVE_DOMAIN": DOMAIN})
+    waits = [sys.executable, "-c", "import sys; print('here', flush=True); sys.stdin.read()"]
+    domain = os.environ | {"PARAMOVE_DOMAIN": DOMAIN}
+    process = subprocess.Popen(waits, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=domain)
     try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"here\n"  # a program that has only just begun has no environment yet
         (found,) = left_over(DOMAIN, runtime)
         assert f"process {process.pid}" in found
     finally:

@@ -11,7 +11,7 @@ export class CameraView {
     this.tall = 36; // px of the image
     this.arrived = 0; // counts images drawn
     this.arrivedAt = -Infinity;
-    this.state = { tracked: {}, plane: {}, objects: {}, pointed: "" };
+    this.state = { tracked: {}, plane: {}, objects: {}, pointed: "", arm: {} };
   }
 
   async image(bytes) {
@@ -46,6 +46,22 @@ export class CameraView {
     this.unit = ratio / scale; // one CSS pixel, in pixels of the image
     this.grid();
     for (const item of this.state.tracked.items ?? []) item.hand ? this.hand(item) : this.object(item);
+    this.arm();
+  }
+
+  arm() { // of a tracked person, and the ball where it points
+    const { lines = [], balls = [] } = this.state.arm, c = this.context, u = this.unit;
+    for (const { points, colour } of lines) {
+      c.beginPath();
+      points.forEach((point, index) => (index ? c.lineTo(...point) : c.moveTo(...point)));
+      c.closePath();
+      c.strokeStyle = colour; c.lineWidth = 2 * u; c.stroke();
+    }
+    for (const { place, diameter, colour } of balls) {
+      c.beginPath(); c.arc(...place, diameter / 2, 0, 7);
+      c.fillStyle = colour; c.fill();
+      c.strokeStyle = "#000"; c.lineWidth = u; c.stroke();
+    }
   }
 
   grid() {

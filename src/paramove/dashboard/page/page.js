@@ -112,8 +112,8 @@ function showRules(objects) {
 }
 
 function draw() {
-  const { tracked = {}, plane = {}, objects = {}, pointed = "", robot = {}, goal = {} } = state;
-  camera.update({ tracked, plane, objects, pointed });
+  const { tracked = {}, plane = {}, objects = {}, pointed = "", robot = {}, goal = {}, arm = {} } = state;
+  camera.update({ tracked, plane, objects, pointed, arm });
   world.update({ world: state.world ?? null, robot, objects, goal, plane });
   world.draw();
   camera.draw();

@@ -26,7 +26,7 @@ from paramove.evaluation.chapter4.tables import (
     variation_table,
 )
 from paramove.evaluation.chapter4.targets import Target, targets_of
-from paramove.evaluation.report import STYLE
+from paramove.evaluation.report import STYLE, section
 
 NOT_SHOWN = (
     "Figures 4.1, 4.7, 4.8, 4.10, 4.16 and 4.17 are photographs of a person and pictures of the motion capture; 4.9 "
@@ -63,11 +63,11 @@ def write_results(results: Results, folder: Path) -> tuple[dict[str, Any], list[
         f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
         f"<header{bad}><div><h1>Parametric HMMs of arm movements: {met} of {len(targets)} goals met</h1>",
         f"<p>Chapter 4 of the thesis, repeated with {_seeds(results)}.</p></div></header><main>",
-        _section("Goals", "The worst model and number of states counts.", targets_table(targets)),
-        _section("Beside the thesis", DATA, findings_table(found)),
+        section("Goals", "The worst model and number of states counts.", targets_table(targets)),
+        section("Beside the thesis", DATA, findings_table(found)),
         *_pictures(results, summary),
         *_questions(results, summary, likeliest),
-        _section("Natural variation", "Pointing, cm.", variation_table(summary["variation"])),
+        section("Natural variation", "Pointing, cm.", variation_table(summary["variation"])),
         f"<section class=why>{escape(NOT_SHOWN)}</section></main></html>",
     ]
     (folder / "report.html").write_text("\n".join(parts), encoding="utf-8")
@@ -90,20 +90,20 @@ def _pictures(results: Results, summary: dict[str, Any]) -> list[str]:
     most = max(float(np.nanmax(values)) for values in synthesis.values())
     rows = -(-len(synthesis) // 4)
     return [
-        _section(
+        section(
             "A linear PHMM of the line movement (figures 4.2 to 4.6)",
             "Out along a line of slope p and back, ten sequences, 10 iterations. Grey: the true movements for "
             "p = 0.25, 0 and −0.25. 4.6: sequences with the same progression rate.",
             drawing.drawn(partial(drawing.line_states, states=line["states"]), (8.0, 3.2))
             + drawing.drawn(partial(drawing.line_curves, curves=line["curves"], titles=titles), (11.0, 2.6)),
         ),
-        _section("All models", RESIDUALS, models_table(summary)),
-        _section(
+        section("All models", RESIDUALS, models_table(summary)),
+        section(
             "Synthesis error over the region (figure 4.14 a–d)",
             "Pointing, (4.3), cm, mean of all seeds; paths smooth. Below: near the person.",
             drawing.drawn(partial(drawing.surfaces, shown=synthesis, columns=4, most=most), (11.0, 1.9 * rows + 0.4)),
         ),
-        _section(
+        section(
             "Error of the recognised place (figure 4.14 e–h)",
             "Pointing, cm, mean of four tests and all seeds.",
             drawing.drawn(partial(drawing.surfaces, shown=theta, columns=4, most=most), (11.0, 1.9 * rows + 0.4)),
@@ -113,36 +113,36 @@ def _pictures(results: Results, summary: dict[str, Any]) -> list[str]:
 
 def _questions(results: Results, summary: dict[str, Any], likeliest: dict[str, Any]) -> list[str]:
     return [
-        _section(
+        section(
             "Expected frames per state (figures 4.12, 4.13)",
             "IPHMM 3×3 of reaching: they do not change much.",
             drawing.drawn(partial(drawing.durations, found=_durations(results)), (11.0, 2.8)),
         ),
-        _section(
+        section(
             "The likelihood of a place (figure 4.15)",
             f"A movement to the cross, {likeliest['states']} states; the ring is the maximum.",
             drawing.drawn(
                 partial(drawing.likelihoods, values=likeliest["values"], found=likeliest["estimates"]), (10.0, 3.0)
             ),
         ),
-        _section(
+        section(
             "Noise (4.2.5)",
             "Error of θ of pointing when independent noise is added to every coordinate of every frame.",
             drawing.drawn(partial(drawing.noise, found=summary["noise"]), (9.0, 3.4)),
         ),
-        _section(
+        section(
             "What is none of the movements, and how sure a model is",
             "AUROC: probability that a genuine movement seems more typical than another one. Aborted: half of the "
             "fingertip's way out, back along the same way, then at rest. Stopped: held there. Redirect: to two places.",
             rejection_table(summary),
         ),
-        _section(
+        section(
             "How many demonstrations",
             "Pointing; names mean the raster of the axis.",
             drawing.drawn(partial(drawing.learning, rows=summary["learning"]), (11.0, 5.6))
             + f"<details><summary>numbers</summary>{learning_table(summary['learning'])}</details>",
         ),
-        _section(
+        section(
             "The redirect action (4.3)",
             "Tests: pairs of places over the whole region. Jerk: of the synthesised movements, as a multiple of "
             "that of the training movements.",
@@ -171,7 +171,3 @@ def _states(found: Results) -> list[int]:
 def _seeds(results: Results) -> str:
     seeds = sorted({one["seed"] for one in of_group(results, MODELS, name=QPHMM_3)})
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
-
-
-def _section(title: str, why: str, content: str) -> str:
-    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p><div class=scroll>{content}</div></section>"

@@ -23,7 +23,7 @@ from paramove.evaluation.movements.method import (
 )
 from paramove.evaluation.movements.sweep import Row
 from paramove.hmm import TrainingOptions
-from paramove.phmm import LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
+from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
 
 Floats = NDArray[np.float64]
 FLOOR_M = 1e-4
@@ -75,6 +75,7 @@ def our_rows() -> list[Row]:
     kinds: dict[str, Callable[[], ParametricHMM]] = {
         "paramove, quadratic PHMM": partial(QuadraticPHMM, **common),
         "paramove, linear PHMM": partial(LinearPHMM, **common),
+        "paramove, cubic PHMM": partial(CubicPHMM, **common),
         "paramove, quadratic PHMM as in the thesis": partial(QuadraticPHMM, residuals="independent", **common),
     }
     return [Row(name, _maker(make), repr(make), SOURCES, ours=True) for name, make in kinds.items()]

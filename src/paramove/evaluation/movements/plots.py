@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -14,6 +15,8 @@ from paramove.evaluation.movements.trial import SHARES
 from paramove.evaluation.plots import STYLE
 
 OURS, THEIRS = "#2f6fc4", "#7a838e"
+TITLES = 100
+"""Characters that the titles of all panels have room for, side by side."""
 
 
 def svg_of(figure: Figure) -> str:
@@ -29,7 +32,7 @@ def intervals(rows: dict[str, dict[str, Any]], quantities: Sequence[Quantity], o
     """One panel per quantity, one line per method: the value and its 95 % interval."""
     shown = [q for q in quantities if any(q.name in row["measures"] for row in rows.values())]
     with mpl.rc_context(cast(Any, STYLE)):
-        figure = Figure(figsize=(11.0, 1.0 + 0.24 * len(rows)), layout="constrained")
+        figure = Figure(figsize=(11.0, 1.2 + 0.24 * len(rows)), layout="constrained")
         panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
         for axes, quantity in zip(panels, shown, strict=True):
             for line, (name, row) in enumerate(rows.items()):
@@ -41,7 +44,7 @@ def intervals(rows: dict[str, dict[str, Any]], quantities: Sequence[Quantity], o
             if quantity.name == "covered":
                 axes.axvline(95.0, c="#1f7a45", lw=1.0, ls=":")
             unit = f", {quantity.unit}" if quantity.unit else ""
-            axes.set_title(f"{quantity.heading}{unit}", fontsize=8.5)
+            axes.set_title(fill(f"{quantity.heading}{unit}", TITLES // len(shown)), fontsize=8.5)
         panels[0].set_yticks(range(len(rows)), list(rows))
         panels[0].invert_yaxis()
         return svg_of(figure)

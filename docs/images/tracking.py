@@ -1,0 +1,77 @@
+"""The pictures of the page on tracking: what the filter sees and believes at four moments of one clip.
+
+python -m sim.performances --kind pointing --clips 1
+python docs/images/tracking.py --out docs/images/tracking.jpg
+"""
+
+import argparse
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from paramove.action_space.grammar import Grammar
+from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.tracker import ActionTracker
+from paramove.action_space.training import table_action
+from paramove.action_space.video_tracker import believed
+from paramove.action_space.vocabulary import Vocabulary
+from paramove.evaluation.chapter6.clips import clips_folder, read_clip
+from paramove.observation.arm_observer import ArmObserver
+
+MOMENTS_S = (0.6, 1.2, 1.5, 2.2)
+SHOWN = 40
+SCALE = 1.05
+
+
+def draw(out: Path, view: int) -> None:
+    """Writes the picture: a column for each moment; hypotheses before and after weighing, and what has changed."""
+    clip = read_clip(clips_folder() / "pointing_00")
+    observer = ArmObserver(clip.sizes, [clip.cameras[view]])
+    placement = PersonPlacement.of_arm(clip.shoulder, clip.sizes.length)
+    tracker = ActionTracker(Vocabulary([table_action("pointing")]), Grammar.loop("pointing"), placement)
+    columns, wanted = [], list(MOMENTS_S)
+    for time_s, images in zip(clip.times_s, clip.frames((view,)), strict=True):
+        observer.look([images[view]])
+        belief = believed(tracker, observer, float(time_s))
+        if wanted and time_s >= wanted[0]:
+            wanted.pop(0)
+            columns.append(column(images[view], observer, tracker, belief))
+    cv2.imwrite(str(out), np.hstack(columns)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 82])
+
+
+def column(image, observer, tracker, belief):
+    """One moment: the hypotheses, those with weight, the believed arm with the ball; what has changed."""
+    particles, rng = tracker.filter.particles, np.random.default_rng(0)
+    poses = tracker.placement.in_world(particles.poses)
+    before = outlined(image, observer, poses[rng.choice(len(poses), SHOWN, replace=False)], (255, 210, 60), 1)
+    after = outlined(image, observer, poses[rng.choice(len(poses), SHOWN, p=particles.weights)], (90, 230, 255), 1)
+    found = outlined(image, observer, belief.pose[None], (60, 255, 100), 2)
+    place = SCALE * (observer.cameras[0].project(belief.targets[belief.action]) + 0.5)
+    sure = max(0.0, 1.0 - belief.theta[belief.action].deviation / 0.2)
+    colour = (round(255 * min(1.0, 2 - 2 * sure)), round(255 * min(1.0, 2 * sure)), 30)
+    cv2.circle(found, tuple(place.round().astype(int).tolist()), 7, colour, -1, cv2.LINE_AA)
+    change = observer.change(0)
+    shown = np.full((*change.shape, 3), 90, np.uint8)
+    shown[change > 0] = (255, 255, 255)
+    shown[change < 0] = (20, 20, 30)
+    shown = cv2.resize(shown, before.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+    return np.vstack([before, after, found, shown])
+
+
+def outlined(image, observer, poses, colour, width):
+    """The image, enlarged, with the outlines of poses."""
+    size = (round(SCALE * image.shape[1]), round(SCALE * image.shape[0]))
+    picture = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC)
+    for pose in poses:
+        points = SCALE * (observer.outline(pose, 0) + 0.5)
+        cv2.polylines(picture, [points.round().astype(np.int32)], True, colour, width, cv2.LINE_AA)
+    return picture
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--view", type=int, default=0, help="number of the camera, from 0")
+    arguments = parser.parse_args()
+    draw(arguments.out, arguments.view)

@@ -1,0 +1,55 @@
+"""Action tracker: follows a person's right arm in the images of calibrated cameras, and where it points.
+
+Hears   camera_1/image, camera_2/image,
+        camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
+Says    action/estimate                   ActionEstimate              15 Hz   table, or that of `table_place`
+        human/arm_pose                    ArmPose                     15 Hz   table
+        action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
+        action/scene                      foxglove.SceneUpdate        15 Hz   table, or that of `table_place`
+"""
+
+from paramove.action_space.messages import arm_pose_message, estimate_message, outline_message, scene_message
+from paramove.action_space.setup import TrackingSetup
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.vision.frames import FrameError, decode
+
+HEARS = topics.CAMERA_IMAGES
+SAYS = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
+
+
+class Config(NodeConfig, TrackingSetup):
+    """See `TrackingSetup`."""
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes. An image that cannot be used is left out and told."""
+    tracker = config.video_tracker(bus.run_folder)
+    names, place = tracker.parameter_names, config.table_place
+    sentence = f"tracking {', '.join(names)} with {', '.join(tracker.cameras)}"
+    bus.ready(sentence)
+    told = tracker.kind_of_trouble
+    for event in bus.events(*HEARS, tick=True):
+        if isinstance(event, Tick):
+            tracker.tick(event.now_ns)
+        elif (camera := event.topic.name.removesuffix("/image")) in tracker.cameras:
+            try:
+                for moment in tracker.see(camera, event.captured_ns, decode(event.message)):
+                    estimate = estimate_message(moment, names, config.particles, place)
+                    pose, outline, ball = (
+                        arm_pose_message(moment),
+                        outline_message(moment),
+                        scene_message(moment, place),
+                    )
+                    for topic, message in zip(SAYS, (estimate, pose, outline, ball), strict=True):
+                        bus.publish(topic, message, moment.captured_ns)
+            except FrameError as error:
+                tracker.cannot_see(camera, event.captured_ns, str(error))
+        trouble = tracker.trouble()
+        if tracker.kind_of_trouble != told:
+            told = tracker.kind_of_trouble
+            bus.degraded(trouble) if trouble else bus.ready(sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

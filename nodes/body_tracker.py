@@ -1,0 +1,48 @@
+"""Body tracker: finds the marked points of a person's right arm in space, in the images of calibrated cameras.
+
+Hears   camera_1/image, camera_2/image,
+        camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
+Says    human/arm_pose                    ArmPose                     15 Hz   table
+        action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
+        action/scene                      foxglove.SceneUpdate        15 Hz   table
+"""
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.vision.body_messages import arm_pose_message, outline_message, scene_message
+from paramove.vision.body_tracking import BodyTrackingSetup
+from paramove.vision.frames import FrameError, decode
+
+HEARS = topics.CAMERA_IMAGES
+SAYS = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
+
+
+class Config(NodeConfig, BodyTrackingSetup):
+    """See `BodyTrackingSetup`."""
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes. An image that cannot be used is left out and told."""
+    tracking = config.body_tracking(bus.run_folder)
+    first = tracking.cameras["camera_1"]
+    sentence = f"looking for {', '.join(tracking.point_names)} with {', '.join(tracking.cameras)}"
+    bus.ready(sentence)
+    told = ""
+    for event in bus.events(*HEARS, tick=True):
+        if isinstance(event, Tick):
+            tracking.tick(event.now_ns)
+        elif (camera := event.topic.name.removesuffix("/image")) in tracking.cameras:
+            try:
+                for moment in tracking.see(camera, event.captured_ns, decode(event.message)):
+                    messages = (arm_pose_message(moment), outline_message(moment, first), scene_message(moment))
+                    for topic, message in zip(SAYS, messages, strict=True):
+                        bus.publish(topic, message, moment.captured_ns)
+            except FrameError as error:
+                tracking.cannot_see(camera, event.captured_ns, str(error))
+        if (trouble := tracking.trouble()) != told:
+            told = trouble
+            bus.degraded(trouble) if trouble else bus.ready(sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

@@ -1,0 +1,46 @@
+"""Relocator: holds an object, puts it where a person points, fetches it again and waits for the next place.
+
+Hears   gestures             Gesture            event    right_shoulder
+        action/estimate      ActionEstimate     15 Hz    right_shoulder
+        relocation/status    RelocationStatus   event
+        arm/safety           SafetyState        15 Hz, latched
+Says    relocation/goal      RelocationGoal     event    right_shoulder
+        application/stage    ApplicationStage   1 Hz
+        speech               Speech             event
+"""
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.rules.relocator import Relocator
+from paramove.rules.relocator_options import RelocatorOptions
+
+HEARS = (topics.GESTURES, topics.ACTION_ESTIMATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
+SAYS = (topics.RELOCATION_GOAL, topics.APPLICATION_STAGE, topics.SPEECH)
+
+
+class Config(NodeConfig, RelocatorOptions):
+    """See `RelocatorOptions`."""
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the object was put at all places, the arm is not armed any more, or the bus closes."""
+    relocator = Relocator(config, f"goal-{bus.now_ns}")
+    hear = (relocator.on_gesture, relocator.on_estimate, relocator.on_goal_status, relocator.on_safety)
+    bus.ready("waiting for the arm")
+    for event in bus.events(*HEARS, tick=True):
+        if not isinstance(event, Tick):
+            hear[HEARS.index(event.topic)](event.message)
+            continue
+        said = relocator.tick(event.now_ns * 1e-9)
+        for topic, messages in zip(SAYS, (said.goals, said.stages, said.speech), strict=True):
+            for message in messages:
+                bus.publish(topic, message)
+        if relocator.failure:
+            bus.failed(relocator.failure)
+        if relocator.finished or relocator.failure:
+            return
+        bus.ready(relocator.sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

@@ -1,0 +1,124 @@
+"""The two calibrated cameras that look at the instructor's arm, like chapter 6's, but at the robot's scale.
+
+Poses are in the table frame of `sim.small_person`, in which they are calibrated.
+"""
+
+from __future__ import annotations
+
+import cv2
+import mujoco
+import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from numpy.typing import NDArray
+
+from paramove.observation.cameras import CalibratedCamera
+from sim.camera import Eye, Image
+from sim.human import camera_frame
+from sim.performances import Lens
+from sim.performances_scene import (
+    HEIGHT_PX,
+    MARGIN_PX,
+    WIDTH_PX,
+    as_calibrated,
+    draw_camera,
+)
+from sim.small_person import SCALE, shoulder_from_table, turn_of_table
+
+FloatArray = NDArray[np.float64]
+
+PLACES = (  # eye and target in the human frame: from the right, and from above over the robot's left shoulder
+    ((0.30, -1.80, 0.85), (-0.03, -0.16, 0.12)),
+    ((0.85, -0.80, 1.75), (-0.03, -0.17, 0.06)),
+)
+RENDERED_PX = (WIDTH_PX + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX)
+HEIGHT_OF_SCENE = 0.04
+"""Of the human frame's origin over the working plane, about."""
+BOARD_SHIFT, BOARD_TURN = 0.001, 0.003
+"""Greatest errors, m and rad, with which the calibration board was laid on the table; all cameras share them."""
+
+
+def draw_arm_cameras(draw: np.random.Generator) -> tuple[CalibratedCamera, ...]:
+    """The cameras around the arm, a little elsewhere and with another lens each time. Without errors."""
+    return tuple(
+        draw_camera(f"camera_{number}", eye, target, draw, SCALE, HEIGHT_OF_SCENE)
+        for number, (eye, target) in enumerate(PLACES, start=1)
+    )
+
+
+def calibrated(cameras: tuple[CalibratedCamera, ...], draw: np.random.Generator) -> tuple[CalibratedCamera, ...]:
+    """As somebody calibrated them, with the errors of a calibration and of where its board lay."""
+    shift, turn = draw.uniform(-BOARD_SHIFT, BOARD_SHIFT, 2), float(draw.uniform(-BOARD_TURN, BOARD_TURN))
+    table_from_board = np.eye(4)
+    table_from_board[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    table_from_board[:2, 3] = shift
+    found = []
+    for camera in cameras:
+        one = as_calibrated(camera, draw)
+        pose = one.camera_from_world @ table_from_board
+        found.append(CalibratedCamera(one.name, one.width_px, one.height_px, one.matrix, one.distortion, pose))
+    return tuple(found)
+
+
+def add_arm_cameras(
+    spec: mujoco.MjSpec, world_from_shoulder: FloatArray, cameras: tuple[CalibratedCamera, ...]
+) -> None:
+    """Adds them to a world, and room to render their pictures."""
+    view = spec.visual.global_
+    view.offwidth = max(view.offwidth, RENDERED_PX[0])
+    view.offheight = max(view.offheight, RENDERED_PX[1])
+    for camera in cameras:
+        shoulder_from_camera = np.eye(4)
+        shoulder_from_camera[:3, :3] = turn_of_table() @ camera.camera_from_world[:3, :3].T
+        shoulder_from_camera[:3, 3] = shoulder_from_table(camera.position) + world_from_shoulder
+        position, quaternion = camera_frame(np.linalg.inv(shoulder_from_camera))
+        half = HEIGHT_PX / 2 + MARGIN_PX
+        fovy = float(np.rad2deg(2 * np.arctan(half / camera.matrix[1, 1])))
+        spec.worldbody.add_camera(name=camera.name, pos=position, quat=quaternion, fovy=fovy)
+
+
+class ArmCameras:
+    """What falls on the cameras' sensors. Holds a graphics context: use it in one thread and `close` it.
+
+    Args:
+        model: With the cameras in it.
+        cameras: As they really are.
+        noise: Standard deviation of the sensors' noise, of 255.
+        draw: Of the noise.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        cameras: tuple[CalibratedCamera, ...],
+        noise: float,
+        draw: np.random.Generator,
+    ) -> None:
+        self._cameras = cameras
+        self._eye = Eye(model, *RENDERED_PX)
+        self._lenses = [Lens(camera) for camera in cameras]
+        self._noise, self._draw = noise, draw
+
+    def images(self, data: mujoco.MjData) -> list[Image]:
+        """One RGB image [240, 320, 3] of each camera."""
+        found = []
+        for camera, lens in zip(self._cameras, self._lenses, strict=True):
+            image = lens.image(self._eye.look(data, camera.name))
+            noise = self._draw.normal(0.0, self._noise, image.shape).round().astype(np.int8)
+            found.append(np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8))
+        return found
+
+    def lights(self, data: mujoco.MjData, now_ns: int) -> list[RawImage]:
+        """The same as messages."""
+        found = []
+        for camera, image in zip(self._cameras, self.images(data), strict=True):
+            message = RawImage(
+                frame_id=camera.name, width=WIDTH_PX, height=HEIGHT_PX, encoding="rgb8", step=3 * WIDTH_PX,
+                data=np.ascontiguousarray(image).tobytes(),
+            )  # fmt: skip
+            message.timestamp.FromNanoseconds(now_ns)
+            found.append(message)
+        return found
+
+    def close(self) -> None:
+        """Gives the graphics context back."""
+        self._eye.close()

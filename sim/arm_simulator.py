@@ -1,0 +1,70 @@
+"""Simulator with an instructor who is a whole arm: `sim.simulator`, and what two calibrated cameras see of that arm.
+
+Hears   wire/hoap3/stream   StreamBatch         events  joint units
+        speech              Speech              events
+Says    clock               Clock               15 Hz
+        camera/light        foxglove.RawImage   15 Hz   camera_optical
+        camera_1/light,
+        camera_2/light      foxglove.RawImage   15 Hz, or a part of it   camera_1, camera_2
+        wire/hoap3/state    Hoap3State          15 Hz   joint units
+        truth/layout        TruthLayout         once, latched   world; only for evaluators
+        truth/state         TruthState          15 Hz   world; only for evaluators
+        truth/arm           TruthArm            15 Hz   table; only for evaluators
+        truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+
+Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`, in the table frame of
+`sim.small_person`.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from pydantic import Field
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, main
+from sim import simulator
+from sim.arm_simulation import ArmSimulation
+from sim.simulation import Simulation
+
+HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
+SAYS = (
+    topics.CLOCK,
+    topics.CAMERA_LIGHT,
+    *topics.CAMERA_LIGHTS[:2],
+    topics.WIRE_HOAP3_STATE,
+    topics.TRUTH_LAYOUT,
+    topics.TRUTH_STATE,
+    topics.TRUTH_ARM,
+    topics.TRUTH_VIEW,
+)
+
+
+class Config(simulator.Config):
+    """See `sim.simulator`.
+
+    Attributes:
+        arm_image_every: The cameras of the arm give an image in every so many ticks of 1/15 s; rendering and tracking
+            take most of the time of a run.
+    """
+
+    arm_image_every: int = Field(default=1, ge=1, le=4)
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes or the simulated time is up."""
+    simulator.run(bus, config, ArmSimulation, partial(say_of_arm, every=config.arm_image_every))
+
+
+def say_of_arm(bus: Bus, simulation: Simulation, every: int = 1) -> None:
+    """What is true of the arm in this tick, and what is seen of it in every so many ticks."""
+    assert isinstance(simulation, ArmSimulation)
+    seen = simulation.tick % every == 0
+    for topic, light in zip(topics.CAMERA_LIGHTS, simulation.arm_lights() if seen else [], strict=False):
+        bus.publish(topic, light, simulation.now_ns)
+    bus.publish(topics.TRUTH_ARM, simulation.truth_arm(), simulation.now_ns)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

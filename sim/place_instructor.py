@@ -1,0 +1,115 @@
+"""An instructor who points at free places of the robot's working area, one after the other, as the robot asks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations.reaching import table_place
+from paramove.msgs.rule_pb2 import Speech
+from sim import tool_box
+from sim.arm_instructor import ELBOW, SHOULDER, WRIST, ArmInstructor
+from sim.instructor import Script, Step
+from sim.small_person import POINTED_ABOVE_PLANE, SCALE, table_from_shoulder
+
+FloatArray = NDArray[np.float64]
+
+OBJECT = "yellow"
+START = (0.165, -0.02)
+"""Marked on the table: where the object stands at first, and where the person stands it when the robot needs help."""
+AREA_X, AREA_Y = (0.130, 0.186), (-0.100, 0.065)
+"""A person points so far inside of what the robot reaches, m, shoulder frame."""
+FREE_OF_ROBOT = 0.07
+"""Between the fingertip and the robot's gripper, seen from above, m."""
+ANOTHER_PLACE = 0.04
+"""The next place is so far from where the object stood last, m."""
+SAME_PLACE_AT_MOST = 2
+WITHIN_SHARE = 0.04
+"""Nobody points at the outermost part of the 80 x 30 cm of the table where people show how they point."""
+
+
+class PlaceInstructor(ArmInstructor):
+    """See `ArmInstructor`. Who is not understood points at the same place once more, then at another one."""
+
+    _place: FloatArray | None = None
+    _shown = 0
+    _stood = np.array(START)
+
+    def hear(self, request: int, name: str = "") -> None:
+        """See `Instructor.hear`. Who is asked to point again while withdrawing the arm points again."""
+        again = (request, name)
+        if request == Speech.REQUEST_POINT_AT_PLACE and self._has_pointed and again not in self._waiting:
+            self._waiting.append(again)
+        if request == Speech.REQUEST_UNSPECIFIED and self._has_pointed and self._place is not None:
+            self._stood, self._place = self._place, None  # it is understood: the object will stand there
+        super().hear(request, name)
+
+    def _scripts(self) -> dict[int, Callable[[str], Script]]:
+        more = {
+            Speech.REQUEST_POINT_AT_PLACE: self._point_at_free_place,
+            Speech.REQUEST_POINT_AT_OBJECT: self._point_at_object,
+        }
+        return {**super()._scripts(), **more}
+
+    def _point_at_object(self, _: str) -> Script:
+        yield from self._empty_hand()
+        self.doing = f"points at {OBJECT}"
+        yield from self._point_above(self._table.position(OBJECT)[:2])
+
+    def _point_at_free_place(self, _: str) -> Script:
+        yield from self._empty_hand()
+        if self._place is None or self._shown >= SAME_PLACE_AT_MOST:
+            self._place, self._shown = self._free_place(), 0
+        self._shown += 1
+        self.doing = "points at ({:.1f}, {:.1f}) cm".format(*(100 * self._place))
+        yield from self._point_above(self._place)
+
+    def _point_above(self, place: FloatArray) -> Script:
+        """Point at a place (2,) and let the arm hang again."""
+        self._has_pointed = False
+        for step in self.point_at_place((*place, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)):
+            yield step
+            self._resting = self.posture
+        self._take(self._resting)
+        self._has_pointed = False
+
+    def _begin_seated(self) -> Script:
+        """The person sits with a hanging arm, and so it stays between two pointings."""
+        self._resting = self.person.points_at((*START, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE), self._draw).postures[
+            0
+        ]
+        self._elbow_towards = self._resting[ELBOW] - 0.5 * (self._resting[SHOULDER] + self._resting[WRIST])
+        self._take(self._resting)
+        yield Step(0.1)
+
+    def _withdraw(self) -> Script:
+        yield from self._hang(self._resting)
+
+    def _free_place(self) -> FloatArray:
+        """Another place in the working area, where the person can point and the robot's hand is not."""
+        gripper = self._table.gripper()[0][:2]
+        for _ in range(10_000):
+            place = np.array([self._places.uniform(*AREA_X), self._places.uniform(*AREA_Y)])
+            free = np.linalg.norm(place - gripper) >= FREE_OF_ROBOT
+            another = np.linalg.norm(place - self._stood) >= ANOTHER_PLACE
+            if free and another and where_people_point(place):
+                return place
+        raise RuntimeError(f"no free place in {AREA_X} x {AREA_Y} m with the robot's hand at {gripper}")
+
+    def _help(self, name: str) -> Script:
+        self._posture = None
+        yield from self._empty_hand()
+        self.doing = f"stands {OBJECT} at its start"
+        self._stood, self._place = np.array(START), None
+        yield from self._bring(OBJECT, self._stood)
+        yield from self._withdraw()
+
+
+def where_people_point(place: FloatArray) -> bool:
+    """Whether a place (2,), m, shoulder frame, lies on the part of the table where people show how they point."""
+    x, y, _ = table_from_shoulder([*place, tool_box.SURFACE_Z]) / SCALE
+    (low_x, high_y, _), (high_x, low_y, _) = table_place([[0.0, 0.0], [1.0, 1.0]])
+    inside = WITHIN_SHARE * (high_x - low_x), WITHIN_SHARE * (high_y - low_y)
+    return bool(low_x + inside[0] <= x <= high_x - inside[0] and low_y + inside[1] <= y <= high_y - inside[1])

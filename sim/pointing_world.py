@@ -1,0 +1,106 @@
+"""A person at a table who points at one place after the other, seen by calibrated cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from numpy.typing import NDArray
+from ruamel.yaml import YAML
+
+from paramove.demonstrations.reaching import table_place
+from paramove.evaluation.chapter6.performances import Performance, assembled, kind_named, pointed_once
+from paramove.evaluation.chapter6.performers import draw_performer
+from paramove.msgs.truth_pb2 import TruthArm
+from paramove.observation.cameras import write_cameras
+from sim.performances import Studio
+
+FloatArray = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+SEED_SPACE = 1000
+"""Numbers of performances from here on are runs; those below are the clips of chapter 6."""
+REST_S = (1.0, 1.8)
+POINTS = {"shoulder": 0, "elbow": 3, "hand": 6}
+
+
+def pointing_performance(seed: int, targets: int) -> Performance:
+    """A person of this seed points at so many places of the table. Everything follows from the seed."""
+    rng = np.random.default_rng((SEED_SPACE, seed))
+    person = draw_performer(rng)
+    planned = []
+    for _ in range(targets):
+        theta = rng.uniform(0.0, 1.0, (1, 2))
+        target = table_place(theta)
+        planned.append(("pointing", theta, target, pointed_once(person, person.placement.in_model(target[0]), rng)))
+    rests = [float(rng.uniform(*REST_S)) for _ in range(targets + 1)]
+    kind = kind_named("pointing")
+    return assembled(kind, SEED_SPACE + seed, person, planned, rests, np.full(3, np.nan), rng)
+
+
+class PointingWorld:
+    """One run. Holds a graphics context: use it in one thread and `close` it.
+
+    Args:
+        seed: Of person, room, cameras and noise.
+        targets: How often the person points.
+        views: Numbers of the cameras that look, from 1.
+        markers: Points of the arm at which the person wears coloured balls.
+    """
+
+    def __init__(self, seed: int, targets: int, views: tuple[int, ...], markers: tuple[str, ...] = ()) -> None:
+        self._studio = Studio(pointing_performance(seed, targets), markers)
+        self._views = views
+        self._noise = np.random.default_rng((SEED_SPACE, seed, 1))
+        self.duration_s = float(self._studio.times_s[-1])
+
+    @property
+    def views(self) -> tuple[int, ...]:
+        """Numbers of the cameras that look, from 1."""
+        return self._views
+
+    def write_measures(self, folder: Path) -> None:
+        """What people measure beforehand: `cameras.yaml`, with the errors of a calibration, and `person.yaml`."""
+        write_cameras(folder / "cameras.yaml", [self._studio.calibrated[view - 1] for view in self._views])
+        person = self._studio.performance.person
+        measures: dict[str, Any] = {"shoulder": [round(float(value), 3) for value in person.measured_shoulder]}
+        for name in ("upper_arm", "forearm", "hand"):
+            measures[name] = round(float(getattr(person.measured, name)), 3)
+        with (folder / "person.yaml").open("w", encoding="utf-8") as file:
+            YAML().dump(measures, file)
+
+    def lights(self, time_s: float) -> list[RawImage]:
+        """What falls on the sensor of each camera, in the order of `views`."""
+        return [self._light(self._studio.film(time_s, view - 1), view, time_s) for view in self._views]
+
+    def truth(self, time_s: float) -> TruthArm:
+        """How the arm really is, and where it points."""
+        pose = self._studio.at(time_s).pose
+        message = TruthArm(time_ns=round(time_s * 1e9))
+        for name, first in POINTS.items():
+            x, y, z = pose[first : first + 3]
+            message.points.add(name=name, x=x, y=y, z=z)
+        for number, act in enumerate(self._studio.performance.acts, start=1):
+            if act.start_s <= time_s <= act.end_s:
+                message.action, message.performance = act.action, number
+                message.target.x, message.target.y, message.target.z = act.targets[0]
+                message.at_target = bool(act.arrives_s[0] <= time_s <= act.leaves_s[0])
+        return message
+
+    def close(self) -> None:
+        """Gives the graphics context back."""
+        self._studio.close()
+
+    def _light(self, image: Image, view: int, time_s: float) -> RawImage:
+        noise = self._noise.normal(0.0, self._studio.room.noise, image.shape).round().astype(np.int8)
+        exposed = cv2.add(image, noise, dtype=cv2.CV_8U)
+        height, width = exposed.shape[:2]
+        message = RawImage(
+            frame_id=f"camera_{view}", width=width, height=height, encoding="rgb8", step=3 * width,
+            data=np.ascontiguousarray(exposed).tobytes(),
+        )  # fmt: skip
+        message.timestamp.FromNanoseconds(round(time_s * 1e9))
+        return message

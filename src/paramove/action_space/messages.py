@@ -1,0 +1,155 @@
+"""What a tracked moment is on the bus: estimate, arm pose, outline in the image, and a ball where the arm points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
+from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from paramove.action_space.video_tracker import TrackedMoment
+from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
+from paramove.msgs.arm_pose_pb2 import ArmPose
+from paramove.observation.arm_body import POSE_POINTS
+from paramove.observation.cameras import WORLD_FRAME
+from paramove.vision.pointing_events import BALL_M, ball_colour, certainty
+
+Floats = NDArray[np.float64]
+
+NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index"}
+
+
+class TablePlace(BaseModel):
+    """Where the table frame, in which cameras and person were measured, is in another frame, such as a robot's.
+
+    Attributes:
+        frame: Name of the other frame.
+        x, y, z: Of the table frame's origin there, m.
+        yaw: Angle from its x axis to the table's, about z, rad.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    frame: str = WORLD_FRAME
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    yaw: float = 0.0
+
+    def frame_from_table(self, points: Floats) -> Floats:
+        """Points (..., 3), m, of the table frame in this one."""
+        return np.asarray(points @ self._turn.T + np.array([self.x, self.y, self.z]))
+
+    def deviations(self, along_table: Floats) -> Floats:
+        """Deviations (3,), m, along the table's axes, along the axes of this frame."""
+        return np.asarray(np.sqrt(self._turn**2 @ along_table**2))
+
+    @property
+    def _turn(self) -> Floats:
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+AT_TABLE = TablePlace()
+
+
+def estimate_message(
+    moment: TrackedMoment,
+    parameter_names: Mapping[str, Sequence[str]],
+    particles: int,
+    table: TablePlace = AT_TABLE,
+) -> ActionEstimate:
+    """Everything that is believed, with places in the frame of `table`. `parameter_names` of each action."""
+    belief = moment.belief
+    message = ActionEstimate(
+        frame=table.frame,
+        progress=belief.tau_histogram.sum(axis=0),
+        effective_sample_size=belief.effective_sample_size,
+        particles=particles,
+        views=moment.n_views,
+        lost=belief.lost,
+        degraded=belief.degraded,
+        sentence=belief.sentence,
+        hand=_location(belief.pose[-3:], np.sqrt(np.diagonal(belief.hand_covariance)), table),
+        pointed=_location(moment.pointed, moment.pointed_deviation, table),
+    )
+    message.captured.FromNanoseconds(moment.captured_ns)
+    for name, probability in belief.actions.items():
+        action = message.actions.add(action=name, probability=probability)
+        if name in belief.theta:
+            theta = belief.theta[name]
+            action.parameters.extend(
+                ActionParameter(name=one, mean=mean, deviation=deviation, covariance=row)
+                for one, mean, deviation, row in zip(
+                    parameter_names[name], theta.mean, theta.deviations, theta.covariance, strict=True
+                )
+            )
+    if belief.target is not None:
+        found = belief.target
+        message.target.number, message.target.action = found.number, found.action
+        message.target.arrived.FromNanoseconds(moment.captured_ns - round((belief.time_s - found.time_s) * 1e9))
+        message.target.location.CopyFrom(_location(found.place, moment.target_deviation, table))
+    return message
+
+
+def arm_pose_message(moment: TrackedMoment) -> ArmPose:
+    """The believed posture; the end of the hand is the tip of the index finger."""
+    message = ArmPose(frame=WORLD_FRAME)
+    message.captured.FromNanoseconds(moment.captured_ns)
+    for name, (x, y, z) in zip(POSE_POINTS, moment.belief.pose.reshape(3, 3), strict=True):
+        message.points.add(name=NAMES_IN_MESSAGES[name], x=x, y=y, z=z)
+    return message
+
+
+def outline_message(moment: TrackedMoment) -> ImageAnnotations:
+    """The outline of the believed arm and the ball where it points, in the first camera's image."""
+    message = ImageAnnotations()
+    message.timestamp.FromNanoseconds(moment.captured_ns)
+    points = message.points.add(type=PointsAnnotation.LINE_LOOP, thickness=2.0)
+    points.timestamp.CopyFrom(message.timestamp)
+    colour = (1.0, 0.3, 0.2) if moment.belief.lost else (0.2, 1.0, 0.4)
+    points.outline_color.r, points.outline_color.g, points.outline_color.b = colour
+    points.outline_color.a = 1.0
+    for x, y in moment.outline:
+        points.points.add(x=x, y=y)
+    if np.isfinite(moment.ball).all():
+        circle = message.circles.add(diameter=9.0, thickness=1.0)
+        circle.timestamp.CopyFrom(message.timestamp)
+        circle.position.x, circle.position.y = moment.ball
+        colour = ball_colour(certainty(moment.pointed_deviation))
+        for part in (circle.fill_color, circle.outline_color):
+            part.r, part.g, part.b = colour
+            part.a = 1.0
+    return message
+
+
+def scene_message(moment: TrackedMoment, table: TablePlace = AT_TABLE) -> SceneUpdate:
+    """The believed arm as lines and the ball where it points, in the frame of `table`."""
+    message = SceneUpdate()
+    entity = message.entities.add(id="target", frame_id=table.frame)
+    entity.timestamp.FromNanoseconds(moment.captured_ns)
+    entity.lifetime.FromMilliseconds(1000)
+    ball = entity.spheres.add()
+    place = ball.pose.position
+    place.x, place.y, place.z = table.frame_from_table(moment.pointed)
+    ball.pose.orientation.w = 1.0
+    ball.size.x = ball.size.y = ball.size.z = BALL_M
+    ball.color.r, ball.color.g, ball.color.b = ball_colour(certainty(moment.pointed_deviation))
+    ball.color.a = 1.0
+    arm = entity.lines.add(thickness=0.02)
+    arm.color.g = arm.color.a = 1.0
+    arm.pose.orientation.w = 1.0
+    for x, y, z in table.frame_from_table(moment.belief.pose.reshape(3, 3)):
+        arm.points.add(x=x, y=y, z=z)
+    return message
+
+
+def _location(place: Floats, deviation: Floats, table: TablePlace) -> Location:
+    x, y, z = map(float, table.frame_from_table(place))
+    along = map(float, table.deviations(deviation))
+    return Location(x=x, y=y, z=z, **dict(zip(("x_deviation", "y_deviation", "z_deviation"), along, strict=True)))

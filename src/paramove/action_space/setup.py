@@ -1,0 +1,159 @@
+"""What a tracker is made of, as parameters of its process: cameras, person, actions, grammar."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from paramove.action_space.grammar import Grammar
+from paramove.action_space.grammar_file import read_grammar
+from paramove.action_space.messages import TablePlace
+from paramove.action_space.particle_filter import FilterOptions
+from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.target_detection import DetectionOptions
+from paramove.action_space.track_health import HealthOptions
+from paramove.action_space.tracker import ActionTracker, TrackerOptions
+from paramove.action_space.training import table_action
+from paramove.action_space.video_tracker import VideoTracker
+from paramove.action_space.vocabulary import ActionModel, Vocabulary
+from paramove.input_error import InputError
+from paramove.observation.arm_body import ArmSizes
+from paramove.observation.arm_observer import ArmObserver
+from paramove.observation.cameras import read_cameras
+from paramove.phmm import ParametricHMM, PolynomialPHMM
+
+MOST_CAMERAS = 4
+LEAST_GROWN = 0.8
+"""Arm length of grown people over the demonstrator's, at least."""
+SYNTHETIC = ("pointing", "reaching")
+
+
+class Person(BaseModel):
+    """A person's measures, m, as a file holds them.
+
+    Attributes:
+        shoulder: The resting right shoulder in the frame of the table.
+        upper_arm: Shoulder to elbow.
+        forearm: Elbow to wrist.
+        hand: Wrist to the tip of the index finger.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    shoulder: tuple[float, float, float] = PersonPlacement().shoulder
+    upper_arm: float = Field(default=ArmSizes.upper_arm, gt=0.07, lt=0.6)
+    forearm: float = Field(default=ArmSizes.forearm, gt=0.07, lt=0.5)
+    hand: float = Field(default=ArmSizes.hand, gt=0.04, lt=0.4)
+
+    @property
+    def sizes(self) -> ArmSizes:
+        """Of the arm; its thickness grows with its length."""
+        default = ArmSizes()
+        scaled = default.scaled((self.upper_arm + self.forearm + self.hand) / default.length)
+        return replace(scaled, upper_arm=self.upper_arm, forearm=self.forearm, hand=self.hand)
+
+    @property
+    def placement(self) -> PersonPlacement:
+        """Where the person sits, and how large the person is."""
+        return PersonPlacement.of_arm(self.shoulder, self.sizes.length)
+
+
+def read_person(path: Path) -> Person:
+    """The person of a YAML file. Raises InputError if there is none or it holds something else."""
+    example = "shoulder: [-0.27, -0.18, 0.35], upper_arm: 0.28, forearm: 0.24, hand: 0.17, all in m"
+    try:
+        return Person.model_validate(YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")))
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file; it tells a person's measures, as {example}", missing=True) from error
+    except (OSError, YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {error}; expected a YAML file with {example}") from error
+    except ValidationError as error:
+        found = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
+        raise InputError(f"{path}: {found}; expected as {example}") from error
+
+
+class TrackingSetup(BaseModel):
+    """Parameters of a tracker. Its files are looked for in the run's folder first, then in the workspace.
+
+    Attributes:
+        cameras: Calibration file; its cameras are camera_1, camera_2, … in their order.
+        person: File of the person's measures; without one, the synthetic demonstrator's.
+        table: Corners of the table's top in order, (x, y) in m in its frame; it hides an arm that hangs below.
+        table_place: Where the table frame is in the frame in which estimates shall be, such as a robot's.
+        actions: "pointing" or "reaching" on the table as the synthetic demonstrator shows them, or files of models of
+            arm poses over (u, v).
+        grammar: File; without one, any of the actions follows any.
+        particles: Hypotheses.
+        least_log_likelihood: Of the best hypothesis, nats; below it for half a second the arm is lost, however used the
+            track is to it. For cameras that see the arm now and then only; None: lost only where it was better before.
+        rate_hz: Of the cameras.
+        seed: Of the filter.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    cameras: Path = Path("cameras.yaml")
+    person: Path | None = None
+    table: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
+    table_place: TablePlace = TablePlace()
+    actions: tuple[str, ...] = Field(default=("pointing",), min_length=1)
+    grammar: Path | None = None
+    particles: int = Field(default=400, ge=50, le=20_000)
+    least_log_likelihood: float | None = None
+    rate_hz: float = Field(default=15.0, gt=0.5, le=240.0)
+    seed: int = Field(default=0, ge=0)
+
+    def video_tracker(self, run_folder: Path = Path()) -> VideoTracker:
+        """Reads the files, trains and compiles what is not there yet. Raises InputError."""
+        found = read_cameras(_beside(run_folder, self.cameras))
+        if len(found) > MOST_CAMERAS:
+            raise InputError(f"{self.cameras}: {len(found)} cameras found, at most {MOST_CAMERAS} are used")
+        cameras = [
+            type(one)(
+                f"camera_{number}", one.width_px, one.height_px, one.matrix, one.distortion, one.camera_from_world
+            )
+            for number, one in enumerate(found, start=1)
+        ]
+        person = Person() if self.person is None else read_person(_beside(run_folder, self.person))
+        vocabulary = Vocabulary([_action(name) for name in self.actions])
+        grammar = Grammar.choice(list(vocabulary.names)) if self.grammar is None else read_grammar(self.grammar)
+        options = TrackerOptions(
+            filter=FilterOptions(n_particles=self.particles),
+            detection=_detection(person.placement.scale),
+            health=HealthOptions(least_log_likelihood=self.least_log_likelihood),
+        )
+        tracker = ActionTracker(vocabulary, grammar, person.placement, options, self.seed)
+        observer = ArmObserver(person.sizes, cameras, table=self.table)
+        video = VideoTracker(tracker, observer, cameras, 1.0 / self.rate_hz)
+        video.warm_up()
+        return video
+
+
+def _beside(run_folder: Path, path: Path) -> Path:
+    """In the run's folder if there is such a file, where a simulator writes what was measured; else as given."""
+    return run_folder / path if (run_folder / path).is_file() else path
+
+
+def _detection(scale: float) -> DetectionOptions:
+    """How far and fast a hand goes between targets, of an arm so long; grown people's are all measured alike."""
+    return DetectionOptions() if scale > LEAST_GROWN else DetectionOptions().scaled(scale)
+
+
+def _action(name: str) -> ActionModel:
+    """A synthetic action, or the model of a file."""
+    if name in SYNTHETIC:
+        return table_action("pointing" if name == "pointing" else "reaching")
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(
+            f"action {name!r}: {', '.join(SYNTHETIC)} or the file of a model expected, and there is no such file",
+            missing=True,
+        )
+    model = ParametricHMM.load(path)
+    if not isinstance(model, PolynomialPHMM):
+        raise InputError(f"{path}: a {type(model).__name__} found, a polynomial model expected: paramove train --kind")
+    return ActionModel.from_file_model(model)

@@ -1,0 +1,134 @@
+"""Whether a track still follows its arm: the best likelihood beside what is usual for this track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramove.input_error import InputError
+from paramove.observation.presence import Presence
+
+KEPT_SHARE = 0.9
+"""Of the greatest change: while the arm is lost it must fall below that."""
+
+
+@dataclass(frozen=True)
+class HealthOptions:
+    """When a track counts as lost, and as found again; times in seconds, so that the frame rate does not matter.
+
+    Attributes:
+        settle_s: as long a track learns what is usual before it can be lost.
+        memory_s: over which the usual is learned.
+        rise: share of `memory_s` in which it becomes better: a while before a contrasting background raises no demands
+            on what follows, and an arm that is gone must not hide in how much better a swift one was.
+        drop_deviations: the best log-likelihood is far below the usual beyond so many usual deviations downwards.
+        least_drop, most_drop: nats, of the likelihood flattened as it usually is; but not within the one, and in any
+            case beyond the other.
+        least_log_likelihood: nats; far below in any case. None: not known.
+        lost_after_s: lost when it is far below for so long.
+        found_after_s: found when it is not for so long.
+        found_share: of what is allowed; while the arm is lost it must come back so near.
+        least_there: of -1 to 1, see `Presence`; less means that but the background is seen where the arm should be.
+        most_changed: times the arm's area; more means that somebody left or came, or that a camera was moved.
+        absent_after_s: lost when one of both is so for so long.
+    """
+
+    settle_s: float = 0.6
+    memory_s: float = 4.0
+    rise: float = 0.3
+    drop_deviations: float = 3.0
+    least_drop: float = 3.0
+    most_drop: float = 5.0
+    least_log_likelihood: float | None = None
+    lost_after_s: float = 0.5
+    found_after_s: float = 0.3
+    found_share: float = 0.5
+    least_there: float = -0.3
+    most_changed: float = 2.5
+    absent_after_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raises InputError for times and drops that are not positive."""
+        for name in vars(self):
+            if name in ("least_log_likelihood", "least_there"):
+                continue
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise InputError(f"{name} is positive and finite, found {getattr(self, name)}")
+
+
+class TrackHealth:
+    """Follows the best log-likelihood of each frame.
+
+    Attributes:
+        lost_since_s: when the track was lost; None while it is not.
+        shortfall: nats below the usual, in the latest frame; of the likelihood flattened as it usually is.
+        n_lost: how often it was lost.
+        absence: why there can be no arm as believed, in the latest frame; "" if there can.
+    """
+
+    def __init__(self, options: HealthOptions | None = None) -> None:
+        self.options = options if options is not None else HealthOptions()
+        self.lost_since_s: float | None = None
+        self.shortfall = 0.0
+        self.n_lost = 0
+        self.absence = ""
+        self._absent_s = 0.0
+        self._usual, self._variance, self._temper = 0.0, 0.0, 1.0
+        self._learned_s = 0.0
+        self._bad_s, self._good_s = 0.0, 0.0
+
+    @property
+    def lost(self) -> bool:
+        """Whether the track is lost."""
+        return self.lost_since_s is not None
+
+    def update(
+        self, time_s: float, elapsed_s: float, best: float, temper: float = 1.0, presence: Presence | None = None
+    ) -> None:
+        """Takes the best log-likelihood of a frame that came `elapsed_s` after the one before, and its exponent."""
+        self.absence = "" if presence is None else self._absence(presence)
+        self._absent_s = self._absent_s + elapsed_s if self.absence else 0.0
+        settled = self._learned_s >= self.options.settle_s
+        self.shortfall = self._temper * (self._usual - best) if settled else 0.0
+        least = self.options.least_log_likelihood
+        allowed = self._allowed() * (self.options.found_share if self.lost else 1.0)
+        bad = bool(self.absence) or (settled and self.shortfall > allowed) or (least is not None and best < least)
+        self._bad_s = self._bad_s + elapsed_s if bad else 0.0
+        self._good_s = 0.0 if bad else self._good_s + elapsed_s
+        if not bad and not self.lost:
+            self._learn(elapsed_s, best, temper)
+        gone = self._bad_s >= self.options.lost_after_s or self._absent_s >= self.options.absent_after_s
+        if not self.lost and gone:
+            self.lost_since_s = time_s
+            self.n_lost += 1
+        elif self.lost and self._good_s >= self.options.found_after_s:
+            self.lost_since_s = None
+
+    def _absence(self, presence: Presence) -> str:
+        most = self.options.most_changed * (KEPT_SHARE if self.lost else 1.0)
+        if presence.changed > most:
+            return (
+                f"the images have changed in {presence.changed:.1f} times the arm's area: somebody came or left, or a "
+                "camera was moved"
+            )
+        return "there is but the background where it should be" if presence.there < self.options.least_there else ""
+
+    def _allowed(self) -> float:
+        usual = self.options.drop_deviations * self._temper * float(np.sqrt(self._variance))
+        return min(max(self.options.least_drop, usual), self.options.most_drop)
+
+    def _learn(self, elapsed_s: float, best: float, temper: float) -> None:
+        """Mean and spread downwards over the latest `memory_s`, all of the track while it is shorter."""
+        settling = self._learned_s < self.options.settle_s
+        self._learned_s += elapsed_s
+        share = min(1.0, max(elapsed_s, 1e-3) / min(max(self._learned_s, 1e-3), self.options.memory_s))
+        difference = best - self._usual
+        self._temper += share * (temper - self._temper)
+        if difference > 0.0 and not settling:
+            self._usual += self.options.rise * share * difference
+            self._variance *= 1.0 - share
+            return
+        self._usual += share * difference
+        # Twice the mean square of what is below is the variance of what scatters alike on both sides.
+        self._variance = (1.0 - share) * (self._variance + (1.0 if settling else 2.0) * share * difference**2)

@@ -1,0 +1,287 @@
+"""Tracking in action space: an arm followed as action, parameters and progress (thesis 6.3 and 6.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.action_space.estimates import (
+    KERNEL_WIDTHS,
+    ThetaEstimate,
+    action_probabilities,
+    best_pose,
+    hand_covariance,
+    mean_pose,
+    refined_pose,
+    tau_histogram,
+    theta_estimate,
+)
+from paramove.action_space.grammar import Grammar
+from paramove.action_space.particle_filter import FilterOptions, Measurement, ParticleFilter, effective_number
+from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.progress_jumps import ProgressJumps
+from paramove.action_space.propagation import THESIS_RATE_HZ, Propagation, PropagationOptions, per_step
+from paramove.action_space.reached_place import ReachedPlace, reached_place
+from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
+from paramove.action_space.track_health import HealthOptions, TrackHealth
+from paramove.action_space.vocabulary import Vocabulary
+from paramove.input_error import InputError
+from paramove.observation.presence import Presence
+
+Floats = NDArray[np.float64]
+Measure = Callable[[Floats], Floats | None]
+
+
+@dataclass(frozen=True)
+class TrackerOptions:
+    """All options of a tracker.
+
+    Attributes:
+        filter, propagation, detection, health: of these parts.
+        histogram_bins: of the histogram over progress.
+        longest_gap_s: after a longer time without a frame the arm may be anywhere.
+        lost_kept: share of the particles that go on when the arm is lost, should the loss be an error.
+        lost_renewed: share of the particles that begin again in each frame (at 8 Hz) while the arm is lost.
+        lost_anywhere: share of these that begin anywhere, the others in the base pose.
+        explored: share of the particles that is moved anywhere in each frame (at 8 Hz): a grammar may have led all of
+            them to an action that is not performed.
+    """
+
+    filter: FilterOptions = field(default_factory=FilterOptions)
+    propagation: PropagationOptions = field(default_factory=PropagationOptions)
+    detection: DetectionOptions = field(default_factory=DetectionOptions)
+    health: HealthOptions = field(default_factory=HealthOptions)
+    histogram_bins: int = 20
+    longest_gap_s: float = 1.5
+    lost_kept: float = 0.25
+    lost_renewed: float = 0.3
+    lost_anywhere: float = 0.5
+    explored: float = 0.05
+
+
+@dataclass(frozen=True)
+class ActionBelief:
+    """What is known after a frame; places in the world, m.
+
+    Attributes:
+        time_s: of the frame.
+        actions: posterior probability of each action (6.8).
+        theta: parameters of each action that has particles (6.10), (6.11).
+        targets: place of the mean parameters of each action that has particles, (3,).
+        tau_histogram: posterior over progress, all bins sum to 1; one row an action, in the order of `actions`.
+        pose: refined (6.18), (9,). pose_best: (6.16), (9,).
+        hand_covariance: of the hand's place, m^2, (3, 3).
+        effective_sample_size: effective number of particles.
+        temper: exponent of the likelihood; below 1 it was flattened.
+        log_likelihood: of the best particle, nats; NaN without a usable view.
+        contact: posterior probability that the hand is at a place of its action.
+        lost: whether the arm is lost. degraded: whether there was no usable view.
+        sentence: what is wrong and what it costs; "" if nothing is.
+        target: the latest target that the hand reached.
+    """
+
+    time_s: float
+    actions: dict[str, float]
+    theta: dict[str, ThetaEstimate]
+    targets: dict[str, Floats]
+    tau_histogram: Floats
+    pose: Floats
+    pose_best: Floats
+    hand_covariance: Floats
+    effective_sample_size: float
+    temper: float
+    log_likelihood: float
+    contact: float
+    lost: bool = False
+    degraded: bool = False
+    sentence: str = ""
+    target: DetectedTarget | None = field(default=None)
+
+    @property
+    def action(self) -> str:
+        """The most probable action."""
+        return max(self.actions, key=lambda name: self.actions[name])
+
+
+class ActionTracker:
+    """Follows one arm. The same seed and the same measurements give the same beliefs.
+
+    Attributes:
+        filter: the particles. health: how often the arm was lost. detector: of targets. progress_jumps: how often the
+            believed progress jumped.
+    """
+
+    def __init__(
+        self, vocabulary: Vocabulary, grammar: Grammar, placement: PersonPlacement | None = None,
+        options: TrackerOptions | None = None, seed: int = 0
+    ) -> None:  # fmt: skip
+        self.vocabulary = vocabulary
+        self.placement = placement if placement is not None else PersonPlacement()
+        self.options = options if options is not None else TrackerOptions()
+        propagation = Propagation(vocabulary, grammar, self.options.propagation)
+        self.filter = ParticleFilter(propagation, self.options.filter, seed)
+        self.health = TrackHealth(self.options.health)
+        self.detector = TargetDetector(self.options.detection)
+        self.progress_jumps = ProgressJumps()
+        self._belief: ActionBelief | None = None
+        self._blind_since_s: float | None = None
+        self._just_lost = False
+
+    @property
+    def belief(self) -> ActionBelief | None:
+        """What was believed after the latest frame; None before the first."""
+        return self._belief
+
+    def update(
+        self, time_s: float, measure: Measure, presence: Callable[[Floats], Presence] | None = None
+    ) -> ActionBelief:
+        """One frame.
+
+        Args:
+            time_s: of its capture. A frame that is not later than the one before is left out.
+            measure: log-likelihoods (M,), nats, of poses (M, 9) in the world; None, values that are all equal or not
+                finite say that nothing could be seen.
+            presence: what speaks for an arm in a pose (9,) in the world being seen at all.
+        """
+        last = self._belief
+        if last is not None and not time_s > last.time_s:
+            return replace(last, sentence=f"a frame {last.time_s - time_s:.3f} s older than the last was left out")
+        elapsed_s = 0.0 if last is None else time_s - last.time_s
+        self._renew(elapsed_s)
+        self.filter.select()
+        if elapsed_s > 0.0:
+            if self._blind_since_s is None:
+                self.filter.explore(per_step(self.options.explored, min(THESIS_RATE_HZ * elapsed_s, 1.0)))
+            self.filter.predict(min(elapsed_s, self.options.longest_gap_s))
+        likelihoods = self._usable(measure(self.placement.in_world(self.filter.particles.poses)))
+        measured = (
+            None
+            if likelihoods is None
+            else self.filter.measure(likelihoods, self.options.filter.independence(elapsed_s))
+        )
+        self._judge(time_s, elapsed_s, measured, presence)
+        self._belief = self._estimates(time_s, measured)
+        self._count_jumps(elapsed_s)
+        return self._belief
+
+    def _renew(self, elapsed_s: float) -> None:
+        """Particles where the arm could be, if it is not known."""
+        options = self.options
+        if elapsed_s > options.longest_gap_s:
+            self.filter.begin_again(options.lost_anywhere)
+            self.detector.forget()
+        elif self._just_lost:
+            self.filter.begin_again(options.lost_anywhere, 1.0 - options.lost_kept)
+        elif self.health.lost and self._blind_since_s is None:
+            frames = min(8.0 * elapsed_s, 1.0)
+            self.filter.begin_again(options.lost_anywhere, 1.0 - (1.0 - options.lost_renewed) ** frames)
+        self._just_lost = False
+
+    def _usable(self, found: Floats | None) -> Floats | None:
+        """Log-likelihoods that say something, else None. Raises InputError for a wrong number of them."""
+        if found is None:
+            return None
+        values = np.asarray(found, dtype=np.float64)
+        n_particles = len(self.filter.particles)
+        if values.shape != (n_particles,):
+            raise InputError(f"expected one log-likelihood for each of {n_particles} poses, found shape {values.shape}")
+        values = np.where(np.isnan(values) | np.isposinf(values), -np.inf, values)
+        finite = values[np.isfinite(values)]
+        return None if len(finite) == 0 or (len(finite) == len(values) and np.ptp(finite) == 0.0) else values
+
+    def _judge(
+        self,
+        time_s: float,
+        elapsed_s: float,
+        measured: Measurement | None,
+        presence: Callable[[Floats], Presence] | None,
+    ) -> None:
+        if measured is None:
+            self._blind_since_s = time_s if self._blind_since_s is None else self._blind_since_s
+            return
+        self._blind_since_s = None
+        was_lost, particles = self.health.lost, self.filter.particles
+        pose = self.placement.in_world(mean_pose(particles.poses, particles.weights))
+        present = None if presence is None else presence(pose)
+        self.health.update(time_s, elapsed_s, measured.best, measured.temper, present)
+        if self.health.lost and not was_lost:
+            self._just_lost = True
+            self.detector.forget()
+
+    def _estimates(self, time_s: float, measured: Measurement | None) -> ActionBelief:
+        particles, placement = self.filter.particles, self.placement
+        action = self.filter.propagation.actions[particles.step]
+        probabilities = action_probabilities(action, particles.weights, len(self.vocabulary))
+        theta, targets = self._theta(action)
+        average = mean_pose(particles.poses, particles.weights)
+        best = average if measured is None else best_pose(particles.poses, particles.weights)
+        reached = reached_place(self.vocabulary, action, particles)
+        widths = tuple(width / placement.scale for width in KERNEL_WIDTHS)
+        belief = ActionBelief(
+            time_s=time_s,
+            actions=dict(zip(self.vocabulary.names, map(float, probabilities), strict=True)),
+            theta=theta,
+            targets=targets,
+            tau_histogram=tau_histogram(
+                action, particles.tau, particles.weights, len(self.vocabulary), self.options.histogram_bins
+            ),
+            pose=placement.in_world(refined_pose(particles.poses, particles.weights, best, widths)),
+            pose_best=placement.in_world(best),
+            hand_covariance=placement.scale**2 * hand_covariance(particles.poses, particles.weights),
+            effective_sample_size=effective_number(particles.weights),
+            temper=1.0 if measured is None else measured.temper,
+            log_likelihood=float("nan") if measured is None else measured.best,
+            contact=0.0 if reached is None else reached.contact,
+            lost=self.health.lost,
+            degraded=measured is None,
+            sentence=self._sentence(time_s),
+        )
+        return replace(belief, target=self._target(belief, reached))
+
+    def _count_jumps(self, elapsed_s: float) -> None:
+        if self._belief is None or self._belief.lost or self._belief.degraded:
+            return
+        particles, name = self.filter.particles, self._belief.action
+        number = self.vocabulary.index(name)
+        rows = self.filter.propagation.actions[particles.step] == number
+        advance = elapsed_s / self.vocabulary.actions[number].duration_s
+        self.progress_jumps.update(name, particles.tau[rows], particles.weights[rows], advance)
+
+    def _theta(self, action: NDArray[np.int64]) -> tuple[dict[str, ThetaEstimate], dict[str, Floats]]:
+        """Parameters and targets of the actions that have particles."""
+        particles, theta, targets = self.filter.particles, {}, {}
+        for number, model in enumerate(self.vocabulary.actions):
+            rows = (action == number) & (particles.weights > 0.0)
+            if rows.any():
+                found = theta_estimate(particles.theta[rows, : model.n_parameters], particles.weights[rows])
+                theta[model.name] = found
+                targets[model.name] = self.placement.in_world(model.target(found.mean))
+        return theta, targets
+
+    def _target(self, belief: ActionBelief, reached: ReachedPlace | None) -> DetectedTarget | None:
+        if belief.lost or belief.degraded or self.health.absence:
+            return self.detector.latest
+        hand = belief.pose[-3:]
+        if reached is None:
+            return self.detector.passed(belief.time_s, hand)
+        place = self.placement.in_world(reached.place)
+        return self.detector.update(belief.time_s, hand, reached.contact, reached.action, reached.theta, place)
+
+    def _sentence(self, time_s: float) -> str:
+        if self._blind_since_s is not None:
+            blind_s = time_s - self._blind_since_s
+            return (
+                f"no usable view for {blind_s:.1f} s: pose and progress are predicted only and become less certain, "
+                "and no target is detected"
+            )
+        if self.health.lost_since_s is not None:
+            shortfall, count = self.health.shortfall, len(self.filter.particles)
+            cause = self.health.absence or f"the best of {count} hypotheses is {shortfall:.1f} nats below the usual"
+            return (
+                f"the arm is lost since {time_s - self.health.lost_since_s:.1f} s, {cause}: pose and target are "
+                "guesses and no target is detected until the arm is found in its base pose or elsewhere"
+            )
+        return ""

@@ -1,0 +1,109 @@
+"""Models for tracking, from demonstrations (thesis 6.4.1 with the settings of 4.1.2)."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from platformdirs import user_cache_path
+
+from paramove.action_space.vocabulary import POSE_SIZE, ActionModel, table_target
+from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
+from paramove.demonstrations.reaching import DEMONSTRATOR_VERSION
+from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
+from paramove.hmm import TrainingOptions
+from paramove.input_error import InputError
+from paramove.observation.arm_body import POSE_POINTS
+from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM, QuadraticPHMM
+
+Floats = NDArray[np.float64]
+logger = logging.getLogger(__name__)
+
+STATES = 80
+TRACKED_POINTS = ("shoulder", "elbow", "index")
+"""Of the demonstrated body points; the tip of the index finger is the end of the hand."""
+
+
+def arm_poses(sequence: ArrayLike, point_names: Sequence[str] = POINT_NAMES) -> Floats:
+    """Poses (T, 9) of body points (T, 3 n); poses (T, 9) stay as they are. Raises InputError for missing points."""
+    points = np.asarray(sequence, dtype=np.float64)
+    if points.ndim == 2 and points.shape[1] == POSE_SIZE:
+        return points
+    missing = [name for name in TRACKED_POINTS if name not in point_names]
+    if missing or points.ndim != 2 or points.shape[1] != 3 * len(point_names):
+        raise InputError(
+            f"expected poses (T, {POSE_SIZE}) or body points (T, {3 * len(point_names)}) with "
+            f"{', '.join(TRACKED_POINTS)}, found shape {points.shape} of {', '.join(point_names)}"
+        )
+    chosen = [point_names.index(name) for name in TRACKED_POINTS]
+    return np.ascontiguousarray(points.reshape(len(points), -1, 3)[:, chosen].reshape(len(points), POSE_SIZE))
+
+
+def train_action(
+    shown: Demonstrations, *, n_states: int = STATES, kind: type[PolynomialPHMM] = QuadraticPHMM
+) -> PolynomialPHMM:
+    """A polynomial PHMM of arm poses, its states 2 or 3 frames long after resampling, its theta that of `shown`.
+
+    The residuals are "independent": a tracker needs how a frame deviates from its state, not how to estimate theta
+    from whole movements.
+    """
+    sequences = [arm_poses(sequence, shown.description.point_names or POINT_NAMES) for sequence in shown.sequences]
+    model = kind(n_states, 2, 3, resampled_frames=round(2.5 * n_states), residuals="independent")
+    model.options = TrainingOptions(floor_deviation=0.002)
+    model.description = replace(shown.description, point_names=POSE_POINTS)
+    return model.fit(sequences, shown.theta)
+
+
+def cached_action(
+    name: str, source: str, show: Callable[[], Demonstrations], *, n_states: int = STATES,
+    kind: type[PolynomialPHMM] = QuadraticPHMM, folder: Path | None = None,
+    target: Callable[[Floats], Floats] = table_target,
+) -> ActionModel:  # fmt: skip
+    """The action of a model that is kept in a folder, by default the user's cache, once it is trained.
+
+    Args:
+        name: of the action. source: where the demonstrations come from; another source is another file.
+        show: makes the demonstrations; called only if there is no model of that source.
+        target: see `ActionModel`.
+    """
+    told = f"{source}, {kind.__name__}, {n_states} states"
+    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
+    path = kept_in / f"{name}_{crc32(told.encode()):08x}.npz"
+    if path.exists():
+        try:
+            stored = PolynomialPHMM.load(path)
+            if stored.description is not None and stored.description.source == told:
+                return ActionModel.from_file_model(stored, target)
+        except (ModelFileError, InputError) as error:
+            logger.warning("training again, the cached model does not fit: %s", error)
+    model = train_action(show(), n_states=n_states, kind=kind)
+    assert model.description is not None
+    model.description = replace(model.description, action=name, source=told)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        model.save(path)
+    except OSError as error:
+        logger.warning("the trained model is not kept: %s", error)
+    return ActionModel.from_file_model(model, target)
+
+
+def table_action_demonstrations(
+    action: Action, seed: int = 0, *, columns: int = 5, rows: int = 3, repetitions: int = 4
+) -> Demonstrations:
+    """The synthetic demonstrator reaches for or points at a raster of the table, labelled with (u, v)."""
+    targets, places = table_targets(columns, rows)
+    shown = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
+    duration = float(np.mean([len(sequence) - 1 for sequence in shown.sequences]) / SAMPLE_RATE_HZ)
+    told = MovementDescription(action, POINT_NAMES, "m", FRAME, ("u", "v"), duration, rate_hz=SAMPLE_RATE_HZ)
+    return Demonstrations(shown.sequences, np.repeat(places, repetitions, axis=0), told)
+
+
+def table_action(action: Action = "pointing", seed: int = 0, folder: Path | None = None) -> ActionModel:
+    """Pointing or reaching on the table, trained with the synthetic demonstrator and kept in the user's cache."""
+    source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, 5 x 3 places, 4 repetitions"
+    return cached_action(action, source, lambda: table_action_demonstrations(action, seed), folder=folder)

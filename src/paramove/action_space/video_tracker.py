@@ -1,0 +1,169 @@
+"""A person's arm tracked in the images of calibrated cameras: images in, what is believed of the arm out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.action_space.tracker import ActionBelief, ActionTracker
+from paramove.observation.arm_observer import ArmObserver
+from paramove.observation.cameras import CalibratedCamera
+from paramove.vision.aligned_views import AlignedViews, Views
+from paramove.vision.camera_watch import CameraWatch
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+LEAST_SHARPNESS = 3.0
+"""Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above
+10."""
+
+
+@dataclass(frozen=True)
+class TrackedMoment:
+    """What is believed of one moment.
+
+    Attributes:
+        captured_ns: Of the images.
+        belief: What the filter believes.
+        outline: Of the believed arm in the first camera's image as captured, (N, 2) px.
+        ball: Where the believed target is seen in that image, (2,) px; NaN if it is not in front of the camera.
+        pointed: The believed target, (3,), m, in the world.
+        pointed_deviation, target_deviation: Along each axis, (3,), m, of `pointed` and of the detected target; the
+            latter zeros if none is detected.
+        n_views: How many cameras told of this moment.
+        trouble: A sentence about cameras that told nothing of use; "" if all did.
+    """
+
+    captured_ns: int
+    belief: ActionBelief
+    outline: Floats
+    ball: Floats
+    pointed: Floats
+    pointed_deviation: Floats
+    target_deviation: Floats
+    n_views: int
+    trouble: str
+
+
+def believed(tracker: ActionTracker, observer: ArmObserver, time_s: float) -> ActionBelief:
+    """The belief after the images that the observer looks at; the observer learns the background beside that arm."""
+    last = tracker.belief
+    belief = tracker.update(time_s, observer.log_likelihoods, observer.presence)
+    if tracker.health.absence or not (belief.lost or belief.degraded):  # what has come to stay is learned slowly
+        observer.learn(belief.pose, 0.0 if last is None else time_s - last.time_s)
+    return belief
+
+
+class VideoTracker:
+    """Brings the images of one moment together and lets the filter judge them.
+
+    Args:
+        tracker: The filter.
+        observer: Compares postures with images; its cameras are `cameras`.
+        cameras: As calibrated, in the order of the observer.
+        period_s: Time between two images of a camera, s.
+    """
+
+    def __init__(
+        self, tracker: ActionTracker, observer: ArmObserver, cameras: Sequence[CalibratedCamera], period_s: float
+    ) -> None:
+        self._tracker = tracker
+        self._observer = observer
+        self._cameras = {camera.name: camera for camera in cameras}
+        self._views = AlignedViews(list(self._cameras), period_s)
+        self._started_ns: int | None = None
+        self._watch = CameraWatch(cameras)
+        self._dark: list[str] = []
+        self._unsure = ""
+
+    def warm_up(self) -> None:
+        """Does everything that is compiled once, so that the first image does not wait for a compiler."""
+        noise, first = np.random.default_rng(0), next(iter(self._cameras.values()))
+        trial = ArmObserver(self._observer.sizes, [first], self._observer.options, table=self._observer.table)
+        moved = self._tracker.filter.propagation.predicted(self._tracker.filter.particles, 0.1, noise)
+        poses = self._tracker.placement.in_world(moved.poses)
+        for _ in range(2):  # the second image is compared with what was learned from the first
+            trial.look([noise.integers(0, 255, (first.height_px, first.width_px, 3), dtype=np.uint8)])
+            trial.log_likelihoods(poses)
+            trial.learn(poses[0], 0.1)
+        trial.outline(poses[0], 0)
+
+    @property
+    def cameras(self) -> tuple[str, ...]:
+        """Names of the cameras."""
+        return tuple(self._cameras)
+
+    @property
+    def parameter_names(self) -> dict[str, tuple[str, ...]]:
+        """Of each action."""
+        return {action.name: action.parameter_names for action in self._tracker.vocabulary.actions}
+
+    def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[TrackedMoment]:
+        """The moments that this image completes. An image of another size than calibrated counts as none."""
+        if self._watch.accepts(camera, captured_ns, image):
+            for views in self._views.add(camera, captured_ns, image):
+                yield self._tracked(views)
+
+    def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
+        """An image that could not even be read."""
+        self._watch.refuse(camera, captured_ns, why)
+
+    def tick(self, now_ns: int) -> None:
+        """Time has passed, with images or without."""
+        self._watch.tick(now_ns)
+
+    def trouble(self) -> str:
+        """What keeps images from being used, and what is not known of the arm; "" if all is well."""
+        return "; ".join(part for part in (*self._watch.troubles(), *self._dark, self._unsure) if part)
+
+    @property
+    def kind_of_trouble(self) -> tuple[str, ...]:
+        """Changes when `trouble` is another one, not while its numbers change."""
+        belief = self._tracker.belief
+        lost = belief is not None and belief.lost
+        return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._unsure else ()))
+
+    def _tracked(self, views: Views) -> TrackedMoment:
+        self._started_ns = views.captured_ns if self._started_ns is None else self._started_ns
+        self._dark = self._look(views.images)
+        time_s = (views.captured_ns - self._started_ns) * 1e-9
+        belief = believed(self._tracker, self._observer, time_s)
+        self._unsure = belief.sentence
+        first = next(iter(self._cameras.values()))
+        theta, found = belief.theta[belief.action], belief.target
+        pointed = belief.targets[belief.action]
+        return TrackedMoment(
+            captured_ns=views.captured_ns,
+            belief=belief,
+            outline=self._observer.outline(belief.pose, 0),
+            ball=first.project(pointed),
+            pointed=pointed,
+            pointed_deviation=self._deviation(belief.action, theta.mean, theta.covariance),
+            target_deviation=np.zeros(3)
+            if found is None
+            else self._deviation(found.action, found.theta, found.covariance),
+            n_views=sum(self._observer.seen),
+            trouble="; ".join([*(f"{name} is silent" for name in views.silent), *self._dark, *self._watch.refused()]),
+        )
+
+    def _look(self, images: Sequence[Image | None]) -> list[str]:
+        """Gives the observer the images in which there are edges; sentences about the others."""
+        self._observer.look(images)
+        dark = self._observer.sharpness < LEAST_SHARPNESS  # NaN, for a missing view, is not below
+        if not dark.any():
+            return []
+        self._observer.look([None if bad else image for bad, image in zip(dark, images, strict=True)])
+        names = [name for bad, name in zip(dark, self._cameras, strict=True) if bad]
+        return [f"{name} shows nothing: take off the lens cap or switch on the light" for name in names]
+
+    def _deviation(self, action: str, theta: Floats, covariance: Floats) -> Floats:
+        """Of the place where the action leads, along each axis, (3,), m, by its slope in theta."""
+        vocabulary, step = self._tracker.vocabulary, 1e-3
+        target = vocabulary.actions[vocabulary.index(action)].target
+        slopes = (target(theta + step * np.eye(len(theta))) - target(theta)) / step * self._tracker.placement.scale
+        result: Floats = np.sqrt(np.einsum("pi,pq,qi->i", slopes, covariance, slopes))
+        return result

@@ -1,0 +1,239 @@
+"""The actions that a tracker knows: parametric HMMs of the arm pose, as tables for many particles (thesis 6.4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.action_space.pose_kernels import write_polynomial_poses, write_tabled_poses
+from paramove.demonstrations import table_place
+from paramove.hmm import LeftRightHMM
+from paramove.input_error import InputError
+from paramove.observation.arm_body import POSE_POINTS
+from paramove.phmm import ParametricHMM, PolynomialPHMM
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+POSE_SIZE = 3 * len(POSE_POINTS)
+THETA_BOUNDS = (-0.2, 1.2)
+PLACE_SIZE = 2
+"""Components of one place (u, v); theta is one or more places, the last of which is where the hand goes."""
+LEAST_APART = 0.15
+"""Of the progress: nearer moments are alike because they are near, not because one mirrors the other."""
+ALIKE = 0.10
+"""m, root mean square over the three points of a pose: poses as near as that may be taken for each other."""
+
+
+class PoseModel(Protocol):
+    """What is needed of a parametric HMM."""
+
+    def state_means(self, theta: ArrayLike) -> Floats:
+        """Means of all states for theta (M, P). Shape (M, N, D)."""
+        ...
+
+    def at(self, theta: ArrayLike) -> LeftRightHMM:
+        """The HMM for theta (P,)."""
+        ...
+
+
+def table_target(theta: Floats) -> Floats:
+    """Place on the table (..., 3), m, in the model's frame, of the last two components (u, v) of theta (..., P)."""
+    return table_place(theta[..., -PLACE_SIZE:])
+
+
+@dataclass(frozen=True)
+class ActionModel:
+    """One action a: poses for any theta and progress tau.
+
+    Attributes:
+        name: of the action.
+        model: of 9-D poses (shoulder, elbow, hand; m, frame of the default demonstrator's table).
+        duration_s: mean duration T_a.
+        parameter_names: one for each of the P components of theta, two components a place.
+        bounds: theta stays within, (least, greatest) for every component.
+        target: where the hand goes for theta (..., P), (..., 3), m, in the frame of the model.
+        kept_variance: share of the variance of a pose that its deviation carries; the fewer components, the better
+            few particles cover them. 1.0 keeps all, as (6.3).
+    """
+
+    name: str
+    model: PoseModel
+    duration_s: float
+    parameter_names: tuple[str, ...] = ("u", "v")
+    bounds: tuple[float, float] = THETA_BOUNDS
+    target: Callable[[Floats], Floats] = field(default=table_target, repr=False)
+    kept_variance: float = 0.995
+
+    def __post_init__(self) -> None:
+        """Raises InputError for a duration, bounds or a model that cannot be those of an action."""
+        if not (np.isfinite(self.duration_s) and self.duration_s > 0.0):
+            raise InputError(f"action {self.name!r}: a duration is positive, found {self.duration_s} s")
+        if not self.parameter_names or len(self.parameter_names) % PLACE_SIZE:
+            raise InputError(
+                f"action {self.name!r}: theta is one or more places of {PLACE_SIZE} components, found the parameters "
+                f"{list(self.parameter_names)}"
+            )
+        found = self.state_means(self.centre[None]).shape[1:]
+        if len(found) != 2 or found[1] != POSE_SIZE:
+            raise InputError(
+                f"action {self.name!r}: expected a model of {POSE_SIZE} numbers a frame (x, y, z of "
+                f"{', '.join(POSE_POINTS)}), found {found[-1]}; paramove.action_space.training makes one"
+            )
+
+    @classmethod
+    def from_file_model(cls, model: ParametricHMM, target: Callable[[Floats], Floats] = table_target) -> Self:
+        """From a trained model whose description names action, parameters and duration. Raises InputError without."""
+        told = model.description
+        if told is None or told.duration <= 0.0:
+            raise InputError("expected a model whose description tells action and duration, found none")
+        bounds = model.parameter_bounds_
+        size = PLACE_SIZE if bounds is None else bounds.shape[1]
+        names = told.parameter_names or ("u", "v")
+        if len(names) != size:
+            raise InputError(f"action {told.action!r}: expected {size} names of parameters, found {list(names)}")
+        return cls(told.action, model, told.duration, names, target=target)
+
+    @property
+    def n_parameters(self) -> int:
+        """P."""
+        return len(self.parameter_names)
+
+    @property
+    def n_deviations(self) -> int:
+        """R, components of a deviation."""
+        return int(self.factors.shape[2])
+
+    @property
+    def centre(self) -> Floats:
+        """The middle theta, (P,)."""
+        return np.full(self.n_parameters, 0.5)
+
+    def state_means(self, theta: Floats) -> Floats:
+        """Means of all states for theta (M, P). Shape (M, N, 9)."""
+        return np.asarray(self.model.state_means(theta), dtype=np.float64)
+
+    @cached_property
+    def factors(self) -> Floats:
+        """F_i of each state: F_i z with standard normal z (R,) has the covariance (6.3). Shape (N, 9, R).
+
+        Symmetric roots, which change as smoothly as the covariances, times the directions that vary most on average;
+        interpolated like the means. The covariances are those of the middle theta.
+        """
+        covariances = np.asarray(self.model.at(self.centre).covariances_, dtype=np.float64)
+        values, vectors = np.linalg.eigh(covariances)
+        roots = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+        pooled, directions = np.linalg.eigh(covariances.mean(axis=0))
+        shares = np.cumsum(pooled[::-1]) / max(float(pooled.sum()), 1e-300)
+        n_kept = min(int(np.searchsorted(shares, self.kept_variance - 1e-12)) + 1, len(pooled))
+        return np.ascontiguousarray(roots @ directions[:, ::-1][:, :n_kept])
+
+    @cached_property
+    def middle_means(self) -> Floats:
+        """State means of the middle theta, (N, 9)."""
+        return np.asarray(self.state_means(self.centre[None])[0])
+
+    @cached_property
+    def mirrored(self) -> Floats:
+        """For each state the progress at which the way back looks like the way out, or the reverse; -1: none. (N,)."""
+        n_states = len(self.middle_means)
+        apart = np.linalg.norm(self.middle_means[:, None] - self.middle_means[None], axis=2) / np.sqrt(3.0)
+        number = np.arange(n_states)
+        apart[np.abs(number[:, None] - number) < LEAST_APART * n_states] = np.inf
+        nearest = apart.argmin(axis=1)
+        return np.asarray(np.where(apart.min(axis=1) <= ALIKE, nearest / max(n_states - 1, 1), -1.0))
+
+    @cached_property
+    def place_dependence(self) -> Floats:
+        """How much the hand of each state depends on each place of theta, 0 (not at all) to 1 (most). (P / 2, N)."""
+        sizes = np.zeros((self.n_parameters // PLACE_SIZE, len(self.middle_means)))
+        for component in range(self.n_parameters):
+            step = np.zeros(self.n_parameters)
+            step[component] = 0.25
+            ends = self.state_means(np.stack([self.centre + step, self.centre - step]))
+            sizes[component // PLACE_SIZE] += ((ends[0] - ends[1])[:, -3:] ** 2).sum(axis=1)
+        sizes = np.sqrt(sizes)
+        return np.asarray(sizes / np.maximum(sizes.max(axis=1, keepdims=True), 1e-12))
+
+    def at_progress(self, table: Floats, tau: Floats) -> Floats:
+        """A table with one value per state (N,), interpolated at tau (M,)."""
+        return np.asarray(np.interp(tau, np.linspace(0.0, 1.0, len(table)), table))
+
+    def poses(self, theta: ArrayLike, tau: ArrayLike, deviation: ArrayLike | None = None) -> Floats:
+        """Mean poses (6.2), or with deviations (M, R) poses of the density (6.3). (M, P), (M,) -> (M, 9)."""
+        places = np.atleast_2d(np.asarray(theta, dtype=np.float64))
+        progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(places))
+        drawn = np.zeros((len(places), self.n_deviations)) if deviation is None else np.asarray(deviation, np.float64)
+        poses = np.empty((len(places), POSE_SIZE))
+        self.write_poses(np.arange(len(places)), places, progress, drawn, poses)
+        return poses
+
+    def write_poses(self, rows: Ints, theta: Floats, tau: Floats, deviation: Floats, poses: Floats) -> None:
+        """Writes poses[rows] (M, 9) of particles theta (M, >= P), tau (M,), deviation (M, >= R)."""
+        if isinstance(self.model, PolynomialPHMM):
+            monomials = self.model.monomials_
+            write_polynomial_poses(
+                rows, theta, tau, deviation, self.model.coefficients_, monomials.exponents, monomials.centre,
+                monomials.scale, self.factors, poses
+            )  # fmt: skip
+            return
+        means = np.ascontiguousarray(self.state_means(theta[rows, : self.n_parameters]))
+        write_tabled_poses(rows, means, tau, deviation, self.factors, poses)
+
+
+class Vocabulary:
+    """The actions, numbered in the order given.
+
+    Raises InputError for no action or two of one name.
+    """
+
+    def __init__(self, actions: Sequence[ActionModel]) -> None:
+        names = [action.name for action in actions]
+        if not names or len(set(names)) < len(names):
+            raise InputError(f"a vocabulary has one or more actions of different names, found {names}")
+        self.actions = tuple(actions)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the actions."""
+        return tuple(action.name for action in self.actions)
+
+    @cached_property
+    def n_parameters(self) -> int:
+        """Greatest P: theta of actions with fewer components is padded behind."""
+        return max(action.n_parameters for action in self.actions)
+
+    @cached_property
+    def n_deviations(self) -> int:
+        """Greatest R."""
+        return max(action.n_deviations for action in self.actions)
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+    def index(self, name: str) -> int:
+        """Number of an action."""
+        return self.names.index(name)
+
+    def poses(self, action: Ints, theta: Floats, tau: Floats, deviation: Floats) -> Floats:
+        """Poses (M, 9), m, in the frame of the models, for action (M,), theta (M, P), tau (M,), deviation (M, R)."""
+        poses = np.empty((len(action), POSE_SIZE))
+        for number, model in enumerate(self.actions):
+            rows = np.flatnonzero(action == number)
+            if len(rows):
+                model.write_poses(rows, theta, tau, deviation, poses)
+        return poses
+
+    def targets(self, action: Ints, theta: Floats) -> Floats:
+        """Where the hand goes, (M, 3), m, in the frame of the models."""
+        places = np.empty((len(action), 3))
+        for number, model in enumerate(self.actions):
+            rows = action == number
+            if rows.any():
+                places[rows] = model.target(theta[rows, : model.n_parameters])
+        return places

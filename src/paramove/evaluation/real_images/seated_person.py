@@ -1,0 +1,95 @@
+"""Where the camera stands and how large the person is, all from the first frame of the recording alone.
+
+World: x forward as the person faces, y to the person's left, z up, m; the origin is on the floor below the camera.
+Every number is fixed before any other frame is scored. Pixels are (x, y) of the 640 x 480 image; "surface" is the depth
+image there, median over 7 x 7 px.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.action_space.placement import PersonPlacement
+from paramove.demonstrations.arm import unit
+from paramove.input_error import InputError
+from paramove.observation.arm_body import ArmSizes, fitted_poses
+from paramove.observation.cameras import CalibratedCamera
+
+Floats = NDArray[np.float64]
+
+INTRINSICS = "cam_params_realsense.json"
+
+UP_IN_CAMERA = np.array([-0.0805, -0.9456, -0.3152])
+"""Normal of the floor: plane through depths of rows 300 to 478, columns 250 to 600, RANSAC to 15 mm: 2606 of 3960."""
+CAMERA_HEIGHT = 0.998
+"""m over that plane."""
+FACING = np.radians(10.0)
+"""By so much the person faces to the own left of the camera: line between the surfaces of both shoulders, (222, 70) and
+(312, 70), which is 0.32 m long."""
+SHOULDER_PX, SHOULDER_DEPTH = (228.0, 72.0), 2.23
+"""The joint: 13 px inside the outer edge of the sleeve; surface 2.18 m and 0.05 m of flesh and jacket."""
+ELBOW_PX, ELBOW_DEPTH = (213.0, 150.0), 2.19
+"""Middle of the sleeve where it bends; surface 2.15 m and 0.04 m."""
+FINGERTIP_PX, FINGERTIP_DEPTH = (238.0, 200.0), 1.97
+"""Lower end of the hand on the knee; surface 1.956 m and 0.01 m."""
+SIZES = ArmSizes(
+    upper_arm=0.28,  # of a person of 1.70 m (shoulder 0.92 m over the floor when seated, knee 0.55 m); the sleeve
+    forearm=0.25,  # foreshortens too much in frame 0 to be measured there
+    hand=0.18,
+    shoulder_radius=0.065,  # the sleeve is 30 px = 0.107 m wide at (215, 110), where the upper arm is in its middle
+    elbow_radius=0.052,
+    wrist_radius=0.040,  # cuff 25 px = 0.083 m at (225, 170)
+    hand_width=0.090,  # 31 px = 0.098 m with the fingers a little spread
+    hand_thickness=0.045,
+)
+
+
+def camera(folder: Path) -> CalibratedCamera:
+    """The camera: lens from the recording's file, without distortion, pose from the floor of frame 0.
+
+    Raises InputError where the file is missing or holds something else.
+    """
+    path = folder / INTRINSICS
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        width, height = int(told["width"]), int(told["height"])
+        matrix = np.array(told["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T  # stored column by column
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file; it tells the camera's lens", missing=True) from error
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise InputError(f"{path}: {error!r}; width, height and a 3 x 3 intrinsic_matrix expected") from error
+    return CalibratedCamera("camera_1", width, height, matrix, np.zeros(0), _camera_from_world())
+
+
+def placement(seen_by: CalibratedCamera) -> PersonPlacement:
+    """The resting shoulder and how large the arm is."""
+    return PersonPlacement.of_arm(in_world(SHOULDER_PX, SHOULDER_DEPTH, seen_by), SIZES.length)
+
+
+def resting_pose(seen_by: CalibratedCamera) -> Floats:
+    """The pose with the hand on the knee, (9,), m, in the world: the points of frame 0, fitted to the arm's lengths."""
+    seen = ((SHOULDER_PX, SHOULDER_DEPTH), (ELBOW_PX, ELBOW_DEPTH), (FINGERTIP_PX, FINGERTIP_DEPTH))
+    points = np.concatenate([in_world(pixel, depth, seen_by) for pixel, depth in seen])
+    return np.asarray(fitted_poses(points[None], SIZES)[0])
+
+
+def in_world(pixel: tuple[float, float], depth: float, seen_by: CalibratedCamera) -> Floats:
+    """The place (3,), m, of a pixel at a depth, m, along the camera's axis."""
+    ray = np.linalg.solve(seen_by.matrix, np.array([*pixel, 1.0]))
+    turn, shift = seen_by.camera_from_world[:3, :3], seen_by.camera_from_world[:3, 3]
+    return np.asarray(turn.T @ (depth * ray - shift))
+
+
+def _camera_from_world() -> Floats:
+    up = unit(UP_IN_CAMERA)
+    towards_camera = unit(np.array([0.0, 0.0, -1.0]) + up[2] * up)
+    left = np.cross(up, towards_camera)
+    forward = np.cos(FACING) * towards_camera + np.sin(FACING) * left
+    result = np.eye(4)
+    result[:3, :3] = np.stack([forward, np.cross(up, forward), up], axis=1)
+    result[:3, 3] = -CAMERA_HEIGHT * up
+    return result

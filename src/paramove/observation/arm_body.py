@@ -1,0 +1,127 @@
+"""The body of an arm: its sizes, and valid postures for poses drawn from a density (thesis 6.6.1).
+
+The upper arm is a tapered capsule from shoulder to elbow, the forearm one from elbow to wrist (the convex hulls of two
+spheres each), the hand an ellipsoid in line with the forearm, from the wrist to the tip of the index finger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.demonstrations.arm import ArmLengths, across
+from paramove.input_error import InputError
+
+Floats = NDArray[np.float64]
+
+POSE_POINTS = ("shoulder", "elbow", "hand")
+"""The three points of an arm pose, in this order; the hand is the tip of the index finger."""
+
+_DEMONSTRATOR = ArmLengths()
+_BACK_AND_DOWN = np.array([-1.0, 0.0, -1.0])
+_LEAST_BEND = 1e-9
+"""An elbow nearer than this to the line from shoulder to hand, m, tells no plane."""
+
+
+@dataclass(frozen=True)
+class ArmSizes:
+    """Sizes of a person's right arm, m; the defaults are those of the synthetic demonstrator.
+
+    Attributes:
+        upper_arm: shoulder to elbow.
+        forearm: elbow to wrist.
+        hand: wrist to the tip of the index finger, the length of the hand's ellipsoid.
+        shoulder_radius, elbow_radius, wrist_radius: of the capsules' ends.
+        hand_width: whole axis of the ellipsoid in the plane of the arm's bend.
+        hand_thickness: whole axis of the ellipsoid at right angles to that plane.
+    """
+
+    upper_arm: float = _DEMONSTRATOR.upper_arm
+    forearm: float = _DEMONSTRATOR.forearm
+    hand: float = _DEMONSTRATOR.fingertip
+    shoulder_radius: float = 0.055
+    elbow_radius: float = 0.042
+    wrist_radius: float = 0.028
+    hand_width: float = 0.080
+    hand_thickness: float = 0.040
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"{field.name} of an arm is {value}: a length above 0 m is expected")
+
+    @property
+    def lower_arm(self) -> float:
+        """Elbow to the tip of the index finger, m."""
+        return self.forearm + self.hand
+
+    @property
+    def length(self) -> float:
+        """Shoulder to the tip of the index finger of the stretched arm, m."""
+        return self.upper_arm + self.lower_arm
+
+    def scaled(self, factor: float) -> ArmSizes:
+        """The same arm, larger by `factor` in all its sizes."""
+        return ArmSizes(*(factor * getattr(self, field.name) for field in fields(self)))
+
+    @classmethod
+    def from_posture(cls, posture: ArrayLike) -> ArmSizes:
+        """Sizes from measured postures (9,) or (M, 9), m: medians of the lengths; the rest is the default's, scaled.
+
+        The forearm and the hand share the measured length from elbow to fingertip as they do in the default, and the
+        thickness of all parts grows with the length of the arm. Raises InputError for postures that are no arm's.
+        """
+        points = np.atleast_2d(np.asarray(posture, dtype=np.float64)).reshape(-1, 3, 3)
+        upper = float(np.median(np.linalg.norm(points[:, 1] - points[:, 0], axis=1)))
+        lower = float(np.median(np.linalg.norm(points[:, 2] - points[:, 1], axis=1)))
+        if not (0.1 < upper < 0.6 and 0.15 < lower < 0.9):
+            raise InputError(
+                f"a posture with {upper:.3f} m from shoulder to elbow and {lower:.3f} m from elbow to fingertip found; "
+                "an arm of 0.1 to 0.6 m and 0.15 to 0.9 m expected: are the points shoulder, elbow, fingertip, in m?"
+            )
+        default = cls()
+        share = default.forearm / default.lower_arm
+        scaled = default.scaled((upper + lower) / default.length)
+        return replace(scaled, upper_arm=upper, forearm=share * lower, hand=(1.0 - share) * lower)
+
+
+def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:
+    """The nearest postures that the arm can take (thesis 6.6.1.2). Shape (M, 9) -> (M, 9), m.
+
+    Shoulder and hand stay; the elbow moves in the plane of the three points, on its side of the line from shoulder to
+    hand, to where both lengths hold. A hand out of reach leaves the arm stretched towards it; one too near to the
+    shoulder moves out along the same line. Where the three points lie on a line, the elbow bends back and down. A
+    pose with NaN or infinity becomes NaN. Raises InputError for another shape.
+    """
+    points = np.asarray(poses, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 9:
+        raise InputError(f"poses of shape {points.shape} found, (M, 9) expected: shoulder, elbow, hand")
+    points = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, np.nan)
+    shoulder, elbow, hand = points[:, 0:3], points[:, 3:6], points[:, 6:9]
+    upper, lower = sizes.upper_arm, sizes.lower_arm
+    line = hand - shoulder
+    distance = np.linalg.norm(line, axis=1)
+    axis = np.where((distance > _LEAST_BEND)[:, None], line / np.maximum(distance, _LEAST_BEND)[:, None], [1.0, 0, 0])
+    axis = np.where(np.isnan(distance)[:, None], np.nan, axis)
+    reached = np.clip(distance, abs(upper - lower), upper + lower)
+    along = (upper**2 - lower**2 + reached**2) / (2.0 * reached) if upper != lower else reached / 2.0
+    away = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
+    bent = shoulder + along[:, None] * axis + away[:, None] * _bend(elbow - shoulder, axis)
+    tip = np.where((reached == distance)[:, None], hand, shoulder + reached[:, None] * axis)
+    return np.concatenate([shoulder, bent, tip], axis=1)
+
+
+def _bend(to_elbow: Floats, axis: Floats) -> Floats:
+    """Unit vectors at right angles to `axis` towards the elbow; back and down where the elbow lies on the axis."""
+    off = to_elbow - (to_elbow * axis).sum(axis=1, keepdims=True) * axis
+    size = np.linalg.norm(off, axis=1, keepdims=True)
+    result: Floats = off / np.maximum(size, _LEAST_BEND)
+    flat = (size < _LEAST_BEND)[:, 0]
+    if flat.any():
+        down = np.broadcast_to(_BACK_AND_DOWN, axis[flat].shape)
+        along_it = np.abs((down * axis[flat]).sum(axis=1, keepdims=True)) > 0.999 * np.linalg.norm(_BACK_AND_DOWN)
+        result[flat] = across(np.where(along_it, [1.0, 0.0, -1.0], down), axis[flat])
+    return result

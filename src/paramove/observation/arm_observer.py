@@ -1,0 +1,344 @@
+"""The likelihood of arm postures given the images of one or several cameras (thesis 6.6)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.input_error import InputError
+from paramove.observation.arm_body import ArmSizes, fitted_poses
+from paramove.observation.background import Background
+from paramove.observation.background_kernels import FULL
+from paramove.observation.cameras import CalibratedCamera
+from paramove.observation.contour_kernels import Contour, fill_segments, new_contour, place_key_points
+from paramove.observation.edge_images import EdgeImages
+from paramove.observation.edge_kernels import DIRECTIONS
+from paramove.observation.likelihood_kernels import (
+    SCRATCH,
+    matched_errors,
+    outline,
+    plain_errors,
+    silhouette,
+    strengths,
+)
+from paramove.observation.matching_kernels import match, new_shifts
+from paramove.observation.options import ObservationOptions
+from paramove.observation.presence import Presence, seen_presence
+from paramove.observation.segment_sums import LANES, NX, NY, SHARE
+from paramove.observation.silhouette_kernels import Camera, new_canvas
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+LEAST_AREA_PX = 200.0
+CHUNK = 50
+"""Most postures that a thread takes at a time: their silhouettes share one canvas."""
+
+
+@dataclass(frozen=True)
+class ContourMatch:
+    """One posture's contour in one view and where it was matched, px of the image as captured.
+
+    Attributes:
+        contour: the outline of the projected arm, (N, 2).
+        matched: the same points shifted along their normals, (N, 2).
+        shifts: s_i, px of the compared image, (N,).
+        strengths: G+ of each point, (N,), 0 to 1.
+        energy: E of (6.26).
+    """
+
+    contour: Floats
+    matched: Floats
+    shifts: Floats
+    strengths: Floats
+    energy: float
+
+
+@dataclass
+class _View:
+    """A camera, the same at the compared size, its edge images, whether it has an image now, the arm's area there."""
+
+    camera: CalibratedCamera
+    small: CalibratedCamera
+    kernel: Camera
+    edges: EdgeImages
+    background: Background | None
+    seen: bool = False
+    arm_area: float = 0.0
+
+
+class ArmObserver:
+    """Compares postures of an arm with images.
+
+    Args:
+        sizes: of the person's arm.
+        cameras: one to as many as one likes; images come in this order.
+        options: parameters of the comparison.
+        table: corners of the table's top in order, (n, 2), m, in its plane z = 0 of the world: it hides what is below.
+        threads: that share the work; as many as there are processors by default.
+    """
+
+    def __init__(
+        self,
+        sizes: ArmSizes,
+        cameras: Sequence[CalibratedCamera],
+        options: ObservationOptions | None = None,
+        *,
+        table: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> None:
+        if not cameras:
+            raise InputError("no camera given: an arm is observed by at least one")
+        self.sizes = sizes
+        self.options = options if options is not None else ObservationOptions()
+        self.threads = max(1, threads if threads is not None else len(os.sched_getaffinity(0)))
+        corners = None if table is None else np.asarray(table, dtype=np.float64)
+        if corners is not None and (corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3):
+            raise InputError(f"a table of shape {corners.shape} found, three or more corners (x, y) in m expected")
+        self.table = corners
+        self._views = [self._view(camera) for camera in cameras]
+        radii = (sizes.shoulder_radius, sizes.elbow_radius, sizes.wrist_radius)
+        self._body = np.array([sizes.forearm, sizes.hand, *radii, sizes.hand_width, sizes.hand_thickness])
+        self._unchanged = np.zeros((self.options.height_px + 2) * (self.options.width_px + 2), np.int8)
+        self._pool = ThreadPoolExecutor(self.threads, "arm_observer") if self.threads > 1 else None
+
+    def _view(self, camera: CalibratedCamera) -> _View:
+        small = camera.resized(self.options.width_px, self.options.height_px)
+        turn, shift = small.camera_from_world[:3, :3].copy(), small.camera_from_world[:3, 3].copy()
+        table = _table_seen(small, self.table)
+        kernel = Camera(turn, shift, small.matrix.copy(), small.width_px, small.height_px, table)
+        learned = self.options.region_weight > 0.0 and self.options.likelihood == "matched"
+        background = Background(small.width_px, small.height_px, self.options.still_edges) if learned else None
+        return _View(camera, small, kernel, EdgeImages(self.options), background)
+
+    @property
+    def cameras(self) -> tuple[CalibratedCamera, ...]:
+        """The cameras, in the order of the images."""
+        return tuple(view.camera for view in self._views)
+
+    @property
+    def seen(self) -> tuple[bool, ...]:
+        """Which views had an image in the last `look`."""
+        return tuple(view.seen for view in self._views)
+
+    @property
+    def sharpness(self) -> Floats:
+        """Gradient that N pixels of each view reach, grey levels per px, (V,); NaN for a missing view.
+
+        A covered or dark camera stays below about 2, whatever its noise; a lit scene has 10 and more.
+        """
+        return np.array([view.edges.sharpness if view.seen else np.nan for view in self._views])
+
+    def look(self, images: Sequence[Image | None]) -> None:
+        """Take one image of each view, (H, W, 3) uint8, RGB or BGR alike; None is a view that is missing now.
+
+        The images must have the sizes of the calibration. Lens distortion is undone here, in the image. Raises
+        InputError for another number, shape or type of images; the observer then has no image at all.
+        """
+        for view in self._views:
+            view.seen = False
+        if len(images) != len(self._views):
+            raise InputError(f"{len(images)} images found, {len(self._views)} expected, None for a missing one")
+        given = [(view, image) for view, image in zip(self._views, images, strict=True) if image is not None]
+        for view, image in given:
+            _check(view.camera, image)
+        self._run([partial(_see, view, image) for view, image in given])
+        step = -(-DIRECTIONS // self.threads)
+        self._run(
+            [
+                partial(view.edges.fill, first, min(first + step, view.edges.count))
+                for view, _ in given
+                for first in range(0, view.edges.count, step)
+            ]
+        )
+        for view, _ in given:
+            view.seen = True
+
+    def log_likelihoods(self, poses: ArrayLike) -> Floats:
+        """ln P(I | x) of postures (M, 9), m, in the world's frame, up to a constant; (M,).
+
+        Postures are fitted to the arm first. The errors of the views that have an image are added, (6.22), and
+        divided by 2 gamma^2, gamma for that many views. A view in which the arm is out of sight counts as if no edge
+        were there. A posture with NaN or infinity gets -inf. Without any image all are 0: nothing is known.
+        """
+        fitted = fitted_poses(poses, self.sizes)
+        views = [view for view in self._views if view.seen]
+        usable = np.isfinite(fitted).all(axis=1)
+        result = np.where(usable, 0.0, -np.inf)
+        if views and usable.any():
+            errors, regions = self._errors(np.ascontiguousarray(fitted[usable]), views)
+            gamma = self.options.view_gamma(len(views))
+            result[usable] = -errors.sum(axis=0) / (2.0 * gamma**2)
+            # Under the arm the background must have changed: its mean change there, of an arm as large as they are.
+            areas = regions[:, 1].mean(axis=1)
+            for view, area in zip(views, areas, strict=True):
+                view.arm_area = float(area)
+            weight = self.options.region_weight * (self.options.gamma / gamma) ** 2 / FULL
+            result[usable] += weight * (regions[:, 0] / np.maximum(areas, LEAST_AREA_PX)[:, None]).sum(axis=0)
+        return result
+
+    def change(self, view: int) -> NDArray[np.int8]:
+        """How much each pixel of the last image differs from the learned background, at the compared size, (H, W).
+
+        100 surely, -100 surely not, 0 unknown or a shadow.
+        """
+        small, background = self._views[view].small, self._views[view].background
+        flat = self._unchanged if background is None else background.change
+        return flat.reshape(small.height_px + 2, small.width_px + 2)[1:-1, 1:-1].copy()
+
+    def presence(self, pose: ArrayLike) -> Presence:
+        """What speaks for an arm in this posture, (9,), m, being seen at all; after `log_likelihoods`."""
+        fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
+        found = [
+            seen_presence(
+                fitted, view.small, view.kernel.table, view.background.change, max(view.arm_area, LEAST_AREA_PX)
+            )
+            for view in self._views
+            if view.background is not None and view.seen and np.isfinite(fitted).all()
+        ]
+        return Presence.mean(found)
+
+    def learn(self, pose: ArrayLike, elapsed_s: float) -> None:
+        """Take the images of the last `look` for the background of the arm in this posture, (9,), m.
+
+        The cameras must stand still. Call it after each image in which the arm is not lost.
+        """
+        fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
+        if not np.isfinite(fitted).all():
+            return
+        for view in self._views:
+            if view.background is None or not view.seen:
+                continue
+            hidden = np.zeros((view.small.height_px, view.small.width_px), np.uint8)
+            silhouette(fitted, self._body, view.kernel, new_canvas(view.kernel.width, view.kernel.height), hidden)
+            size = 2 * self.options.hidden_px + 1
+            hidden = np.asarray(cv2.dilate(hidden, np.ones((size, size), np.uint8)), np.uint8)
+            view.background.learn(hidden, elapsed_s)
+
+    def _errors(self, poses: Floats, views: list[_View]) -> tuple[Floats, Floats]:
+        """Mean squared error of each posture in each view, (V, M); change under it and its area, (V, 2, M)."""
+        errors, regions = np.empty((len(views), len(poses))), np.zeros((len(views), 2, len(poses)))
+        size = max(1, min(CHUNK, -(-len(poses) * len(views) // (2 * self.threads))))
+        self._run(
+            [
+                partial(self._measure, view, poses[at : at + size], row[at : at + size], region[:, at : at + size])
+                for view, row, region in zip(views, errors, regions, strict=True)
+                for at in range(0, len(poses), size)
+            ]
+        )
+        return errors, regions
+
+    def _measure(self, view: _View, poses: Floats, errors: Floats, regions: Floats) -> None:
+        intensities, distances = view.edges.intensities.reshape(-1), view.edges.distances.reshape(-1)
+        if self.options.likelihood == "simple":
+            plain_errors(poses, self._body, view.kernel, distances, errors)
+        else:
+            change = view.background.change if view.background is not None else self._unchanged
+            images = (intensities, distances)
+            matched_errors(poses, self._body, view.kernel, *images, self._numbers, change, errors, regions)
+
+    @property
+    def _numbers(self) -> tuple[float, float, float]:
+        return self.options.key_point_px, self.options.shift_unit, self.options.least_background
+
+    def _run(self, jobs: Sequence[Callable[[], None]]) -> None:
+        """Do all jobs, which release the interpreter, on the threads; what one raises is raised."""
+        if self._pool is None or len(jobs) < 2:
+            for job in jobs:
+                job()
+            return
+        for done in [self._pool.submit(job) for job in jobs]:
+            done.result()
+
+    def outline(self, pose: ArrayLike, view: int) -> Floats:
+        """The contour of the fitted arm in a view, (N, 2), px of the image as captured; (0, 2) if out of sight."""
+        contour, count = self._contour(pose, view)
+        return self._captured(view, np.stack([contour.x[:count], contour.y[:count]], axis=1).astype(np.float64))
+
+    def match(self, pose: ArrayLike, view: int) -> ContourMatch | None:
+        """The matching of one posture in one view, as for its likelihood; None if it is out of sight.
+
+        Raises InputError if that view has no image or the likelihood is the simple one.
+        """
+        edges = self._views[view].edges
+        if not self._views[view].seen or self.options.likelihood == "simple":
+            raise InputError(f"view {view} has no image to match with, or the likelihood is 'simple'")
+        contour, count = self._contour(pose, view)
+        if count == 0:
+            return None
+        number = place_key_points(count, self.options.key_point_px, contour)
+        fill_segments(number, len(edges.distances[0]), contour)
+        shifts, values = new_shifts(number + 1), np.empty((SCRATCH, len(contour.lanes[0])), np.float32)
+        unit, least = self._numbers[1:]
+        energy = match(edges.distances.reshape(-1), edges.stride, number, count, unit, contour, shifts)
+        strengths(edges.intensities.reshape(-1), edges.stride, number, least, contour, shifts, values)
+        return self._matched(view, count, number, contour, shifts.shift, values, energy)
+
+    def _matched(
+        self, view: int, count: int, number: int, contour: Contour, s: Any, values: Any, energy: float
+    ) -> ContourMatch:
+        """The matching of a contour with the kernels' filling up of segments taken away."""
+        filled = np.arange(LANES) < np.diff(contour.starts[: number + 1])[:, None]
+        rows = contour.lanes[:, LANES : (number + 1) * LANES].reshape(-1, number, LANES)[:, filled].astype(np.float64)
+        segment = np.nonzero(filled)[0]
+        moved = (1.0 - rows[SHARE]) * s[segment] + rows[SHARE] * s[(segment + 1) % number]
+        normals = np.stack([rows[NX], rows[NY]], axis=1)
+        edge = np.stack([contour.x[:count], contour.y[:count]], axis=1) + 0.5 * normals
+        matched = edge + moved[:, None] * normals
+        strength = values[0, LANES : (number + 1) * LANES].reshape(number, LANES)[filled].astype(np.float64)
+        return ContourMatch(self._captured(view, edge), self._captured(view, matched), moved, strength, float(energy))
+
+    def _contour(self, pose: ArrayLike, view: int) -> tuple[Contour, int]:
+        kernel = self._views[view].kernel
+        fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
+        contour = new_contour(kernel.width, kernel.height)
+        if not np.isfinite(fitted).all():
+            return contour, 0
+        return contour, outline(fitted, self._body, kernel, new_canvas(kernel.width, kernel.height), contour)
+
+    def _captured(self, view: int, points: Floats) -> Floats:
+        camera, small = self._views[view].camera, self._views[view].small
+        scale = np.array([camera.width_px / small.width_px, camera.height_px / small.height_px])
+        return camera.distort((points + 0.5) * scale - 0.5)
+
+
+def _table_seen(camera: CalibratedCamera, corners: Floats | None) -> NDArray[np.uint8]:
+    """1 where the table is seen in the undistorted image, flat with one pixel of zeros about it; empty without one."""
+    if corners is None:
+        return np.zeros(0, np.uint8)
+    seen = camera.project(np.column_stack([corners, np.zeros(len(corners))]), distorted=False)
+    mask = np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint8)
+    if np.isfinite(seen).all():  # a table that reaches behind the camera is left out
+        inside = np.zeros((camera.height_px, camera.width_px), np.uint8)
+        cv2.fillPoly(inside, [np.clip(seen, -1e4, 1e4).round().astype(np.int32)], 1)
+        mask[1:-1, 1:-1] = inside
+    return mask.reshape(-1)
+
+
+def _check(camera: CalibratedCamera, image: Image) -> None:
+    if image.dtype != np.uint8 or image.shape != (camera.height_px, camera.width_px, 3):
+        raise InputError(
+            f"camera {camera.name!r}: an image of shape {image.shape} and type {image.dtype} found, "
+            f"({camera.height_px}, {camera.width_px}, 3) uint8 expected as calibrated"
+        )
+
+
+def _see(view: _View, image: Image) -> None:
+    """Scale down, undo the lens, and make the gradients."""
+    size = (view.small.width_px, view.small.height_px)
+    if image.shape[1::-1] != size:
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    smoothed = view.edges.smoothed(view.small.undistort(image))
+    if view.background is None:
+        view.edges.see(smoothed)
+        return
+    view.background.see(smoothed)
+    view.edges.see(smoothed, view.background.weights if view.background.known_share > 0.0 else None)

@@ -1,0 +1,80 @@
+"""What a fixed camera sees where no arm is: learned while the arm is tracked, and how an image differs from it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.observation.background_kernels import changes, learn
+
+Image = NDArray[np.uint8]
+
+KNOWN_AFTER_S, FOLLOWS_S, FOLLOWS_LARGE_S = 0.4, 3.0, 20.0
+LEAST_NOISE = 2.0
+"""Grey levels; a rendered or compressed image may have less."""
+SPARSE = 4
+"""Every so many pixels along each axis tell noise and brightness."""
+LOW, HIGH = 2.0, 5.0
+"""Multiples of the noise that surely are noise, and surely not."""
+BORDER_PX = 3
+"""A contour runs between what has changed and what has not: edges count so far about what has changed."""
+DISTANCE_OF_NOISE = 1.54
+"""Median length of three normally distributed numbers."""
+
+
+class Background:
+    """The background of one view at the size at which images are compared.
+
+    Attributes:
+        change: see `changes`, flat with one pixel about the image; 0 everywhere before anything is known.
+        weights: of the edges of each pixel, 0 to 1, (H, W).
+        known_share: of the pixels whose background is known.
+    """
+
+    def __init__(self, width_px: int, height_px: int, still_weight: float) -> None:
+        shape = (height_px, width_px)
+        self._image = np.zeros((*shape, 3), np.uint8)
+        self._mean = np.zeros((*shape, 3), np.float32)
+        self._known = np.zeros(shape, np.uint8)
+        self._away = np.full(shape, KNOWN_AFTER_S, np.float32)  # the first image is known at once beside the arm
+        self._still = np.zeros(shape, np.uint8)
+        self._change = np.zeros((height_px + 2, width_px + 2), np.int8)
+        self._still_weight = still_weight
+        self.known_share = 0.0
+        self.weights = np.ones(shape, np.float32)
+
+    @property
+    def change(self) -> NDArray[np.int8]:
+        """Flat, (H + 2) (W + 2)."""
+        return self._change.reshape(-1)
+
+    def see(self, image: Image) -> None:
+        """Compare an image (H, W, 3)."""
+        self._image = np.ascontiguousarray(image)
+        if self.known_share == 0.0:
+            return
+        gain, noise = self._brightness_and_noise()
+        low, high = LOW * DISTANCE_OF_NOISE * noise, HIGH * DISTANCE_OF_NOISE * noise
+        changes(self._image, self._mean, self._known, gain, low, high, self._change, self._still)
+        size = 2 * BORDER_PX + 1
+        still = cv2.erode(self._still, np.ones((size, size), np.uint8))
+        self.weights = np.where(still > 0, np.float32(self._still_weight), np.float32(1.0))
+
+    def learn(self, hidden: Image, elapsed_s: float) -> None:
+        """Take the image of the last `see` in, where `hidden` (H, W) is 0."""
+        numbers = (KNOWN_AFTER_S, FOLLOWS_S, FOLLOWS_LARGE_S)
+        learn(self._image, self._mean, self._known, self._away, hidden, self._change, elapsed_s, numbers)
+        self.known_share = float(self._known.mean())
+
+    def _brightness_and_noise(self) -> tuple[float, float]:
+        """By how much the image is brighter than the background, and the noise, grey levels; medians."""
+        every = (slice(None, None, SPARSE), slice(None, None, SPARSE))
+        known = self._known[every] > 0
+        was, now = self._mean[every][known], self._image[every][known].astype(np.float32)
+        sums = was.sum(axis=1)
+        bright = sums > 60.0
+        gain = float(np.median(now[bright].sum(axis=1) / sums[bright])) if bright.any() else 1.0
+        gain = min(max(gain, 0.5), 2.0)
+        distance = np.linalg.norm(now - gain * was, axis=1)
+        return gain, max(float(np.median(distance)) / DISTANCE_OF_NOISE, LEAST_NOISE)

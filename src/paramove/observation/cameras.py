@@ -1,0 +1,218 @@
+"""Calibrated cameras: projection, lens distortion undone, and their files (thesis D.3).
+
+The camera frame is OpenCV's: x right, y down, z forward, m. Pixel coordinates are those of pixel centres: the middle of
+the upper left pixel is (0, 0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import cv2
+import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from numpy.typing import ArrayLike, NDArray
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from scipy.spatial.transform import Rotation
+
+from paramove.input_error import InputError
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+WORLD_FRAME = "table"
+COEFFICIENTS = (0, 4, 5, 8, 12, 14)
+"""Numbers of distortion coefficients that OpenCV knows."""
+
+_MODELS = {0: "plumb_bob", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedCamera:
+    """A camera whose lens and place are known.
+
+    Attributes:
+        name: of the camera, and of its frame.
+        width_px, height_px: of its images.
+        matrix: (3, 3), px.
+        distortion: (k,), OpenCV's order k1 k2 p1 p2 k3 ...; k = 0 is a lens without distortion.
+        camera_from_world: (4, 4), m.
+
+    Raises InputError for other shapes, numbers that are not finite and rotations that are none.
+    """
+
+    name: str
+    width_px: int
+    height_px: int
+    matrix: Floats
+    distortion: Floats
+    camera_from_world: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("matrix", "distortion", "camera_from_world"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        self._check()
+
+    def _check(self) -> None:
+        here = f"camera {self.name!r}"
+        if self.width_px < 1 or self.height_px < 1:
+            raise InputError(f"{here}: {self.width_px} x {self.height_px} px found, a size above 0 expected")
+        for name, shape in (("matrix", (3, 3)), ("camera_from_world", (4, 4))):
+            if getattr(self, name).shape != shape:
+                raise InputError(f"{here}: {name} of shape {getattr(self, name).shape} found, {shape} expected")
+        if self.distortion.ndim != 1 or len(self.distortion) not in COEFFICIENTS:
+            raise InputError(f"{here}: distortion of shape {self.distortion.shape} found, {COEFFICIENTS} numbers known")
+        if not all(np.isfinite(value).all() for value in (self.matrix, self.distortion, self.camera_from_world)):
+            raise InputError(f"{here}: a number is not finite; calibrate it anew")
+        if min(self.matrix[0, 0], self.matrix[1, 1]) <= 0.0 or not np.allclose(
+            self.matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=1e-9
+        ):
+            raise InputError(f"{here}: [[fx, s, cx], [0, fy, cy], [0, 0, 1]] expected, {self.matrix.tolist()} found")
+        turn = self.camera_from_world[:3, :3]
+        is_rotation = np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=1e-5) and np.linalg.det(turn) > 0.0
+        if not is_rotation or not np.allclose(self.camera_from_world[3], [0, 0, 0, 1], rtol=0.0, atol=1e-9):
+            raise InputError(f"{here}: camera_from_world holds no rotation and translation")
+
+    def resized(self, width_px: int, height_px: int) -> CalibratedCamera:
+        """The camera of the same picture at another size; the borders of the picture stay where they are."""
+        scale = np.diag([width_px / self.width_px, height_px / self.height_px, 1.0])
+        half = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+        matrix = np.linalg.inv(half) @ scale @ half @ self.matrix
+        return replace(self, width_px=width_px, height_px=height_px, matrix=matrix)
+
+    def project(self, points: ArrayLike, *, distorted: bool = True) -> Floats:
+        """Where points of the world are seen: (..., 3), m -> (..., 2), px of the image as captured, or undistorted.
+
+        A point that is not in front of the camera is NaN.
+        """
+        in_world = np.asarray(points, dtype=np.float64)
+        in_camera = in_world @ self.camera_from_world[:3, :3].T + self.camera_from_world[:3, 3]
+        depth = np.where(in_camera[..., 2:] > 0.0, in_camera[..., 2:], np.nan)
+        normalised = in_camera[..., :2] / depth
+        pixels: Floats = normalised @ self.matrix[:2, :2].T + self.matrix[:2, 2]
+        return self.distort(pixels) if distorted else pixels
+
+    def distort(self, pixels: ArrayLike) -> Floats:
+        """Pixels of the undistorted image -> of the image as captured. Shape (..., 2), px."""
+        ideal = np.asarray(pixels, dtype=np.float64)
+        if not len(self.distortion) or not ideal.size:
+            return ideal.copy()
+        normalised = (ideal - self.matrix[:2, 2]) @ np.linalg.inv(self.matrix[:2, :2]).T
+        rays = np.concatenate([normalised, np.ones((*ideal.shape[:-1], 1))], axis=-1).reshape(-1, 1, 3)
+        captured, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.matrix, self.distortion)
+        return cast(Floats, captured.reshape(ideal.shape))
+
+    def undistort(self, image: Image) -> Image:
+        """The image (H, W) or (H, W, C) as a lens without distortion would show it; the same camera matrix."""
+        if image.shape[:2] != (self.height_px, self.width_px):
+            raise InputError(
+                f"camera {self.name!r}: an image of {image.shape[1]} x {image.shape[0]} px found, "
+                f"{self.width_px} x {self.height_px} px expected as calibrated"
+            )
+        if not len(self.distortion):
+            return image
+        return cast(Image, cv2.remap(image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+
+    @cached_property
+    def _maps(self) -> tuple[Any, Any]:
+        size = (self.width_px, self.height_px)
+        return cv2.initUndistortRectifyMap(self.matrix, self.distortion, None, self.matrix, size, cv2.CV_16SC2)
+
+    @property
+    def position(self) -> Floats:
+        """Of the camera in the world, (3,), m."""
+        turn, shift = self.camera_from_world[:3, :3], self.camera_from_world[:3, 3]
+        result: Floats = -turn.T @ shift
+        return result
+
+    def to_foxglove(self, world_frame: str = WORLD_FRAME) -> tuple[CameraCalibration, FrameTransform]:
+        """The standard messages of lens and place. Raises InputError for a lens that they cannot tell."""
+        if len(self.distortion) not in _MODELS:
+            raise InputError(
+                f"camera {self.name!r}: {len(self.distortion)} distortion coefficients have no name in the message; "
+                f"calibrate with one of {tuple(_MODELS)}"
+            )
+        calibration = CameraCalibration(
+            frame_id=self.name, width=self.width_px, height=self.height_px, D=self.distortion, K=self.matrix.ravel()
+        )
+        calibration.distortion_model = _MODELS[len(self.distortion)]
+        calibration.R.extend(np.eye(3).ravel())
+        calibration.P.extend(np.column_stack([self.matrix, np.zeros(3)]).ravel())
+        place = FrameTransform(parent_frame_id=world_frame, child_frame_id=self.name)
+        place.translation.x, place.translation.y, place.translation.z = self.position
+        quaternion = Rotation.from_matrix(self.camera_from_world[:3, :3].T).as_quat()
+        place.rotation.x, place.rotation.y, place.rotation.z, place.rotation.w = quaternion
+        return calibration, place
+
+    @classmethod
+    def from_foxglove(cls, calibration: CameraCalibration, place: FrameTransform) -> CalibratedCamera:
+        """The camera of two standard messages, `place` being its pose in the world. Raises InputError."""
+        if calibration.D and calibration.distortion_model not in _MODELS.values():
+            raise InputError(
+                f"camera {calibration.frame_id!r}: distortion model {calibration.distortion_model!r} found, "
+                f"one of {sorted(set(_MODELS.values()))} expected"
+            )
+        if len(calibration.K) != 9:
+            raise InputError(f"camera {calibration.frame_id!r}: {len(calibration.K)} numbers in K found, 9 expected")
+        turn, shift = place.rotation, place.translation
+        quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+        if not 0.99 < np.linalg.norm(quaternion) < 1.01:
+            raise InputError(f"camera {calibration.frame_id!r}: rotation {quaternion.tolist()} is no unit quaternion")
+        camera_from_world = np.eye(4)
+        camera_from_world[:3, :3] = Rotation.from_quat(quaternion).as_matrix().T
+        camera_from_world[:3, 3] = -camera_from_world[:3, :3] @ [shift.x, shift.y, shift.z]
+        matrix, lens = np.reshape(calibration.K, (3, 3)), np.array(calibration.D)
+        return cls(calibration.frame_id, calibration.width, calibration.height, matrix, lens, camera_from_world)
+
+
+def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
+    """Write a calibration file, YAML with a list `cameras`."""
+    yaml = YAML()
+    yaml.default_flow_style = None
+    listed = [
+        {
+            "name": camera.name,
+            "width_px": camera.width_px,
+            "height_px": camera.height_px,
+            "matrix": camera.matrix.tolist(),
+            "distortion": camera.distortion.tolist(),
+            "camera_from_world": camera.camera_from_world.tolist(),
+        }
+        for camera in cameras
+    ]
+    with path.open("w", encoding="utf-8") as file:
+        yaml.dump({"world_frame": WORLD_FRAME, "cameras": listed}, file)
+
+
+def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
+    """The cameras of a calibration file. Raises InputError if there is none or it holds something else."""
+    if not path.exists():
+        raise InputError(f"{path}: no calibration file there; `paramove calibrate cameras` writes one", missing=True)
+    try:
+        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is no YAML file: {error}") from error
+    listed = content.get("cameras") if isinstance(content, dict) else None
+    if not isinstance(listed, list) or not listed:
+        raise InputError(f"{path}: a list 'cameras' expected; `paramove calibrate cameras` writes one")
+    return tuple(_camera(path, number, entry) for number, entry in enumerate(listed))
+
+
+def _camera(path: Path, number: int, entry: Any) -> CalibratedCamera:
+    wanted = ("name", "width_px", "height_px", "matrix", "distortion", "camera_from_world")
+    if not isinstance(entry, dict) or set(entry) != set(wanted):
+        found = sorted(map(str, entry)) if isinstance(entry, dict) else type(entry).__name__
+        raise InputError(f"{path}: camera {number}: the keys {', '.join(wanted)} expected, {found} found")
+    try:
+        arrays = [np.array(entry[key], dtype=np.float64) for key in wanted[3:]]
+        return CalibratedCamera(str(entry["name"]), int(entry["width_px"]), int(entry["height_px"]), *arrays)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: camera {number}: {error}") from error

@@ -1,0 +1,170 @@
+"""Kernels of the contour: traced as a closed loop (thesis 6.6.2), key points, normals, segments between key points."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.hmm.compilation import compiled, compiled_arithmetic
+from paramove.observation.edge_kernels import COSINES, DIRECTIONS, MARGIN, SINES
+from paramove.observation.segment_sums import BASE, FIELDS, LANES, NX, NY, PX, PY, SHARE
+
+Bytes = NDArray[np.uint8]
+Floats32 = NDArray[np.float32]
+Ints32 = NDArray[np.int32]
+
+LEAST_POINTS = 24
+"""A shorter contour is none: the arm is as good as out of sight."""
+NORMAL_STEP = 4
+"""The normal at a point is across the line between the points so many places before and after it."""
+
+
+class Contour(NamedTuple):
+    """A contour and its segments; arrays are large enough for any contour of the image.
+
+    Attributes:
+        x, y: contour pixels in order, (N_max,).
+        starts: place of each key point in the contour, (K_max + 1,); starts[K] = N.
+        normals: outward at the key points, (2, K_max).
+        keys: the key points, (2, K_max), in the edge images' coordinates without margin.
+        lanes: of each segment, (FIELDS, (K_max + 1) LANES). Segment k is at slot k + 1; slot 0 repeats the last one, so
+            that the two segments about key point k are at slots k and k + 1.
+    """
+
+    x: Ints32
+    y: Ints32
+    starts: Ints32
+    normals: Floats32
+    keys: Floats32
+    lanes: Floats32
+
+
+@compiled
+def new_contour(width: int, height: int) -> Contour:
+    """Room for a contour in an image of this size."""
+    most = 6 * (width + height)
+    segments = most // 3
+    return Contour(
+        np.empty(most, np.int32),
+        np.empty(most, np.int32),
+        np.empty(segments + 1, np.int32),
+        np.empty((2, segments), np.float32),
+        np.empty((2, segments), np.float32),
+        np.zeros((FIELDS, (segments + 1) * LANES), np.float32),
+    )
+
+
+@compiled
+def trace(mask: Bytes, width: int, row: int, left: int, contour: Contour) -> int:
+    """Contour pixels, counterclockwise, from the first silhouette pixel of a row on; their number.
+
+    mask has one pixel of zeros about the image. `left` is a column at or before that pixel. The loop ends where its
+    first step would be repeated, so that it may pass its first pixel on the way.
+    """
+    stride = width + 2
+    steps = (-1, stride - 1, stride, stride + 1, 1, 1 - stride, -stride, -stride - 1)
+    step_x, step_y = (-1, -1, 0, 1, 1, 1, 0, -1), (0, 1, 1, 1, 0, -1, -1, -1)
+    x, y = left, row
+    place = (y + 1) * stride + x + 1
+    while x < width and mask[place] == 0:
+        x, place = x + 1, place + 1
+    if x == width:
+        return 0
+    most, count, first, first_step, turn = len(contour.x), 0, place, -1, 0
+    while count < most:
+        found = -1
+        for i in range(1, 9):
+            way = (turn + i) & 7
+            if mask[place + steps[way]] != 0:
+                found = way
+                break
+        if found < 0:  # a single pixel
+            contour.x[0], contour.y[0] = x, y
+            return 1
+        if place == first and found == first_step:
+            return count
+        if count == 0:
+            first_step = found
+        contour.x[count], contour.y[count] = x, y
+        count += 1
+        place, x, y, turn = place + steps[found], x + step_x[found], y + step_y[found], (found + 4) & 7
+    return count
+
+
+@compiled_arithmetic
+def place_key_points(count: int, spacing: float, contour: Contour) -> int:
+    """Key points every `spacing` px and their outward normals; returns K.
+
+    A contour pixel lies half a pixel inside the outline, and the edge images half a pixel up and left.
+    """
+    number = max(int(np.round(count / spacing)), (count + LANES - 1) // LANES)
+    half = np.float32(0.5)
+    for k in range(number):
+        i = (k * count) // number
+        contour.starts[k] = i
+        before, after = i - NORMAL_STEP, i + NORMAL_STEP
+        before = before + count if before < 0 else before
+        after = after - count if after >= count else after
+        along_x = np.float32(contour.x[after] - contour.x[before])
+        along_y = np.float32(contour.y[after] - contour.y[before])
+        size = np.sqrt(along_x * along_x + along_y * along_y)
+        nx = -along_y / size if size > np.float32(0.0) else np.float32(0.0)
+        ny = along_x / size if size > np.float32(0.0) else np.float32(1.0)
+        contour.normals[0, k], contour.normals[1, k] = nx, ny
+        contour.keys[0, k] = np.float32(contour.x[i]) + half * nx - half
+        contour.keys[1, k] = np.float32(contour.y[i]) + half * ny - half
+    contour.starts[number] = count
+    return number
+
+
+@compiled_arithmetic
+def fill_segments(number: int, area: int, contour: Contour) -> None:
+    """Places, normals and directions of all contour points, segment by segment.
+
+    Normals between key points are interpolated. A segment is filled up with points in the margin.
+    """
+    lanes, aside = contour.lanes, np.float32(1 - MARGIN)
+    for k in range(number):
+        after = k + 1 if k + 1 < number else 0
+        begin, length, at = contour.starts[k], contour.starts[k + 1] - contour.starts[k], (k + 1) * LANES
+        nx, ny = contour.normals[0, k], contour.normals[1, k]
+        turn_x, turn_y = contour.normals[0, after] - nx, contour.normals[1, after] - ny
+        step = np.float32(1.0) / np.float32(length)
+        for lane in range(length):
+            share = np.float32(lane) * step
+            lanes[SHARE, at + lane] = share
+            lanes[NX, at + lane], lanes[NY, at + lane] = nx + share * turn_x, ny + share * turn_y
+            lanes[PX, at + lane] = np.float32(contour.x[begin + lane])
+            lanes[PY, at + lane] = np.float32(contour.y[begin + lane])
+        for lane in range(length, LANES):
+            lanes[SHARE, at + lane] = lanes[NX, at + lane] = lanes[NY, at + lane] = np.float32(0.0)
+            lanes[PX, at + lane] = lanes[PY, at + lane] = aside
+    place_points(lanes[PX], lanes[PY], lanes[NX], lanes[NY], (number + 1) * LANES)
+    choose_directions(lanes[NX], lanes[NY], area, lanes[BASE], (number + 1) * LANES)
+    for field in range(FIELDS):
+        for lane in range(LANES):
+            lanes[field, lane] = lanes[field, number * LANES + lane]
+
+
+@compiled_arithmetic
+def place_points(px: Floats32, py: Floats32, nx: Floats32, ny: Floats32, end: int) -> None:
+    """Normals get length 1; points move half a pixel outward, half up and left, half for rounding, and the margin."""
+    half, offset = np.float32(0.5), np.float32(MARGIN)
+    for i in range(LANES, end):
+        shrink = np.float32(1.0) / np.sqrt(max(nx[i] * nx[i] + ny[i] * ny[i], np.float32(1e-6)))
+        x, y = nx[i] * shrink, ny[i] * shrink
+        nx[i], ny[i] = x, y
+        px[i] += half * x + offset
+        py[i] += half * y + offset
+
+
+@compiled_arithmetic
+def choose_directions(nx: Floats32, ny: Floats32, area: int, base: Floats32, end: int) -> None:
+    """b_i H' W' of all points: b_i is the direction most nearly parallel to the normal."""
+    for i in range(LANES, end):
+        x, y, nearest, chosen = nx[i], ny[i], np.float32(-1.0), np.float32(0.0)
+        for d in range(DIRECTIONS):
+            value = abs(x * SINES[d] + y * COSINES[d])
+            chosen = np.float32(d) if value > nearest else chosen
+            nearest = max(value, nearest)
+        base[i] = chosen * np.float32(area)

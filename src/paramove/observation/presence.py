@@ -1,0 +1,64 @@
+"""Whether an arm is seen at all where one is believed to be, by what has changed from the learned background."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.observation.background_kernels import FULL
+from paramove.observation.cameras import CalibratedCamera
+
+Floats = NDArray[np.float64]
+
+AXIS_SHARES = np.linspace(0.25, 0.95, 15)
+"""Of the line from elbow to fingertip: places at which something must be seen."""
+CHANGED = 30
+"""Of `FULL`: a pixel that has changed."""
+AROUND = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1)), axis=-1).reshape(-1, 2)
+"""Pixels (x, y) about such a place."""
+
+
+@dataclass(frozen=True)
+class Presence:
+    """Whether there is an arm at all, as far as the background is known.
+
+    Attributes:
+        there: along forearm and hand, mean over the views: 1 where something else than the background is seen, -1 where
+            nothing but the background is, 0 where it is not known.
+        changed: area in which the images differ from the background, as a multiple of the arm's; mean over the views.
+    """
+
+    there: float = 0.0
+    changed: float = 0.0
+
+    @staticmethod
+    def mean(views: Sequence[Presence]) -> Presence:
+        """Of several views; of none, nothing is known."""
+        if not views:
+            return Presence()
+        return Presence(float(np.mean([one.there for one in views])), float(np.mean([one.changed for one in views])))
+
+
+def seen_presence(
+    pose: Floats, camera: CalibratedCamera, table: NDArray[np.uint8], change: NDArray[np.int8], arm_area: float
+) -> Presence:
+    """In one view.
+
+    Args:
+        pose: shoulder, elbow, fingertip, (9,), m, world. camera: at the compared size.
+        table: 1 where the table is seen, and change: from the background; flat with one pixel about the image.
+        arm_area: px.
+    """
+    changed = np.count_nonzero(change > CHANGED) / arm_area
+    axis = pose[3:6] + AXIS_SHARES[:, None] * (pose[6:] - pose[3:6])
+    places = np.round(camera.project(axis, distorted=False))
+    size, stride = (camera.width_px, camera.height_px), camera.width_px + 2
+    inside = ((places >= 0.0) & (places < size)).all(axis=1)  # NaN, behind the camera, is not
+    at = (places[inside].astype(np.int64) + 1) @ (1, stride)
+    if len(table) > 0:
+        at = at[(table[at] == 0) | (axis[inside, 2] >= 0.0)]  # what the table does not hide
+    there = change[at[:, None] + AROUND @ (1, stride)].mean() / FULL if len(at) > 0 else 0.0
+    return Presence(float(there), float(changed))

@@ -1,0 +1,273 @@
+"""The ChArUco board that cameras are calibrated with: its squares, its markers, and how it is found in an image.
+
+The board lies on the table with the lower edge of its sheet along the table's near edge. Its corners are given in the
+frame "table": x forward (up on the sheet), y left, z up; the origin is the middle of the sheet's lower edge, which is
+one square below the chequers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.input_error import InputError
+
+Matrix = NDArray[np.float64]
+Image = NDArray[Any]  # uint8 [H, W] or [H, W, 3]
+
+COLUMNS, ROWS = 8, 5
+MARKERS = COLUMNS * ROWS // 2
+MARKER_SHARE = 0.75
+"""Side of a marker by the side of its square: its modules are an eighth of a square."""
+DICTIONARY = cv2.aruco.DICT_4X4_100
+NOMINAL_SQUARES = (0.030, 0.045)
+"""Sides of the squares, m, of boards whose markers tell their size: the first has ids 0 to 19, the second 20 to 39."""
+SIZE_UNTOLD_ID = MARKERS * len(NOMINAL_SQUARES)
+"""First id of boards with squares of any other size."""
+SQUARE_LIMITS = (0.004, 0.4)
+LEAST_CORNERS = 8
+"""A view with fewer corners tells little of the lens, and a wrong one among them would not be found."""
+LEAST_ROWS = 2
+ENOUGH_TO_BEND = 14
+"""With fewer corners a smooth bend of the board cannot be told from one that was found wrongly."""
+LEAST_MISFIT_PX = (0.3, 0.6)
+"""A corner nearer than this to where the others want it is never doubted; with a bend, and without."""
+BESIDE = 0.09
+"""Where the squares around a corner are looked at, in squares along both sides: before a marker begins."""
+LEAST_CONTRAST = 0.3
+"""Of the brighter black to the darker white square at a corner, by that of the extremes."""
+MAGNIFICATIONS = (1, 2, 3)
+LARGEST_PX = 4000
+"""A magnified image is not wider than this: markers in it are large enough, and it would take seconds."""
+AMPLE_SPACING_PX = 35.0
+"""Between neighbouring corners; where they are farther apart, magnifying finds them no better."""
+MOST_MISFIT = 0.12
+"""Of a corner to the plane's perspective, in squares. A strong wide-angle lens bends the board by 0.05."""
+
+
+class BoardError(InputError):
+    """A board that cannot be; the message says what was found and what would do."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """A board of 8 x 5 squares, the upper left one black, with markers in the white ones.
+
+    Attributes:
+        square: Side of a square, m.
+        first_id: Id of the first marker; the others follow, row by row.
+        thickness: Of the plate that the sheet is glued to, m: height of the corners above the table.
+
+    Raises BoardError for a square or thickness that no sheet has.
+    """
+
+    square: float
+    first_id: int = SIZE_UNTOLD_ID
+    thickness: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high = SQUARE_LIMITS
+        if not low <= self.square <= high:
+            raise BoardError(
+                f"squares of {self.square * 1000:g} mm found, {low * 1000:g} to {high * 1000:g} mm expected: "
+                "the side of one square, such as 30mm"
+            )
+        if not 0.0 <= self.thickness <= 0.1:
+            raise BoardError(f"a board of {self.thickness * 1000:g} mm found, 0 to 100 mm expected")
+
+    @classmethod
+    def printed(cls, square: float) -> Board:
+        """The board that is printed for squares of this side, m; its markers tell the size if it is a usual one."""
+        usual = [place for place, nominal in enumerate(NOMINAL_SQUARES) if abs(square - nominal) < 1e-6]
+        return cls(square, MARKERS * (usual[0] if usual else len(NOMINAL_SQUARES)))
+
+    @property
+    def nominal_square(self) -> float | None:
+        """Side for which boards with these ids are printed, m; None if the ids do not tell."""
+        place = self.first_id // MARKERS
+        return NOMINAL_SQUARES[place] if place < len(NOMINAL_SQUARES) else None
+
+    @property
+    def ids(self) -> NDArray[np.int32]:
+        """Ids of the markers, row by row from the upper left, [20]."""
+        return np.arange(self.first_id, self.first_id + MARKERS, dtype=np.int32)
+
+    @property
+    def opencv(self) -> Any:
+        """The same as a `cv2.aruco.CharucoBoard`: origin in the upper left corner, x right, y down, m."""
+        size = (COLUMNS, ROWS)
+        return cv2.aruco.CharucoBoard(size, self.square, MARKER_SHARE * self.square, dictionary(), self.ids)
+
+    def corners(self) -> Matrix:
+        """Inner corners of the squares, [28, 3], m, in the table frame, row by row from the upper left."""
+        return self.on_table(self.opencv.getChessboardCorners())
+
+    def on_table(self, points: NDArray[Any]) -> Matrix:
+        """Points [..., 3] of OpenCV's board frame in the table frame, m."""
+        right, down, into = np.moveaxis(points.astype(np.float64), -1, 0)
+        forward = (ROWS + 1) * self.square - down
+        left = 0.5 * COLUMNS * self.square - right
+        return np.stack([forward, left, self.thickness - into], axis=-1)
+
+
+def dictionary() -> Any:
+    """The markers' dictionary: 4 x 4 bits, as few as possible, so that they are found from afar."""
+    return cv2.aruco.getPredefinedDictionary(DICTIONARY)
+
+
+@dataclass(frozen=True)
+class BoardView:
+    """What was found of a board in one image.
+
+    Attributes:
+        name: Of the image.
+        corner_ids: Which corners, [N], ascending.
+        points: Where they are, [N, 2], px; the middle of the first pixel is 0.
+        size: Width and height of the image, px.
+        first_id: Of the board's markers.
+    """
+
+    name: str
+    corner_ids: NDArray[np.int32]
+    points: Matrix
+    size: tuple[int, int]
+    first_id: int
+
+    @property
+    def nearly_whole(self) -> bool:
+        """Whether at least nine of ten corners were found."""
+        return len(self.corner_ids) >= 0.9 * (COLUMNS - 1) * (ROWS - 1)
+
+    @property
+    def spacing_px(self) -> float:
+        """Median distance of neighbouring corners, px."""
+        between = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
+        np.fill_diagonal(between, np.inf)
+        return float(np.median(between.min(axis=1)))
+
+
+class BoardFinder:
+    """Finds the boards of `Board.printed`, whichever lies in the image."""
+
+    def __init__(self) -> None:
+        firsts = range(0, SIZE_UNTOLD_ID + 1, MARKERS)
+        self._boards = {first: Board(NOMINAL_SQUARES[0], first) for first in firsts}
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        self._markers = cv2.aruco.ArucoDetector(dictionary(), parameters)
+        expected = cv2.aruco.CharucoParameters()
+        expected.checkMarkers = False  # OpenCV's check refuses boards that are seen at a slant; `_agreeing` does not
+        expected.minMarkers = 1
+        self._detectors = {
+            first: cv2.aruco.CharucoDetector(board.opencv, expected, parameters)
+            for first, board in self._boards.items()
+        }
+
+    def find(self, image: Image, name: str = "image") -> BoardView | None:
+        """The board in an image [H, W] or [H, W, 3] uint8; None if there is none, or too little of it.
+
+        Small markers are found in a magnified image only: magnifications are tried until most of the board is found.
+        """
+        gray: Any = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        best: BoardView | None = None
+        for times in MAGNIFICATIONS:
+            if times > 1 and times * max(gray.shape) > LARGEST_PX:
+                break
+            view = self._found(gray, times, name)
+            if view is not None and (best is None or len(view.corner_ids) >= len(best.corner_ids)):
+                best = view
+            if best is not None and (times > 1 or best.spacing_px > AMPLE_SPACING_PX) and best.nearly_whole:
+                break
+        return best
+
+    def _found(self, gray: Image, times: int, name: str) -> BoardView | None:
+        large: Any = gray
+        if times > 1:
+            large = cv2.resize(gray, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC)
+        marker_corners, marker_ids, _ = self._markers.detectMarkers(large)
+        if marker_ids is None:
+            return None
+        first = _board_of(marker_ids.ravel())
+        if first is None:
+            return None
+        corners, ids, _, _ = self._detectors[first].detectBoard(
+            large, markerCorners=marker_corners, markerIds=marker_ids
+        )
+        if ids is None or len(ids) < LEAST_CORNERS:
+            return None
+        order = np.argsort(ids.ravel())
+        which = ids.ravel()[order].astype(np.int32)
+        points = (corners.reshape(-1, 2).astype(np.float64)[order] + 0.5) / times - 0.5
+        on_board = np.stack(np.divmod(which, COLUMNS - 1), axis=1)[:, ::-1].astype(np.float64)
+        kept = _crossing(gray, on_board, points)
+        if kept.sum() < LEAST_CORNERS:
+            return None
+        kept[kept] = _agreeing(on_board[kept], points[kept])
+        if kept.sum() < LEAST_CORNERS or _on_one_line(which[kept]):
+            return None
+        size = (int(gray.shape[1]), int(gray.shape[0]))
+        return BoardView(name, which[kept], points[kept], size, first)
+
+
+def _board_of(marker_ids: NDArray[np.int32]) -> int | None:
+    """First id of the board that most of the markers belong to; None if they are on no board, as those on an arm."""
+    counts = np.bincount(marker_ids // MARKERS)[: SIZE_UNTOLD_ID // MARKERS + 1]
+    return int(np.argmax(counts)) * MARKERS if counts.any() else None
+
+
+def _crossing(gray: Image, on_board: Matrix, in_image: Matrix) -> NDArray[np.bool_]:
+    """At which corners two black and two white squares meet, [N]: not where a finger hides one of them."""
+    homography, _ = cv2.findHomography(on_board, in_image, cv2.RANSAC, 3.0)
+    if homography is None:
+        return np.zeros(len(on_board), dtype=np.bool_)
+    aside = BESIDE * np.array([[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]])
+    around = cv2.perspectiveTransform((on_board[:, None] + aside).reshape(-1, 1, 2), homography).reshape(-1, 4, 2)
+    around = around + in_image[:, None] - cv2.perspectiveTransform(on_board[:, None], homography)
+    levels = cv2.remap(gray, around.astype(np.float32), np.empty(0), cv2.INTER_LINEAR).astype(np.float64)
+    even = on_board.sum(axis=1) % 2 == 0  # the upper left square is black, and so the lower right one
+    black = np.where(even[:, None], levels[:, :2], levels[:, 2:])
+    white = np.where(even[:, None], levels[:, 2:], levels[:, :2])
+    contrast = white.max(axis=1) - black.min(axis=1)
+    return np.asarray(white.min(axis=1) - black.max(axis=1) > LEAST_CONTRAST * contrast)
+
+
+def _agreeing(on_board: Matrix, in_image: Matrix) -> NDArray[np.bool_]:
+    """Which corners agree with a view of a plane, [N].
+
+    First with a perspective view, up to what a lens bends; then with one bent smoothly: what is left of the distances
+    is fitted by a quadratic of the place on the board, and what then is far off was found wrongly.
+    """
+    homography, inliers = cv2.findHomography(in_image, on_board, cv2.RANSAC, MOST_MISFIT)
+    if homography is None or inliers is None:
+        return np.zeros(len(on_board), dtype=np.bool_)
+    kept = np.asarray(inliers.ravel() > 0)
+    while kept.sum() >= LEAST_CORNERS:
+        view, _ = cv2.findHomography(on_board[kept], in_image[kept])
+        seen = cv2.perspectiveTransform(on_board[:, None], view)[:, 0]
+        x, y = (on_board - on_board.mean(axis=0)).T
+        bends = kept.sum() >= ENOUGH_TO_BEND
+        terms = np.column_stack([np.ones_like(x), x, y, *([x * x, x * y, y * y] if bends else [])])
+        weights = np.linalg.lstsq(terms[kept], (in_image - seen)[kept], rcond=None)[0]
+        misfit = np.linalg.norm(in_image - seen - terms @ weights, axis=1)
+        limit = max(LEAST_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[kept])))
+        worst = int(np.argmax(np.where(kept, misfit, 0.0)))  # one at a time, as it bends the others' fit
+        if misfit[worst] <= limit:
+            break
+        kept[worst] = False
+    return kept
+
+
+def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:
+    rows, columns = np.divmod(corner_ids, COLUMNS - 1)
+    return len(set(rows.tolist())) < LEAST_ROWS or len(set(columns.tolist())) < LEAST_ROWS
+
+
+def views_of(images: Sequence[tuple[str, Image]]) -> list[BoardView | None]:
+    """What is found in each of the named images."""
+    finder = BoardFinder()
+    return [finder.find(image, name) for name, image in images]

@@ -1,0 +1,114 @@
+"""Models of the last part of pointing and of reaching, which say whether a window of tracked points is one (paper 5.4).
+
+"A PHMM is trained for the last part of pointing movements. The recognition of the position is estimated as the most
+likely parameter of the PHMM over a recent time window of the elbow and wrist positions, which is recognized as pointing
+by simple thresholding." The threshold is on the probability that a genuine last part is so strange or stranger (thesis
+2.2.5), and reaching, which looks alike, competes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+from platformdirs import user_cache_path
+
+from paramove.demonstrations.last_parts import FRAMES, LAST_PARTS_VERSION, last_parts
+from paramove.demonstrations.synthetic import FRAME, Action
+from paramove.hmm import TrainingOptions
+from paramove.phmm import ModelFileError, MovementDescription, QuadraticPHMM
+
+Floats = NDArray[np.float64]
+logger = logging.getLogger(__name__)
+
+STATES = 8
+PERSONS = 8
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What a window of points is taken for.
+
+    Attributes:
+        theta: coordinates (u, v) on the table of the place that is pointed at, (2,). covariance: of these, (2, 2).
+        strangeness: how unlike the last part of a pointing movement.
+        typicality: probability that a genuine one is so strange or stranger.
+        log_density: of the window as pointing.
+    """
+
+    theta: Floats
+    covariance: Floats
+    strangeness: float
+    typicality: float
+    log_density: float
+
+
+class LastPartModel:
+    """The last part of pointing, and of reaching where that can be told apart.
+
+    Args:
+        pointing: of points over `FRAMES` frames, with correlated residuals.
+        reaching: the same of reaching; None where it does not compete.
+
+    Attributes:
+        duration_s: mean of the last parts of pointing that were shown.
+    """
+
+    def __init__(self, pointing: QuadraticPHMM, reaching: QuadraticPHMM | None) -> None:
+        assert pointing.description is not None
+        self._pointing = pointing
+        self._reaching = reaching
+        self.duration_s = float(pointing.description.duration)
+
+    @classmethod
+    def of_points(cls, points: Sequence[str], folder: Path | None = None) -> LastPartModel:
+        """Trained with synthetic persons and kept in a folder, by default the user's cache.
+
+        The end of the finger beside the wrist tells a pointing hand from one that grasps. Without both, reaching for a
+        thing looks like pointing a little beyond it, so it does not compete.
+        """
+        pointing = _trained("pointing", points, folder)
+        both = {"wrist", "index"} <= set(points)
+        return cls(pointing, _trained("reaching", points, folder) if both else None)
+
+    def judged(self, window: Floats) -> Judgement:
+        """Of points over time (FRAMES, 3 n), m, in the models' frame."""
+        examined = self._pointing.examine(window)
+        found = examined.estimate
+        return Judgement(found.theta, found.covariance, examined.strangeness, examined.typicality, examined.log_density)
+
+    def lead(self, window: Floats, judged: Judgement) -> float:
+        """Logarithm of a window's density as pointing over that as reaching; infinite if reaching does not compete."""
+        return np.inf if self._reaching is None else judged.log_density - self._reaching.examine(window).log_density
+
+
+def _trained(action: Action, points: Sequence[str], folder: Path | None) -> QuadraticPHMM:
+    """From the folder, or trained and kept there."""
+    source = f"last parts {LAST_PARTS_VERSION} of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
+    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
+    path = kept_in / f"last_part_{action}_{crc32(source.encode()):08x}.npz"
+    if path.exists():
+        try:
+            stored = QuadraticPHMM.load(path)
+            if stored.description is not None and stored.description.source == source:
+                return stored
+        except ModelFileError as error:
+            logger.warning("training again, the cached model does not fit: %s", error)
+    shown = last_parts(action, points, persons=PERSONS)
+    model = QuadraticPHMM(STATES, 2, 4, options=TrainingOptions(floor_deviation=0.003))
+    model.description = MovementDescription(
+        f"last part of {action}", tuple(points), "m", FRAME, ("u", "v"), shown.duration_s,
+        rate_hz=(FRAMES - 1) / shown.duration_s, source=source,
+    )  # fmt: skip
+    model.fit(shown.sequences, shown.theta, shown.groups)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        model.save(path)
+    except OSError as error:
+        logger.warning("the trained model is not kept: %s", error)
+    return model

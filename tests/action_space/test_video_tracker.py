@@ -1,0 +1,141 @@
+"""A drawn arm is followed through the images of one and two cameras, and what is wrong with them is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from paramove.action_space.setup import Person, TrackingSetup, read_person
+from paramove.action_space.video_tracker import VideoTracker
+from paramove.demonstrations import table_place
+from paramove.input_error import InputError
+from tests.action_space.drawn_arm import RATE_HZ, camera, drawn, pointing, write_setup
+
+MS = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("setup")
+
+
+@pytest.fixture(scope="module")
+def parameters(folder):
+    return write_setup(folder, 2)
+
+
+def tracker(parameters) -> VideoTracker:
+    return TrackingSetup.model_validate({**parameters, "rate_hz": RATE_HZ}).video_tracker()
+
+
+def tracked(video, times, streams):
+    moments = []
+    for time_s, *images in zip(times, *streams, strict=True):
+        for number, image in enumerate(images, start=1):
+            moments += video.see(f"camera_{number}", round(time_s * 1e9), image)
+    return moments
+
+
+def test_pointing_is_followed_to_its_target_by_two_cameras(parameters):
+    times, poses = pointing((0.4, 0.6))
+    moments = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
+    assert len(moments) == len(times)
+    errors = np.array([moment.belief.pose[-3:] for moment in moments]) - poses[:, -3:]
+    assert np.median(np.linalg.norm(errors, axis=1)) < 0.03
+    target = moments[-1].belief.target
+    assert target is not None
+    assert np.linalg.norm(target.place[:2] - table_place((0.4, 0.6))[:2]) < 0.05
+    assert {moment.n_views for moment in moments} == {2}
+    assert all(moment.trouble == "" for moment in moments)
+
+
+def test_the_ball_is_where_the_target_is_seen_and_becomes_certain(parameters):
+    times, poses = pointing((0.4, 0.6))
+    moments = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
+    arrived = int(np.argmin(np.linalg.norm(poses[:, -3:] - table_place((0.4, 0.6)), axis=1)))
+    there = moments[arrived + 2]
+    assert np.linalg.norm(there.ball - camera(1).project(table_place((0.4, 0.6)))) < 8.0
+    assert there.pointed_deviation.max() < 0.5 * moments[3].pointed_deviation.max()
+
+
+def test_a_camera_that_falls_silent_is_named_and_the_other_goes_on(parameters):
+    times, poses = pointing()
+    video, first, second = tracker(parameters), drawn(poses, camera(1)), drawn(poses, camera(2))
+    moments = []
+    for number, time_s in enumerate(times):
+        moments += video.see("camera_1", round(time_s * 1e9), next(first))
+        if number < 5:
+            moments += video.see("camera_2", round(time_s * 1e9), next(second))
+    assert moments[-1].n_views == 1
+    assert moments[-1].trouble == "camera_2 is silent"
+
+
+def test_a_dark_camera_counts_as_none_and_is_told(parameters):
+    times, poses = pointing()
+    dark = [np.random.default_rng(1).integers(0, 4, (120, 160, 3), dtype=np.uint8) for _ in times[:6]]
+    moments = tracked(tracker(parameters), times[:6], [list(drawn(poses[:6], camera(1))), dark])
+    assert {moment.n_views for moment in moments} == {1}
+    assert "camera_2 shows nothing: take off the lens cap" in moments[-1].trouble
+    assert not moments[-1].belief.degraded
+
+
+def test_all_cameras_dark_is_degraded_and_no_target(parameters):
+    times, _ = pointing()
+    dark = [[np.zeros((120, 160, 3), np.uint8)] * 6] * 2
+    moments = tracked(tracker(parameters), times[:6], dark)
+    assert moments[-1].belief.degraded
+    assert moments[-1].belief.target is None
+    assert "no usable view" in moments[-1].belief.sentence
+
+
+def test_an_image_of_another_size_is_left_out_and_told(parameters):
+    video = tracker(parameters)
+    assert list(video.see("camera_1", 0, np.zeros((12, 16, 3), np.uint8))) == []
+    assert video.trouble() == (
+        "camera_1 gives 16 x 12 px, calibrated are 160 x 120 px: set its resolution or calibrate it anew"
+    )
+
+
+def test_the_same_images_give_the_same_beliefs(parameters):
+    times, poses = pointing()
+    runs = [
+        tracked(tracker(parameters), times[:20], [list(drawn(poses[:20], camera(n))) for n in (1, 2)]) for _ in range(2)
+    ]
+    for one, other in zip(*runs, strict=True):
+        np.testing.assert_array_equal(one.belief.pose, other.belief.pose)
+
+
+def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
+    setup = TrackingSetup.model_validate({"cameras": "cameras.yaml", "actions": (str(folder / "pointing.npz"),)})
+    assert setup.video_tracker(folder).cameras == ("camera_1", "camera_2")
+    with pytest.raises(InputError, match="no calibration file there; `paramove calibrate cameras` writes one"):
+        setup.video_tracker(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("upper_arm: 28", "upper_arm: Input should be less than 0.6; expected as"),
+        ("upper_am: 0.28", "upper_am: Extra inputs are not permitted"),
+        ("shoulder: [1, 2]", "shoulder.2: Field required"),
+        ("shoulder: [", "expected a YAML file with"),
+    ],
+)
+def test_a_wrong_person_is_told_with_an_example(tmp_path, text, told):
+    (tmp_path / "person.yaml").write_text(text)
+    with pytest.raises(InputError, match="all in m") as caught:
+        read_person(tmp_path / "person.yaml")
+    assert told in str(caught.value)
+
+
+def test_a_person_s_measures_make_the_arm(tmp_path):
+    (tmp_path / "person.yaml").write_text("shoulder: [-0.3, -0.2, 0.4]\nupper_arm: 0.30\nforearm: 0.25\nhand: 0.18\n")
+    person = read_person(tmp_path / "person.yaml")
+    assert (person.sizes.upper_arm, person.sizes.lower_arm) == (0.30, 0.43)
+    assert person.placement.shoulder == (-0.3, -0.2, 0.4)
+    assert person.sizes.shoulder_radius > Person().sizes.shoulder_radius
+
+
+def test_an_action_that_is_not_there_is_told(parameters):
+    with pytest.raises(InputError, match="pointing, reaching or the file of a model expected"):
+        TrackingSetup.model_validate({**parameters, "actions": ("poking",)}).video_tracker()
