@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.observation.background_kernels import changes, learn
+from paramove.observation.background_kernels import changes, learn, samples
 
 Image = NDArray[np.uint8]
 
@@ -69,12 +69,12 @@ class Background:
 
     def _brightness_and_noise(self) -> tuple[float, float]:
         """By how much the image is brighter than the background, and the noise, grey levels; medians."""
-        every = (slice(None, None, SPARSE), slice(None, None, SPARSE))
-        known = self._known[every] > 0
-        was, now = self._mean[every][known], self._image[every][known].astype(np.float32)
-        sums = was.sum(axis=1)
+        was, now = samples(self._image, self._mean, self._known, SPARSE)
+        all_channels = np.ones(3, np.float32)
+        sums = was @ all_channels
         bright = sums > 60.0
-        gain = float(np.median(now[bright].sum(axis=1) / sums[bright])) if bright.any() else 1.0
+        gain = float(np.median((now @ all_channels)[bright] / sums[bright])) if bright.any() else 1.0
         gain = min(max(gain, 0.5), 2.0)
-        distance = np.linalg.norm(now - gain * was, axis=1)
+        difference = now - np.float32(gain) * was
+        distance = np.sqrt(np.einsum("ij,ij->i", difference, difference))
         return gain, max(float(np.median(distance)) / DISTANCE_OF_NOISE, LEAST_NOISE)

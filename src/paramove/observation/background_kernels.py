@@ -18,6 +18,21 @@ SHIFTED_PX = 2
 
 
 @compiled
+def samples(image: Bytes, background: Floats32, known: Bytes, every: int) -> tuple[Floats32, Floats32]:
+    """Colours of the background and of the image at one of `every` pixels along each axis where it is known, (n, 3)."""
+    height, width = known.shape
+    most = (1 + (height - 1) // every) * (1 + (width - 1) // every)
+    was, now, count = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32), 0
+    for y in range(0, height, every):
+        for x in range(0, width, every):
+            if known[y, x] != 0:
+                for c in range(3):
+                    was[count, c], now[count, c] = background[y, x, c], np.float32(image[y, x, c])
+                count += 1
+    return was[:count], now[:count]
+
+
+@compiled
 def nearest_beside(
     image: Bytes, background: Floats32, known: Bytes, scale: np.float32, row: int, column: int
 ) -> np.float32:
@@ -117,7 +132,8 @@ def covered(mask: Bytes, change: Signed, top: int, bottom: int, width: int, left
     total, area = np.int32(0), np.int32(0)
     for y in range(top, bottom + 1):
         place = (y + 1) * (width + 2) + 1
-        for x in range(place + left[y], place + right[y] + 1):
-            total += np.int32(mask[x]) * np.int32(change[x])
-            area += np.int32(mask[x])
+        inside, changed = mask[place + left[y] : place + right[y] + 1], change[place + left[y] : place + right[y] + 1]
+        for x in range(len(inside)):
+            total += np.int32(inside[x]) * np.int32(changed[x])
+            area += np.int32(inside[x])
     return int(total), int(area)
