@@ -1,11 +1,15 @@
 """Tables of action models beside the models themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from paramove.action_space.training import train_action
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
-from paramove.demonstrations import table_place
+from paramove.demonstrations import Demonstrations, table_place
 from paramove.input_error import InputError
+from paramove.phmm import LinearPHMM
 from tests.action_space.toy import toy_action
 
 
@@ -109,3 +113,28 @@ def test_a_model_of_other_points_is_refused():
 
     with pytest.raises(InputError, match=r"9 numbers a frame .* found 21"):
         ActionModel("a", Whole(), 3.0)
+
+
+def test_poses_may_tell_where_the_wrist_is():
+    bent, straight = toy_action("bent", pose_size=12), toy_action("straight")
+    theta, tau, deviation = draws(bent)
+    poses = Vocabulary([bent]).poses(np.zeros(len(theta), np.int64), theta, tau, deviation)
+    assert poses.shape == (len(theta), 12)
+    np.testing.assert_allclose(poses, bent.poses(theta, tau, deviation), rtol=0.0, atol=0.0)
+    with pytest.raises(InputError, match=r"as many numbers, found {'bent': 12, 'straight': 9}: train all of them with"):
+        Vocabulary([bent, straight])
+
+
+def test_an_action_with_the_wrist_is_trained_from_poses_with_the_wrist(pointing):
+    poses = [pointing.poses(np.full((60, 2), share), np.linspace(0.0, 1.0, 60)) for share in np.linspace(0.0, 1.0, 6)]
+    rng = np.random.default_rng(7)
+    bent = [np.concatenate([one, 0.5 * (one[:, 3:6] + one[:, 6:9])], axis=1) for one in poses]
+    bent = [one + 0.003 * rng.normal(size=one.shape) for one in bent]
+    told = replace(pointing.model.description, point_names=("shoulder", "elbow", "hand", "wrist"))
+    theta = np.repeat(np.linspace(0.0, 1.0, 6)[:, None], 2, axis=1)
+    model = train_action(Demonstrations(bent, theta, told), n_states=10, kind=LinearPHMM)
+    assert model.description.point_names == ("shoulder", "elbow", "hand", "wrist")
+    assert ActionModel.from_file_model(model).pose_size == 12
+    model.description = replace(model.description, point_names=("shoulder", "elbow", "wrist", "hand"))
+    with pytest.raises(InputError, match="expected the points"):
+        ActionModel.from_file_model(model)

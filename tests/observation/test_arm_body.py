@@ -15,7 +15,7 @@ COORDINATES = st.lists(st.floats(-0.6, 0.6), min_size=9, max_size=9)
 
 
 def lengths(poses):
-    points = poses.reshape(-1, 3, 3)
+    points = poses[:, :9].reshape(-1, 3, 3)
     return np.linalg.norm(np.diff(points, axis=1), axis=2)
 
 
@@ -65,6 +65,39 @@ def test_valid_poses_stay_as_they_are_and_fitting_twice_changes_nothing():
     rng = np.random.default_rng(1)
     once = fitted_poses(rng.uniform(-0.5, 0.5, (100, 9)), SIZES)
     assert_allclose(fitted_poses(once, SIZES), once, rtol=0.0, atol=1e-6)
+
+
+def test_a_wrist_keeps_its_angle_and_its_side():
+    rng = np.random.default_rng(2)
+    poses = rng.uniform(-0.5, 0.5, (200, 12))
+    fitted = fitted_poses(poses, SIZES)
+    elbow, hand, wrist = fitted[:, 3:6], fitted[:, 6:9], fitted[:, 9:12]
+    assert_allclose(lengths(fitted)[:, 0], SIZES.upper_arm, rtol=0.0, atol=1e-9)
+    assert_allclose(np.linalg.norm(wrist - elbow, axis=1), SIZES.forearm, rtol=0.0, atol=1e-9)
+    assert_allclose(np.linalg.norm(hand - wrist, axis=1), SIZES.hand, rtol=0.0, atol=1e-9)
+    assert_allclose(bends_of(fitted), bends_of(poses), rtol=0.0, atol=1e-6)
+    drawn = poses[:, 9:12] - poses[:, 3:6]
+    assert ((wrist - elbow) * side_of(drawn, hand - elbow)).sum(axis=1).min() >= 0.0
+    assert_allclose(fitted_poses(fitted, SIZES), fitted, rtol=0.0, atol=1e-6)
+
+
+def test_a_straight_wrist_changes_nothing():
+    poses = np.random.default_rng(3).uniform(-0.5, 0.5, (50, 9))
+    middle = 0.6 * poses[:, 3:6] + 0.4 * poses[:, 6:9]
+    fitted = fitted_poses(np.concatenate([poses, middle], axis=1), SIZES)
+    assert_allclose(fitted[:, :9], fitted_poses(poses, SIZES), rtol=0.0, atol=1e-7)
+
+
+def bends_of(poses):
+    """Angle at the wrist, rad."""
+    along, on = poses[:, 9:12] - poses[:, 3:6], poses[:, 6:9] - poses[:, 9:12]
+    cosine = (along * on).sum(axis=1) / np.linalg.norm(along, axis=1) / np.linalg.norm(on, axis=1)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def side_of(off, line):
+    """What of `off` is across `line`."""
+    return off - (off * line).sum(axis=1, keepdims=True) / (line * line).sum(axis=1, keepdims=True) * line
 
 
 def test_a_line_bends_back_and_down_and_nan_stays():

@@ -10,7 +10,7 @@ from paramove.observation import ArmObserver, ArmSizes, fitted_poses
 from paramove.observation.contour_kernels import new_contour, trace
 from paramove.observation.silhouette_kernels import Camera, draw_arm, new_canvas, project_ellipsoid, wipe
 from sim.human import ArmSilhouette
-from tests.observation.views import camera_at, four_cameras, some_poses
+from tests.observation.views import camera_at, four_cameras, some_bent_poses, some_poses
 
 SIZES = ArmSizes()
 BODY = np.array([SIZES.forearm, SIZES.hand, 0.055, 0.042, 0.028, SIZES.hand_width, SIZES.hand_thickness])
@@ -29,13 +29,15 @@ def drawn(pose, camera):
 
 
 @pytest.mark.parametrize("fovy_deg", [45.0, 22.0])
-def test_silhouettes_are_mujocos(fovy_deg):
+@pytest.mark.parametrize("poses", [some_poses, some_bent_poses], ids=["straight", "bent wrists"])
+def test_silhouettes_are_mujocos(fovy_deg, poses):
     cameras = four_cameras(fovy_deg=fovy_deg)
     theirs = ArmSilhouette(SIZES, cameras[0].matrix, 320, 240)
     overlaps = []
     for camera in cameras:
-        for pose in some_poses(40, seed=1):
-            expected, found = theirs.mask(pose, camera.camera_from_world), drawn(pose, camera)
+        for pose in poses(40, seed=1):
+            wrist = pose[9:] if len(pose) > 9 else None
+            expected, found = theirs.mask(pose[:9], camera.camera_from_world, wrist), drawn(pose, camera)
             overlaps.append((expected & found).sum() / max((expected | found).sum(), 1))
     theirs.close()
     assert np.median(overlaps) >= 0.985

@@ -34,3 +34,12 @@ def some_poses(count, seed=0, sizes=None):
     hand = rng.uniform([-0.1, -0.5, 0.0], [0.3, 0.2, 0.4], (count, 3))
     elbow = 0.5 * (shoulder + hand) + rng.normal(size=(count, 3)) * [0.03, 0.05, 0.03] + [-0.05, -0.08, -0.1]
     return fitted_poses(np.concatenate([shoulder, elbow, hand], axis=1), sizes or ArmSizes())
+
+
+def some_bent_poses(count, seed=0, sizes=None):
+    """The same with bent wrists, (count, 12)."""
+    poses, arm = some_poses(count, seed, sizes), sizes or ArmSizes()
+    aside = 0.2 * arm.hand * np.random.default_rng(seed + 1).normal(size=(count, 3))
+    share = arm.forearm / arm.lower_arm
+    wrist = (1.0 - share) * poses[:, 3:6] + share * poses[:, 6:9] + aside
+    return fitted_poses(np.concatenate([poses, wrist], axis=1), arm)

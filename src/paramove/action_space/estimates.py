@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.observation.arm_body import HAND
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -62,17 +64,17 @@ def tau_histogram(action: Ints, tau: Floats, weights: Floats, n_actions: int, n_
 
 
 def best_pose(poses: Floats, weights: Floats) -> Floats:
-    """Pose of the particle with the greatest weight (6.16). Shape (9,)."""
+    """Pose of the particle with the greatest weight (6.16). Shape (D,)."""
     return np.asarray(poses[int(weights.argmax())])
 
 
 def mean_pose(poses: Floats, weights: Floats) -> Floats:
-    """Mean of the poses (6.17). Shape (9,)."""
+    """Mean of the poses (6.17). Shape (D,)."""
     return np.asarray(weights @ poses)
 
 
 def refined_pose(poses: Floats, weights: Floats, first: Floats, widths: tuple[float, ...] = KERNEL_WIDTHS) -> Floats:
-    """`first` drawn to the mean of the poses around it, by kernels that narrow (6.18)-(6.20). Shape (9,).
+    """`first` drawn to the mean of the poses around it, by kernels that narrow (6.18)-(6.20). Shape (D,).
 
     Covariance sigma_i^2 I with sigma_i in m (6.19, corrected).
     """
@@ -88,4 +90,4 @@ def refined_pose(poses: Floats, weights: Floats, first: Floats, widths: tuple[fl
 
 def hand_covariance(poses: Floats, weights: Floats) -> Floats:
     """Covariance of the hand's place, m^2. Shape (3, 3)."""
-    return theta_estimate(poses[:, -3:], weights).covariance
+    return theta_estimate(poses[:, HAND], weights).covariance

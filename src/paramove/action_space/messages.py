@@ -15,13 +15,13 @@ from pydantic import BaseModel, ConfigDict
 from paramove.action_space.video_tracker import TrackedMoment
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation.arm_body import POSE_POINTS
+from paramove.observation.arm_body import BENT_POSE_POINTS, HAND
 from paramove.observation.cameras import WORLD_FRAME
 from paramove.vision.pointing_events import BALL_M, ball_colour, certainty
 
 Floats = NDArray[np.float64]
 
-NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index"}
+NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", "wrist": "wrist"}
 
 
 class TablePlace(BaseModel):
@@ -75,7 +75,7 @@ def estimate_message(
         lost=belief.lost,
         degraded=belief.degraded,
         sentence=belief.sentence,
-        hand=_location(belief.pose[-3:], np.sqrt(np.diagonal(belief.hand_covariance)), table),
+        hand=_location(belief.pose[HAND], np.sqrt(np.diagonal(belief.hand_covariance)), table),
         pointed=_location(moment.pointed, moment.pointed_deviation, table),
     )
     message.captured.FromNanoseconds(moment.captured_ns)
@@ -98,10 +98,11 @@ def estimate_message(
 
 
 def arm_pose_message(moment: TrackedMoment) -> ArmPose:
-    """The believed posture; the end of the hand is the tip of the index finger."""
+    """The believed posture; the hand's is the tip of the index finger. With the wrist if its action knows it."""
     message = ArmPose(frame=WORLD_FRAME)
     message.captured.FromNanoseconds(moment.captured_ns)
-    for name, (x, y, z) in zip(POSE_POINTS, moment.belief.pose.reshape(3, 3), strict=True):
+    points = moment.belief.pose.reshape(-1, 3)
+    for name, (x, y, z) in zip(BENT_POSE_POINTS[: len(points)], points, strict=True):
         message.points.add(name=NAMES_IN_MESSAGES[name], x=x, y=y, z=z)
     return message
 
@@ -144,7 +145,7 @@ def scene_message(moment: TrackedMoment, table: TablePlace = AT_TABLE) -> SceneU
     arm = entity.lines.add(thickness=0.02)
     arm.color.g = arm.color.a = 1.0
     arm.pose.orientation.w = 1.0
-    for x, y, z in table.frame_from_table(moment.belief.pose.reshape(3, 3)):
+    for x, y, z in table.frame_from_table(moment.belief.pose[:9].reshape(3, 3)):
         arm.points.add(x=x, y=y, z=z)
     return message
 

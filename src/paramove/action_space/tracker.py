@@ -29,6 +29,7 @@ from paramove.action_space.target_detection import DetectedTarget, DetectionOpti
 from paramove.action_space.track_health import HealthOptions, TrackHealth
 from paramove.action_space.vocabulary import Vocabulary
 from paramove.input_error import InputError
+from paramove.observation.arm_body import HAND
 from paramove.observation.presence import Presence
 
 Floats = NDArray[np.float64]
@@ -72,7 +73,7 @@ class ActionBelief:
         theta: parameters of each action that has particles (6.10), (6.11).
         targets: place of the mean parameters of each action that has particles, (3,).
         tau_histogram: posterior over progress, all bins sum to 1; one row an action, in the order of `actions`.
-        pose: refined (6.18), (9,). pose_best: (6.16), (9,).
+        pose: refined (6.18), (D,). pose_best: (6.16), (D,).
         hand_covariance: of the hand's place, m^2, (3, 3).
         effective_sample_size: effective number of particles.
         temper: exponent of the likelihood; below 1 it was flattened.
@@ -142,9 +143,9 @@ class ActionTracker:
 
         Args:
             time_s: of its capture. A frame that is not later than the one before is left out.
-            measure: log-likelihoods (M,), nats, of poses (M, 9) in the world; None, values that are all equal or not
+            measure: log-likelihoods (M,), nats, of poses (M, D) in the world; None, values that are all equal or not
                 finite say that nothing could be seen.
-            presence: what speaks for an arm in a pose (9,) in the world being seen at all.
+            presence: what speaks for an arm in a pose (D,) in the world being seen at all.
         """
         last = self._belief
         if last is not None and not time_s > last.time_s:
@@ -264,7 +265,7 @@ class ActionTracker:
     def _target(self, belief: ActionBelief, reached: ReachedPlace | None) -> DetectedTarget | None:
         if belief.lost or belief.degraded or self.health.absence:
             return self.detector.latest
-        hand = belief.pose[-3:]
+        hand = belief.pose[HAND]
         if reached is None:
             return self.detector.passed(belief.time_s, hand)
         place = self.placement.in_world(reached.place)

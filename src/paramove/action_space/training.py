@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from platformdirs import user_cache_path
 
-from paramove.action_space.vocabulary import POSE_SIZE, ActionModel, table_target
+from paramove.action_space.vocabulary import POSE_SIZES, ActionModel, table_target
 from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
 from paramove.demonstrations.reaching import DEMONSTRATOR_VERSION
 from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
 from paramove.hmm import TrainingOptions
 from paramove.input_error import InputError
-from paramove.observation.arm_body import POSE_POINTS
+from paramove.observation.arm_body import BENT_POSE_POINTS
 from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM, QuadraticPHMM
 
 Floats = NDArray[np.float64]
@@ -30,18 +30,18 @@ TRACKED_POINTS = ("shoulder", "elbow", "index")
 
 
 def arm_poses(sequence: ArrayLike, point_names: Sequence[str] = POINT_NAMES) -> Floats:
-    """Poses (T, 9) of body points (T, 3 n); poses (T, 9) stay as they are. Raises InputError for missing points."""
+    """Poses (T, 9) of body points (T, 3 n); poses (T, 9) or (T, 12) stay. Raises InputError for missing points."""
     points = np.asarray(sequence, dtype=np.float64)
-    if points.ndim == 2 and points.shape[1] == POSE_SIZE:
+    if points.ndim == 2 and points.shape[1] in POSE_SIZES:
         return points
     missing = [name for name in TRACKED_POINTS if name not in point_names]
     if missing or points.ndim != 2 or points.shape[1] != 3 * len(point_names):
         raise InputError(
-            f"expected poses (T, {POSE_SIZE}) or body points (T, {3 * len(point_names)}) with "
+            f"expected poses (T, {POSE_SIZES[0]}) or body points (T, {3 * len(point_names)}) with "
             f"{', '.join(TRACKED_POINTS)}, found shape {points.shape} of {', '.join(point_names)}"
         )
     chosen = [point_names.index(name) for name in TRACKED_POINTS]
-    return np.ascontiguousarray(points.reshape(len(points), -1, 3)[:, chosen].reshape(len(points), POSE_SIZE))
+    return np.ascontiguousarray(points.reshape(len(points), -1, 3)[:, chosen].reshape(len(points), POSE_SIZES[0]))
 
 
 def train_action(
@@ -55,7 +55,7 @@ def train_action(
     sequences = [arm_poses(sequence, shown.description.point_names or POINT_NAMES) for sequence in shown.sequences]
     model = kind(n_states, 2, 3, resampled_frames=round(2.5 * n_states), residuals="independent")
     model.options = TrainingOptions(floor_deviation=0.002)
-    model.description = replace(shown.description, point_names=POSE_POINTS)
+    model.description = replace(shown.description, point_names=BENT_POSE_POINTS[: sequences[0].shape[1] // 3])
     return model.fit(sequences, shown.theta)
 
 

@@ -14,13 +14,13 @@ from paramove.action_space.pose_kernels import write_polynomial_poses, write_tab
 from paramove.demonstrations import table_place
 from paramove.hmm import LeftRightHMM
 from paramove.input_error import InputError
-from paramove.observation.arm_body import POSE_POINTS
+from paramove.observation.arm_body import BENT_POSE_POINTS, HAND, POSE_POINTS
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-POSE_SIZE = 3 * len(POSE_POINTS)
+POSE_SIZES = (3 * len(POSE_POINTS), 3 * len(BENT_POSE_POINTS))
 THETA_BOUNDS = (-0.2, 1.2)
 PLACE_SIZE = 2
 """Components of one place (u, v); theta is one or more places, the last of which is where the hand goes."""
@@ -53,7 +53,8 @@ class ActionModel:
 
     Attributes:
         name: of the action.
-        model: of 9-D poses (shoulder, elbow, hand; m, frame of the default demonstrator's table).
+        model: of poses (shoulder, elbow, hand, or also the wrist; m, frame of the default demonstrator's table); D = 9
+            or 12.
         duration_s: mean duration T_a.
         parameter_names: one for each of the P components of theta, two components a place.
         bounds: theta stays within, (least, greatest) for every component.
@@ -80,10 +81,11 @@ class ActionModel:
                 f"{list(self.parameter_names)}"
             )
         found = self.state_means(self.centre[None]).shape[1:]
-        if len(found) != 2 or found[1] != POSE_SIZE:
+        if len(found) != 2 or found[1] not in POSE_SIZES:
             raise InputError(
-                f"action {self.name!r}: expected a model of {POSE_SIZE} numbers a frame (x, y, z of "
-                f"{', '.join(POSE_POINTS)}), found {found[-1]}; paramove.action_space.training makes one"
+                f"action {self.name!r}: expected a model of {POSE_SIZES[0]} numbers a frame (x, y, z of "
+                f"{', '.join(POSE_POINTS)}), or {POSE_SIZES[1]} (and of the wrist), found {found[-1]}; "
+                "paramove.action_space.training makes one"
             )
 
     @classmethod
@@ -95,6 +97,9 @@ class ActionModel:
         bounds = model.parameter_bounds_
         size = PLACE_SIZE if bounds is None else bounds.shape[1]
         names = told.parameter_names or ("u", "v")
+        points = told.point_names
+        if len(points) == len(BENT_POSE_POINTS) and points[-1] != BENT_POSE_POINTS[-1]:
+            raise InputError(f"action {told.action!r}: expected the points {BENT_POSE_POINTS}, found {tuple(points)}")
         if len(names) != size:
             raise InputError(f"action {told.action!r}: expected {size} names of parameters, found {list(names)}")
         return cls(told.action, model, told.duration, names, target=target)
@@ -103,6 +108,11 @@ class ActionModel:
     def n_parameters(self) -> int:
         """P."""
         return len(self.parameter_names)
+
+    @property
+    def pose_size(self) -> int:
+        """D, 9 or 12."""
+        return int(self.factors.shape[1])
 
     @property
     def n_deviations(self) -> int:
@@ -115,12 +125,12 @@ class ActionModel:
         return np.full(self.n_parameters, 0.5)
 
     def state_means(self, theta: Floats) -> Floats:
-        """Means of all states for theta (M, P). Shape (M, N, 9)."""
+        """Means of all states for theta (M, P). Shape (M, N, D)."""
         return np.asarray(self.model.state_means(theta), dtype=np.float64)
 
     @cached_property
     def factors(self) -> Floats:
-        """F_i of each state: F_i z with standard normal z (R,) has the covariance (6.3). Shape (N, 9, R).
+        """F_i of each state: F_i z with standard normal z (R,) has the covariance (6.3). Shape (N, D, R).
 
         Symmetric roots, which change as smoothly as the covariances, times the directions that vary most on average;
         interpolated like the means. The covariances are those of the middle theta.
@@ -135,14 +145,16 @@ class ActionModel:
 
     @cached_property
     def middle_means(self) -> Floats:
-        """State means of the middle theta, (N, 9)."""
+        """State means of the middle theta, (N, D)."""
         return np.asarray(self.state_means(self.centre[None])[0])
 
     @cached_property
     def mirrored(self) -> Floats:
         """For each state the progress at which the way back looks like the way out, or the reverse; -1: none. (N,)."""
         n_states = len(self.middle_means)
-        apart = np.linalg.norm(self.middle_means[:, None] - self.middle_means[None], axis=2) / np.sqrt(3.0)
+        apart = np.linalg.norm(self.middle_means[:, None] - self.middle_means[None], axis=2) / np.sqrt(
+            self.pose_size / 3
+        )
         number = np.arange(n_states)
         apart[np.abs(number[:, None] - number) < LEAST_APART * n_states] = np.inf
         nearest = apart.argmin(axis=1)
@@ -156,7 +168,7 @@ class ActionModel:
             step = np.zeros(self.n_parameters)
             step[component] = 0.25
             ends = self.state_means(np.stack([self.centre + step, self.centre - step]))
-            sizes[component // PLACE_SIZE] += ((ends[0] - ends[1])[:, -3:] ** 2).sum(axis=1)
+            sizes[component // PLACE_SIZE] += ((ends[0] - ends[1])[:, HAND] ** 2).sum(axis=1)
         sizes = np.sqrt(sizes)
         return np.asarray(sizes / np.maximum(sizes.max(axis=1, keepdims=True), 1e-12))
 
@@ -165,16 +177,16 @@ class ActionModel:
         return np.asarray(np.interp(tau, np.linspace(0.0, 1.0, len(table)), table))
 
     def poses(self, theta: ArrayLike, tau: ArrayLike, deviation: ArrayLike | None = None) -> Floats:
-        """Mean poses (6.2), or with deviations (M, R) poses of the density (6.3). (M, P), (M,) -> (M, 9)."""
+        """Mean poses (6.2), or with deviations (M, R) poses of the density (6.3). (M, P), (M,) -> (M, D)."""
         places = np.atleast_2d(np.asarray(theta, dtype=np.float64))
         progress = np.broadcast_to(np.asarray(tau, dtype=np.float64), len(places))
         drawn = np.zeros((len(places), self.n_deviations)) if deviation is None else np.asarray(deviation, np.float64)
-        poses = np.empty((len(places), POSE_SIZE))
+        poses = np.empty((len(places), self.pose_size))
         self.write_poses(np.arange(len(places)), places, progress, drawn, poses)
         return poses
 
     def write_poses(self, rows: Ints, theta: Floats, tau: Floats, deviation: Floats, poses: Floats) -> None:
-        """Writes poses[rows] (M, 9) of particles theta (M, >= P), tau (M,), deviation (M, >= R)."""
+        """Writes poses[rows] (M, D) of particles theta (M, >= P), tau (M,), deviation (M, >= R)."""
         if isinstance(self.model, PolynomialPHMM):
             monomials = self.model.monomials_
             write_polynomial_poses(
@@ -189,14 +201,21 @@ class ActionModel:
 class Vocabulary:
     """The actions, numbered in the order given.
 
-    Raises InputError for no action or two of one name.
+    Raises InputError for no action, two of one name, or poses of which only some tell where the wrist is.
     """
 
     def __init__(self, actions: Sequence[ActionModel]) -> None:
         names = [action.name for action in actions]
         if not names or len(set(names)) < len(names):
             raise InputError(f"a vocabulary has one or more actions of different names, found {names}")
+        sizes = {action.name: action.pose_size for action in actions}
+        if len(set(sizes.values())) > 1:
+            raise InputError(
+                f"the actions of a vocabulary have poses of as many numbers, found {sizes}: train all of them with the "
+                "wrist, or none"
+            )
         self.actions = tuple(actions)
+        self.pose_size = actions[0].pose_size
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -221,8 +240,8 @@ class Vocabulary:
         return self.names.index(name)
 
     def poses(self, action: Ints, theta: Floats, tau: Floats, deviation: Floats) -> Floats:
-        """Poses (M, 9), m, in the frame of the models, for action (M,), theta (M, P), tau (M,), deviation (M, R)."""
-        poses = np.empty((len(action), POSE_SIZE))
+        """Poses (M, D), m, in the frame of the models, for action (M,), theta (M, P), tau (M,), deviation (M, R)."""
+        poses = np.empty((len(action), self.pose_size))
         for number, model in enumerate(self.actions):
             rows = np.flatnonzero(action == number)
             if len(rows):

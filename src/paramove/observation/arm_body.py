@@ -1,7 +1,8 @@
 """The body of an arm: its sizes, and valid postures for poses drawn from a density (thesis 6.6.1).
 
 The upper arm is a tapered capsule from shoulder to elbow, the forearm one from elbow to wrist (the convex hulls of two
-spheres each), the hand an ellipsoid in line with the forearm, from the wrist to the tip of the index finger.
+spheres each), the hand an ellipsoid from the wrist to the tip of the index finger, in line with the forearm unless the
+pose tells where the wrist is.
 """
 
 from __future__ import annotations
@@ -18,6 +19,10 @@ Floats = NDArray[np.float64]
 
 POSE_POINTS = ("shoulder", "elbow", "hand")
 """The three points of an arm pose, in this order; the hand is the tip of the index finger."""
+BENT_POSE_POINTS = (*POSE_POINTS, "wrist")
+"""The four points of a pose that also tells where the wrist is. Without it the hand is in line with the forearm."""
+HAND = slice(6, 9)
+"""The coordinates of the hand in either pose."""
 
 _DEMONSTRATOR = ArmLengths()
 _BACK_AND_DOWN = np.array([-1.0, 0.0, -1.0])
@@ -89,29 +94,52 @@ class ArmSizes:
 
 
 def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:
-    """The nearest postures that the arm can take (thesis 6.6.1.2). Shape (M, 9) -> (M, 9), m.
+    """The nearest postures that the arm can take (thesis 6.6.1.2). (M, 9) -> (M, 9) or (M, 12) -> (M, 12), m.
 
     Shoulder and hand stay; the elbow moves in the plane of the three points, on its side of the line from shoulder to
     hand, to where both lengths hold. A hand out of reach leaves the arm stretched towards it; one too near to the
     shoulder moves out along the same line. Where the three points lie on a line, the elbow bends back and down. A
-    pose with NaN or infinity becomes NaN. Raises InputError for another shape.
+    wrist keeps its angle and its side of the line from elbow to hand. A pose with NaN or infinity becomes NaN. Raises
+    InputError for another shape.
     """
     points = np.asarray(poses, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 9:
-        raise InputError(f"poses of shape {points.shape} found, (M, 9) expected: shoulder, elbow, hand")
+    if points.ndim != 2 or points.shape[1] not in (9, 12):
+        raise InputError(
+            f"poses of shape {points.shape} found, (M, 9) expected: shoulder, elbow, hand; or (M, 12): and wrist"
+        )
     points = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, np.nan)
+    if points.shape[1] == 9:
+        return _elbow_fitted(points, sizes.upper_arm, np.full(len(points), sizes.lower_arm))
+    elbow, hand, wrist = points[:, 3:6], points[:, HAND], points[:, 9:12]
+    lower = np.linalg.norm(sizes.forearm * _unit(wrist - elbow) + sizes.hand * _unit(hand - wrist), axis=1)
+    arm = _elbow_fitted(points[:, :9], sizes.upper_arm, lower)
+    line = arm[:, 6:9] - arm[:, 3:6]
+    along = (sizes.forearm**2 - sizes.hand**2 + lower**2) / (2.0 * np.maximum(lower, _LEAST_BEND))
+    away = np.sqrt(np.maximum(sizes.forearm**2 - along**2, 0.0))
+    axis = _unit(line)
+    off = wrist - elbow
+    off = _unit(off - (off * axis).sum(axis=1, keepdims=True) * axis)
+    return np.concatenate([arm, arm[:, 3:6] + along[:, None] * axis + away[:, None] * off], axis=1)
+
+
+def _elbow_fitted(points: Floats, upper: float, lower: Floats) -> Floats:
+    """Poses (M, 9) with `upper` from shoulder to elbow and `lower` (M,) from elbow to hand, m."""
     shoulder, elbow, hand = points[:, 0:3], points[:, 3:6], points[:, 6:9]
-    upper, lower = sizes.upper_arm, sizes.lower_arm
     line = hand - shoulder
     distance = np.linalg.norm(line, axis=1)
     axis = np.where((distance > _LEAST_BEND)[:, None], line / np.maximum(distance, _LEAST_BEND)[:, None], [1.0, 0, 0])
     axis = np.where(np.isnan(distance)[:, None], np.nan, axis)
-    reached = np.clip(distance, abs(upper - lower), upper + lower)
-    along = (upper**2 - lower**2 + reached**2) / (2.0 * reached) if upper != lower else reached / 2.0
+    reached = np.clip(distance, np.maximum(np.abs(upper - lower), _LEAST_BEND), upper + lower)
+    along = (upper**2 - lower**2 + reached**2) / (2.0 * reached)
     away = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     bent = shoulder + along[:, None] * axis + away[:, None] * _bend(elbow - shoulder, axis)
     tip = np.where((reached == distance)[:, None], hand, shoulder + reached[:, None] * axis)
     return np.concatenate([shoulder, bent, tip], axis=1)
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Of length 1, (M, 3); zeros stay."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), _LEAST_BEND))
 
 
 def _bend(to_elbow: Floats, axis: Floats) -> Floats:

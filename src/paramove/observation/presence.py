@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.observation.arm_body import HAND
 from paramove.observation.background_kernels import FULL
 from paramove.observation.cameras import CalibratedCamera
 
@@ -48,12 +49,12 @@ def seen_presence(
     """In one view.
 
     Args:
-        pose: shoulder, elbow, fingertip, (9,), m, world. camera: at the compared size.
+        pose: shoulder, elbow, fingertip, (9,), or also the wrist, (12,), m, world. camera: at the compared size.
         table: 1 where the table is seen, and change: from the background; flat with one pixel about the image.
         arm_area: px.
     """
     changed = np.count_nonzero(change > CHANGED) / arm_area
-    axis = pose[3:6] + AXIS_SHARES[:, None] * (pose[6:] - pose[3:6])
+    axis = pose[3:6] + AXIS_SHARES[:, None] * (pose[HAND] - pose[3:6])
     places = np.round(camera.project(axis, distorted=False))
     size, stride = (camera.width_px, camera.height_px), camera.width_px + 2
     inside = ((places >= 0.0) & (places < size)).all(axis=1)  # NaN, behind the camera, is not

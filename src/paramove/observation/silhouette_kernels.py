@@ -48,7 +48,7 @@ class Canvas(NamedTuple):
         ends: first and last column of the polygon that is being drawn in each row, (2, height).
         corners: of that polygon, (2, CORNERS), px.
         ellipses: of shoulder, elbow, wrist and hand: centre x y, shape xx xy yy, px; (4, 5).
-        points: shoulder, elbow, hand in the camera's frame, (3, 3), m.
+        points: shoulder, elbow, hand, wrist in the camera's frame, (4, 3), m.
         axes: of the hand in that frame, (3, 3); centre, shape: of the part that is being projected, (3,), (3, 3).
     """
 
@@ -74,7 +74,7 @@ def new_canvas(width: int, height: int) -> Canvas:
         np.empty((2, height)),
         np.empty((2, CORNERS)),
         np.empty((4, 5)),
-        np.empty((3, 3)),
+        np.empty((4, 3)),
         np.empty((3, 3)),
         np.empty(3),
         np.empty((3, 3)),
@@ -105,18 +105,21 @@ def project_ellipsoid(centre: Floats, shape: Floats, matrix: Floats, ellipse: Fl
 def arm_ellipses(pose: Floats, body: Floats, camera: Camera, canvas: Canvas) -> bool:
     """Ellipses of shoulder, elbow, wrist and hand; False if a part is not before the camera.
 
+    pose: shoulder, elbow, hand, (9,), the wrist then on the line from elbow to hand; or also the wrist, (12,);
     body: forearm, hand, radii of shoulder, elbow and wrist, width and thickness of the hand, m; (7,).
     """
     points, matrix, ellipses = canvas.points, camera.matrix, canvas.ellipses
-    for i in range(3):
+    for i in range(len(pose) // 3):
         for j in range(3):
             points[i, j] = camera.shift[j]
             for k in range(3):
                 points[i, j] += camera.turn[j, k] * pose[3 * i + k]
-    hand_axes(points, body, canvas.axes)
+    if len(pose) == 9:
+        put_wrist_straight(points, body[0])
+    hand_axes(points, canvas.axes)
     along, centre, shape = canvas.axes[0], canvas.centre, canvas.shape
     for number in range(4):
-        at, further = (number, 0.0) if number < 2 else (1, body[0] if number == 2 else body[0] + 0.5 * body[1])
+        at, further = (number, 0.0) if number < 2 else (3, 0.0 if number == 2 else 0.5 * body[1])
         for i in range(3):
             centre[i] = points[at, i] + further * along[i]
             for j in range(3):
@@ -133,17 +136,32 @@ def arm_ellipses(pose: Floats, body: Floats, camera: Camera, canvas: Canvas) -> 
 
 
 @compiled_arithmetic
-def hand_axes(points: Floats, body: Floats, axes: Floats) -> None:
-    """Unit vectors along the forearm, across it in the plane of the arm's bend, and at right angles; (3, 3)."""
-    length, dot, width = 0.0, 0.0, 0.0
+def put_wrist_straight(points: Floats, forearm: float) -> None:
+    """The wrist on the line from elbow to hand."""
+    length = 0.0
     for i in range(3):
-        axes[0, i] = points[2, i] - points[1, i]
-        length += axes[0, i] ** 2
+        length += (points[2, i] - points[1, i]) ** 2
     for i in range(3):
-        axes[0, i] /= np.sqrt(length)
-        dot += (points[0, i] - points[1, i]) * axes[0, i]
+        points[3, i] = points[1, i] + forearm * (points[2, i] - points[1, i]) / np.sqrt(length)
+
+
+@compiled_arithmetic
+def hand_axes(points: Floats, axes: Floats) -> None:
+    """Unit vectors along the hand, across it in the plane of the arm's bend, and at right angles; (3, 3)."""
+    size, length, dot, width = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        axes[1, i] = points[0, i] - points[1, i] - dot * axes[0, i]
+        axes[0, i] = points[2, i] - points[3, i]
+        axes[2, i] = points[2, i] - points[1, i]
+        size += axes[0, i] ** 2
+        length += axes[2, i] ** 2
+        dot += (points[0, i] - points[1, i]) * axes[2, i]
+    along = 0.0
+    for i in range(3):
+        axes[0, i] /= np.sqrt(size)
+        axes[1, i] = points[0, i] - points[1, i] - dot / length * axes[2, i]
+        along += axes[1, i] * axes[0, i]
+    for i in range(3):
+        axes[1, i] -= along * axes[0, i]
         width += axes[1, i] ** 2
     if width < 1e-18:  # a stretched arm tells no plane: the width lies across the view
         axes[1, 0], axes[1, 1], axes[1, 2] = -axes[0, 1], axes[0, 0], 1e-9

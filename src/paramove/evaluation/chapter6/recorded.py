@@ -16,7 +16,7 @@ from paramove.demonstrations import Demonstrations
 from paramove.demonstrations.recorded_people import RecordedMovement, data_folder, load_recordings
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER
 from paramove.hmm.sequences import resample
-from paramove.observation.arm_body import ArmSizes
+from paramove.observation.arm_body import BENT_POSE_POINTS, ArmSizes
 from paramove.phmm import MovementDescription
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ def recorded_demonstrations(
     of_subject: int | None = None,
     without_target: int | None = None,
 ) -> Demonstrations:
-    """Training movements, theta (u, v) of the direction. Poses (T, 9) at 50 Hz: the way out only.
+    """Training movements, theta (u, v) of the direction. Poses with the wrist (T, 12) at 50 Hz: the way out only.
 
     Either of all persons without one, or of one person without the movements to one target.
     """
@@ -107,12 +107,10 @@ def recorded_demonstrations(
         and (of_subject is None or one.subject == of_subject)
         and (without_target is None or one.target_id != without_target)
     ]
-    sequences = [one.poses[slice(*one.segment)] for one in shown]
+    sequences = [np.concatenate([one.poses, one.wrist], axis=1)[slice(*one.segment)] for one in shown]
     theta = np.array([one.theta for one in shown])
     duration = float(np.mean([len(sequence) - 1 for sequence in sequences]) / RATE_HZ)
-    told = MovementDescription(
-        "recorded_pointing", ("shoulder", "elbow", "hand"), "m", FRAME, ("u", "v"), duration, rate_hz=RATE_HZ
-    )
+    told = MovementDescription("recorded_pointing", BENT_POSE_POINTS, "m", FRAME, ("u", "v"), duration, rate_hz=RATE_HZ)
     return Demonstrations([resample(one, max(len(one), 40)) for one in sequences], theta, told)
 
 

@@ -17,6 +17,7 @@ from paramove.action_space.video_tracker import believed
 from paramove.evaluation.chapter6.clips import TABLE, Clip, read_clip
 from paramove.evaluation.chapter6.performances import Act
 from paramove.evaluation.chapter6.vocabularies import Knowledge, knowledge_of
+from paramove.observation.arm_body import HAND
 from paramove.observation.arm_observer import ArmObserver
 from paramove.observation.options import Likelihood, ObservationOptions
 from paramove.phmm import ParametricHMM
@@ -93,8 +94,8 @@ class Follower:
         histograms = np.array([one.tau_histogram for one in beliefs])
         return {
             "times_s": [round(one.time_s, 4) for one in beliefs],
-            "poses": _lengths([one.pose for one in beliefs]),
-            "best_hands": _lengths([one.pose_best[-3:] for one in beliefs]),
+            "poses": _lengths([one.pose[:9] for one in beliefs]),
+            "best_hands": _lengths([one.pose_best[HAND] for one in beliefs]),
             "hand_deviations": _lengths([np.sqrt(np.diagonal(one.hand_covariance)) for one in beliefs]),
             "effective": [round(one.effective_sample_size, 1) for one in beliefs],
             "lost": [int(one.lost) for one in beliefs],
@@ -143,7 +144,8 @@ def place_from_true_poses(clip: Clip, act: Act, knowledge: Knowledge) -> list[fl
     last_s = float(act.arrives_s[0]) if clip.kind == "recorded" else act.end_s
     inside = (clip.times_s >= act.start_s) & (clip.times_s <= last_s)
     placement = PersonPlacement.of_arm(truth.shoulder, truth.sizes.length)
-    theta = action.model.estimate(placement.in_model(truth.poses[inside])).theta
+    points = np.concatenate([truth.poses, truth.wrist], axis=1)[inside, : action.pose_size]
+    theta = action.model.estimate(placement.in_model(points)).theta
     place = knowledge.pointed(placement.in_world(action.target(theta)), placement)
     found: list[float] = _lengths(place)
     return found
