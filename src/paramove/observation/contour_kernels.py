@@ -18,6 +18,24 @@ LEAST_POINTS = 24
 NORMAL_STEP = 4
 """The normal at a point is across the line between the points so many places before and after it."""
 
+STEPS_X = np.array([-1, -1, 0, 1, 1, 1, 0, -1], np.int32)
+STEPS_Y = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int32)
+"""The eight neighbours of a pixel, counterclockwise as seen in the image, from the left one on."""
+
+
+def next_steps() -> NDArray[np.int8]:
+    """For each neighbour that the loop came from and each set of neighbours that are in the mask, as bits: the next.
+
+    The first one in the mask after that which the loop came from, which is asked last; -1: none. Flat, 8 x 256.
+    """
+    orders = (np.arange(8)[:, None] + np.arange(1, 9)) & 7
+    there = np.arange(256)[None, :, None] >> orders[:, None, :] & 1
+    found = np.take_along_axis(orders[:, None, :], there.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
+    return np.where(there.any(axis=2), found, -1).astype(np.int8).reshape(-1)
+
+
+NEXT_STEPS = next_steps()
+
 
 class Contour(NamedTuple):
     """A contour and its segments; arrays are large enough for any contour of the image.
@@ -61,33 +79,33 @@ def trace(mask: Bytes, width: int, row: int, left: int, contour: Contour) -> int
     mask has one pixel of zeros about the image. `left` is a column at or before that pixel. The loop ends where its
     first step would be repeated, so that it may pass its first pixel on the way.
     """
-    stride = width + 2
+    stride, xs, ys = width + 2, contour.x, contour.y
     steps = (-1, stride - 1, stride, stride + 1, 1, 1 - stride, -stride, -stride - 1)
-    step_x, step_y = (-1, -1, 0, 1, 1, 1, 0, -1), (0, 1, 1, 1, 0, -1, -1, -1)
-    x, y = left, row
-    place = (y + 1) * stride + x + 1
+    x, y = np.int32(left), np.int32(row)
+    place = (row + 1) * stride + left + 1
     while x < width and mask[place] == 0:
-        x, place = x + 1, place + 1
+        x, place = np.int32(x + 1), place + 1
     if x == width:
         return 0
-    most, count, first, first_step, turn = len(contour.x), 0, place, -1, 0
+    most, count, first, first_step, turn = len(xs), 0, place, -1, 0
+    one, line = np.uint64(1), np.uint64(stride)  # unsigned: such an index is not tested for counting from the end
     while count < most:
-        found = -1
-        for i in range(1, 9):
-            way = (turn + i) & 7
-            if mask[place + steps[way]] != 0:
-                found = way
-                break
+        here = np.uint64(place)
+        above, below = here - line, here + line
+        code = mask[here - one] | mask[below - one] << 1 | mask[below] << 2 | mask[below + one] << 3
+        code |= mask[here + one] << 4 | mask[above + one] << 5 | mask[above] << 6 | mask[above - one] << 7
+        found = NEXT_STEPS[np.uint64(turn << 8 | code)]
         if found < 0:  # a single pixel
-            contour.x[0], contour.y[0] = x, y
+            xs[0], ys[0] = x, y
             return 1
         if place == first and found == first_step:
             return count
         if count == 0:
             first_step = found
-        contour.x[count], contour.y[count] = x, y
+        xs[np.uint64(count)], ys[np.uint64(count)] = x, y
         count += 1
-        place, x, y, turn = place + steps[found], x + step_x[found], y + step_y[found], (found + 4) & 7
+        place, x, y = place + steps[found], np.int32(x + STEPS_X[found]), np.int32(y + STEPS_Y[found])
+        turn = (found + 4) & 7
     return count
 
 
