@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.hmm.compilation import compiled, compiled_arithmetic
+from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
 from paramove.observation.background_kernels import covered
 from paramove.observation.contour_kernels import (
     LEAST_POINTS,
@@ -76,10 +76,12 @@ def strengths(
     out: (SCRATCH, slots LANES); its first row takes the result, in the order of `contour.lanes`.
     """
     end = (number + 1) * LANES
+    moved, share = out[1], contour.lanes[SHARE]
     for k in range(number):
         here, there = shifts.shift[k], shifts.shift[k + 1 if k + 1 < number else 0]
-        for lane in range((k + 1) * LANES, (k + 2) * LANES):
-            out[1, lane] = here + contour.lanes[SHARE, lane] * (there - here)
+        for lane in range(LANES):
+            at = np.uint64((k + 1) * LANES + lane)
+            moved[at] = here + share[at] * (there - here)
     for row in range(3):
         side = np.float32(0.0) if row == 0 else LOOK_ASIDE if row == 1 else -LOOK_ASIDE
         addresses(contour.lanes, out[1], side, np.float32(stride), end, out[2])
@@ -109,15 +111,13 @@ def boosted(shift: Floats32, one: Floats32, other: Floats32, least: np.float32, 
         values[i] = min(full, x * ratio * ratio) / (full * (np.float32(1.0) + far * far))
 
 
-@compiled_arithmetic
-def mean_error(number: int, points: int, contour: Contour, values: Floats32) -> float:
-    """Mean of (1 - G)^2 over the contour, (6.27)."""
-    total = np.float32(0.0)
-    for k in range(number):
-        first = (k + 1) * LANES
-        for i in range(first, first + contour.starts[k + 1] - contour.starts[k]):
-            total += (np.float32(1.0) - values[i]) ** 2
-    return float(total / points)
+@compiled_sums
+def mean_error(number: int, points: int, values: Floats32) -> float:
+    """Mean of (1 - G)^2 over the contour, (6.27). Points that fill segments up lie in the margin, where G is 0."""
+    end, total = (number + 1) * LANES, np.float32(0.0)
+    for i in range(LANES, end):
+        total += (np.float32(1.0) - values[i]) ** 2
+    return float(total - (number * LANES - points)) / points
 
 
 @compiled
@@ -165,7 +165,7 @@ def matched_errors(
             fill_segments(number, area, contour)
             match(distances, stride, number, points, numbers[1], contour, shifts)
             strengths(intensities, stride, number, numbers[2], contour, shifts, values)
-            errors[i] = mean_error(number, points, contour, values[0])
+            errors[i] = mean_error(number, points, values[0])
 
 
 @compiled
