@@ -88,17 +88,17 @@ class EdgeImages:
 
 
 def line_steps(i: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
-    """Steps l n_i of (6.25), rounded to pixels, as flat offsets, and their weights 256 (1 - |l| / L)."""
+    """Steps l n_i of (6.25), l > 0, rounded to pixels, as flat offsets, and their weights 256 (1 - l / L)."""
     angle = i * np.pi / DIRECTIONS
-    along = np.array([step for step in range(-REACH_PX + 1, REACH_PX) if step])
+    along = np.arange(1, REACH_PX)
     offsets = np.rint(along * np.cos(angle)).astype(np.int64) * stride + np.rint(along * np.sin(angle)).astype(np.int64)
-    return offsets, np.rint(256.0 * (1.0 - np.abs(along) / REACH_PX)).astype(np.uint16)
+    return offsets, np.rint(256.0 * (1.0 - along / REACH_PX)).astype(np.uint16)
 
 
 def disc_steps(stride: int) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
-    """Steps q - p of (6.23) within the disc of radius L, as flat offsets, and their weights 256 (1 - |q - p| / L)."""
+    """Steps q - p of (6.23) in half the disc of radius L, as flat offsets, and their weights 256 (1 - |q - p| / L)."""
     dy, dx = np.indices((2 * REACH_PX + 1, 2 * REACH_PX + 1)).reshape(2, -1) - REACH_PX
     distance = np.hypot(dx, dy)
-    inside = (distance < REACH_PX) & (distance > 0.0)
+    inside = (distance < REACH_PX) & ((dy > 0) | ((dy == 0) & (dx > 0)))
     weights = np.rint(256.0 * (1.0 - distance[inside] / REACH_PX)).astype(np.uint16)
     return (dy * stride + dx)[inside].astype(np.int64), weights

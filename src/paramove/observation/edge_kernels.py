@@ -101,9 +101,9 @@ def whole_intensity(sizes: Floats32, scale: float, image: Bytes) -> None:
 def distance_image(
     source: Bytes, steps: Ints, weights: NDArray[np.uint16], width: int, height: int, out: Bytes
 ) -> None:
-    """max over the steps of source(p + step) * weight / 256, for all p inside; (6.25) and (6.23), flat images.
+    """max over the steps of source(p +- step) * weight / 256, for all p inside; (6.25) and (6.23), flat images.
 
-    steps: flat offsets, (S,); weights: 256 (1 - distance / L), (S,).
+    steps: flat offsets in one half plane, (S,); weights: 256 (1 - distance / L), (S,).
     """
     stride = width + 2 * MARGIN
     best = np.empty(width, np.uint8)
@@ -112,8 +112,9 @@ def distance_image(
         best[:] = source[begin : begin + width]
         for j in range(len(steps)):
             there = source[begin + steps[j] : begin + steps[j] + width]
+            opposite = source[begin - steps[j] : begin - steps[j] + width]
             weight = weights[j]
             for x in range(width):
-                value = np.uint8(np.uint16(np.uint16(there[x]) * weight) >> np.uint16(8))
-                best[x] = max(best[x], value)
+                value = np.uint16(max(there[x], opposite[x]))
+                best[x] = max(best[x], np.uint8(np.uint16(value * weight) >> np.uint16(8)))
         out[begin : begin + width] = best
