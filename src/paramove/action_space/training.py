@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from platformdirs import user_cache_path
 
 from paramove.action_space.vocabulary import POSE_SIZES, ActionModel, table_target
 from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
@@ -19,10 +16,10 @@ from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
 from paramove.hmm import TrainingOptions
 from paramove.input_error import InputError
 from paramove.observation.arm_body import BENT_POSE_POINTS
-from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM, QuadraticPHMM
+from paramove.phmm import MovementDescription, PolynomialPHMM, QuadraticPHMM
+from paramove.phmm.kept_model import kept_model
 
 Floats = NDArray[np.float64]
-logger = logging.getLogger(__name__)
 
 STATES = 80
 TRACKED_POINTS = ("shoulder", "elbow", "index")
@@ -71,25 +68,15 @@ def cached_action(
         show: makes the demonstrations; called only if there is no model of that source.
         target: see `ActionModel`.
     """
+
+    def train() -> PolynomialPHMM:
+        model = train_action(show(), n_states=n_states, kind=kind)
+        assert model.description is not None
+        model.description = replace(model.description, action=name)
+        return model
+
     told = f"{source}, {kind.__name__}, {n_states} states"
-    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
-    path = kept_in / f"{name}_{crc32(told.encode()):08x}.npz"
-    if path.exists():
-        try:
-            stored = PolynomialPHMM.load(path)
-            if stored.description is not None and stored.description.source == told:
-                return ActionModel.from_file_model(stored, target)
-        except (ModelFileError, InputError) as error:
-            logger.warning("training again, the cached model does not fit: %s", error)
-    model = train_action(show(), n_states=n_states, kind=kind)
-    assert model.description is not None
-    model.description = replace(model.description, action=name, source=told)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        model.save(path)
-    except OSError as error:
-        logger.warning("the trained model is not kept: %s", error)
-    return ActionModel.from_file_model(model, target)
+    return ActionModel.from_file_model(kept_model(PolynomialPHMM, name, told, train, folder), target)
 
 
 def table_action_demonstrations(

@@ -1,6 +1,5 @@
 """Training sets on grids of targets, and the reaching model that moves the robot (thesis 4.2.1, 5.2.2)."""
 
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,10 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
-from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParameterGrid
+from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
+from paramove.phmm.kept_model import stored_model
 
 Floats = NDArray[np.float64]
-logger = logging.getLogger(__name__)
 
 DEMONSTRATOR_VERSION = 2  # raise it with every change of the synthetic movements: cached models then train again
 
@@ -94,13 +93,14 @@ def train_reaching_model(
     """
     source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, {repetitions} repetitions"
     model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
-    if cache is not None and cache.exists():
-        try:
-            stored = InterpolativePHMM.load(cache)
-            if stored.n_states == n_states and stored.description and stored.description.source == source:
-                return stored
-        except ModelFileError as error:
-            logger.warning("training again, the cached model does not fit: %s", error)
+    stored = stored_model(InterpolativePHMM, cache)
+    if (
+        stored is not None
+        and stored.n_states == n_states
+        and stored.description
+        and stored.description.source == source
+    ):
+        return stored
     shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=repetitions)
     model.fit(shown.sequences, shown.theta)
     arrival, grasp = grasp_states(model.means_)

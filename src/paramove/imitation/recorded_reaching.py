@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +12,7 @@ import numpy as np
 from paramove.demonstrations.body_frame import BODY
 from paramove.demonstrations.recorded_people import RATE_HZ, Recordings, RecordingsError, data_folder, load_recordings
 from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM
-
-logger = logging.getLogger(__name__)
+from paramove.phmm.kept_model import stored_model
 
 ACTIONS = ("reach_forward", "reach_across")
 N_STATES = 40
@@ -35,7 +33,7 @@ def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
         ModelFileError: There are neither recordings nor a kept model, or the recordings do not suit; with the remedy.
     """
     cache = None if cache_folder is None else cache_folder / f"reaching_{name}.npz"
-    kept = _kept(cache)
+    kept = stored_model(PolynomialPHMM, cache)
     try:
         source = f"{name}, {', '.join(ACTIONS)}, version {VERSION}, sha256 {_digest(name)}"
         if kept is not None and kept.description is not None and kept.description.source == source:
@@ -53,16 +51,6 @@ def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
     if cache is not None:
         model.save(cache)
     return model
-
-
-def _kept(cache: Path | None) -> PolynomialPHMM | None:
-    if cache is None or not cache.exists():
-        return None
-    try:
-        return PolynomialPHMM.load(cache)
-    except ModelFileError as error:
-        logger.warning("training again, the cached model does not fit: %s", error)
-        return None
 
 
 def _digest(name: str) -> str:

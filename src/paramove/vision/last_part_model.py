@@ -8,23 +8,20 @@ by simple thresholding." The threshold is on the probability that a genuine last
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from platformdirs import user_cache_path
 
 from paramove.demonstrations.last_parts import FRAMES, LAST_PARTS_VERSION, last_parts
 from paramove.demonstrations.synthetic import FRAME, Action
 from paramove.hmm import TrainingOptions
-from paramove.phmm import ModelFileError, MovementDescription, QuadraticPHMM
+from paramove.phmm import MovementDescription, QuadraticPHMM
+from paramove.phmm.kept_model import kept_model
 
 Floats = NDArray[np.float64]
-logger = logging.getLogger(__name__)
 
 STATES = 8
 PERSONS = 8
@@ -89,26 +86,15 @@ class LastPartModel:
 
 def _trained(action: Action, points: Sequence[str], folder: Path | None) -> QuadraticPHMM:
     """From the folder, or trained and kept there."""
+
+    def train() -> QuadraticPHMM:
+        shown = last_parts(action, points, persons=PERSONS)
+        model = QuadraticPHMM(STATES, 2, 4, options=TrainingOptions(floor_deviation=0.003))
+        model.description = MovementDescription(
+            f"last part of {action}", tuple(points), "m", FRAME, ("u", "v"), shown.duration_s,
+            rate_hz=(FRAMES - 1) / shown.duration_s,
+        )  # fmt: skip
+        return model.fit(shown.sequences, shown.theta, shown.groups)
+
     source = f"last parts {LAST_PARTS_VERSION} of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
-    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
-    path = kept_in / f"last_part_{action}_{crc32(source.encode()):08x}.npz"
-    if path.exists():
-        try:
-            stored = QuadraticPHMM.load(path)
-            if stored.description is not None and stored.description.source == source:
-                return stored
-        except ModelFileError as error:
-            logger.warning("training again, the cached model does not fit: %s", error)
-    shown = last_parts(action, points, persons=PERSONS)
-    model = QuadraticPHMM(STATES, 2, 4, options=TrainingOptions(floor_deviation=0.003))
-    model.description = MovementDescription(
-        f"last part of {action}", tuple(points), "m", FRAME, ("u", "v"), shown.duration_s,
-        rate_hz=(FRAMES - 1) / shown.duration_s, source=source,
-    )  # fmt: skip
-    model.fit(shown.sequences, shown.theta, shown.groups)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        model.save(path)
-    except OSError as error:
-        logger.warning("the trained model is not kept: %s", error)
-    return model
+    return kept_model(QuadraticPHMM, f"last_part_{action}", source, train, folder)

@@ -1,0 +1,55 @@
+"""Models that are trained from demonstrations at their first use and kept in a file from then on."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+from zlib import crc32
+
+from platformdirs import user_cache_path
+
+from paramove.phmm.parametric import ParametricHMM
+from paramove.phmm.storage import ModelFileError
+
+Model = TypeVar("Model", bound=ParametricHMM)
+logger = logging.getLogger(__name__)
+
+
+def stored_model(kind: type[Model], path: Path | None) -> Model | None:
+    """The model of a file, if there is one that can be read; what cannot is told in the log."""
+    if path is None or not path.exists():
+        return None
+    try:
+        return kind.load(path)
+    except ModelFileError as error:
+        logger.warning("training again, the cached model does not fit: %s", error)
+        return None
+
+
+def kept_model(
+    kind: type[Model], name: str, source: str, train: Callable[[], Model], folder: Path | None = None
+) -> Model:
+    """The model of that source which a folder has, by default the user's cache; else trained and kept there.
+
+    Args:
+        kind: of the model. name: of its file.
+        source: what it is trained from and how, which its description then names; another source is another file.
+        train: gives one with a description; called only if it is needed.
+    """
+    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
+    path = kept_in / f"{name}_{crc32(source.encode()):08x}.npz"
+    stored = stored_model(kind, path)
+    if stored is not None and stored.description is not None and stored.description.source == source:
+        return stored
+    model = train()
+    assert model.description is not None
+    model.description = replace(model.description, source=source)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        model.save(path)
+    except OSError as error:
+        logger.warning("the trained model is not kept: %s", error)
+    return model
