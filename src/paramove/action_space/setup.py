@@ -23,10 +23,9 @@ from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import read_cameras
+from paramove.observation.measured_files import measured_cameras, measured_file
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
-MOST_CAMERAS = 4
 LEAST_GROWN = 0.8
 """Arm length of grown people over the demonstrator's, at least."""
 SYNTHETIC = ("pointing", "reaching")
@@ -76,6 +75,11 @@ def read_person(path: Path) -> Person:
         raise InputError(f"{path}: {found}; expected as {example}") from error
 
 
+def measured_person(run_folder: Path, path: Path | None) -> Person:
+    """The person of a file, looked for in the run's folder first; without one, the synthetic demonstrator."""
+    return Person() if path is None else read_person(measured_file(run_folder, path))
+
+
 class TrackingSetup(BaseModel):
     """Parameters of a tracker. Its files are looked for in the run's folder first, then in the workspace.
 
@@ -109,16 +113,8 @@ class TrackingSetup(BaseModel):
 
     def video_tracker(self, run_folder: Path = Path()) -> VideoTracker:
         """Reads the files, trains and compiles what is not there yet. Raises InputError."""
-        found = read_cameras(_beside(run_folder, self.cameras))
-        if len(found) > MOST_CAMERAS:
-            raise InputError(f"{self.cameras}: {len(found)} cameras found, at most {MOST_CAMERAS} are used")
-        cameras = [
-            type(one)(
-                f"camera_{number}", one.width_px, one.height_px, one.matrix, one.distortion, one.camera_from_world
-            )
-            for number, one in enumerate(found, start=1)
-        ]
-        person = Person() if self.person is None else read_person(_beside(run_folder, self.person))
+        cameras = measured_cameras(run_folder, self.cameras)
+        person = measured_person(run_folder, self.person)
         vocabulary = Vocabulary([_action(name) for name in self.actions])
         grammar = Grammar.choice(list(vocabulary.names)) if self.grammar is None else read_grammar(self.grammar)
         options = TrackerOptions(
@@ -131,11 +127,6 @@ class TrackingSetup(BaseModel):
         video = VideoTracker(tracker, observer, cameras, 1.0 / self.rate_hz)
         video.warm_up()
         return video
-
-
-def _beside(run_folder: Path, path: Path) -> Path:
-    """In the run's folder if there is such a file, where a simulator writes what was measured; else as given."""
-    return run_folder / path if (run_folder / path).is_file() else path
 
 
 def _detection(scale: float) -> DetectionOptions:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paramove.input_error import InputError
-from paramove.observation.cameras import CalibratedCamera, read_cameras
+from paramove.observation.cameras import CalibratedCamera
+from paramove.observation.measured_files import measured_cameras
 from paramove.vision.aligned_views import AlignedViews, Views
 from paramove.vision.camera_watch import CameraWatch
 from paramove.vision.colour_tracker import Colour
@@ -19,7 +20,6 @@ from paramove.vision.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint
 
 Image = NDArray[np.uint8]
 
-MOST_CAMERAS = 4
 UNSEEN_S = 3.0
 """A point that was not seen by two cameras for so long is told. A hand that rests below the table comes back sooner."""
 
@@ -160,11 +160,7 @@ class BodyTrackingSetup(BaseModel):
 
     def body_tracking(self, run_folder: Path = Path()) -> BodyTracking:
         """Reads the calibration. Raises InputError."""
-        in_run = run_folder / self.cameras
-        found = read_cameras(in_run if in_run.is_file() else self.cameras)
-        if len(found) > MOST_CAMERAS:
-            raise InputError(f"{self.cameras}: {len(found)} cameras found, at most {MOST_CAMERAS} are used")
-        cameras = [replace(one, name=f"camera_{number}") for number, one in enumerate(found, start=1)]
+        cameras = measured_cameras(run_folder, self.cameras)
         markers = {name: one.marker(name) for name, one in self.markers.items()}
         options = BodyTrackerOptions(markers=markers, most_residual_px=self.most_residual_px)
         return BodyTracking(cameras, options, 1.0 / self.rate_hz)

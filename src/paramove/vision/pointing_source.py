@@ -43,14 +43,11 @@ class PointingSetup(BaseModel):
 
     def _window(self, run_folder: Path) -> PointingWindow:
         # Movement models take a second to import: only who hears poses waits for them.
-        from paramove.action_space.setup import Person, read_person
+        from paramove.action_space.setup import measured_person
         from paramove.vision.last_part_model import LastPartModel
         from paramove.vision.pointing_window import PointingWindow
 
-        person = Person()
-        if self.person is not None:
-            in_run = run_folder / self.person
-            person = read_person(in_run if in_run.is_file() else self.person)
+        person = measured_person(run_folder, self.person)
         model = LastPartModel.of_points(self.pointing_window.points)
         return PointingWindow(model, person.placement, self.pointing_window)
 
