@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from paramove.cli import evaluate_tracking
 from paramove.cli.evaluate import app
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE
 from paramove.evaluation.chapter6 import clips, experiments, report
+from paramove.supervision.exit_codes import JUDGED_A_FAILURE
 from tests.evaluation.chapter6.made_up_tracks import result
 
 

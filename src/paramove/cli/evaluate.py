@@ -19,7 +19,6 @@ from paramove.cli.evaluate_movements import peers, real
 from paramove.cli.evaluate_real_images import real_images
 from paramove.cli.evaluate_tracking import chapter6
 from paramove.cli.evaluation_io import (
-    JUDGED_A_FAILURE,
     PROGRESS,
     JsonFileOption,
     seeds_in,
@@ -87,7 +86,7 @@ def rule_learning(
                 f"seed {result['seed']}: {result.get('reason') or 'failed'} ({result['run_folder']})", markup=False
             )
     write_numbers(json_file, {"results": results, "totals": totals_of(results)}, console)
-    raise typer.Exit(exit_codes.OK if enough(results) else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if enough(results) else exit_codes.JUDGED_A_FAILURE)
 
 
 @app.command("homography")
@@ -126,7 +125,7 @@ def homography(
     console.print(_homography_table(rows))
     write_numbers(json_file, rows, console)
     good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
-    raise typer.Exit(exit_codes.OK if good else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if good else exit_codes.JUDGED_A_FAILURE)
 
 
 def _homography_table(rows: list[dict[str, Any]]) -> Table:

@@ -12,7 +12,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, JsonFileOption, seeds_in, stored_results, write_numbers
+from paramove.cli.evaluation_io import JsonFileOption, seeds_in, stored_results, write_numbers
 from paramove.supervision import exit_codes
 
 CHAPTER2_FOLDER = Path("runs/evaluation/chapter2")
@@ -92,7 +92,7 @@ def chapter4(
         console.print(table)
     write_numbers(json_file, plain(numbers), console)
     console.print(f"report: {folder / 'report.html'}", markup=False, soft_wrap=True)
-    raise typer.Exit(exit_codes.OK if all(target.met for target in targets) else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if all(target.met for target in targets) else exit_codes.JUDGED_A_FAILURE)
 
 
 def _rows(findings: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, PROGRESS, JsonFileOption, workspace_here, write_numbers
+from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, workspace_here, write_numbers
 from paramove.supervision import exit_codes
 
 RUNS = Path("runs/kills")
@@ -66,7 +66,7 @@ def kills(
     for line in problems_of(ordered):
         console.print(Text(line, style="red"), soft_wrap=True)
     write_numbers(json_file, {"cases": ordered}, console)
-    raise typer.Exit(exit_codes.OK if all(result["passed"] for result in ordered) else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if all(result["passed"] for result in ordered) else exit_codes.JUDGED_A_FAILURE)
 
 
 def faults(
@@ -110,7 +110,7 @@ def faults(
             console.print(Text(f"{result.row.id}: {result.message} ({', '.join(result.row.tests)})", style="red"))
     write_numbers(json_file, [result.as_json() for result in results], console)
     bad = any(result.outcome in ("failed", "missing") for result in results)
-    raise typer.Exit(JUDGED_A_FAILURE if bad else exit_codes.OK)
+    raise typer.Exit(exit_codes.JUDGED_A_FAILURE if bad else exit_codes.OK)
 
 
 def _perform(missing: list[Any], options: Any, results: dict[str, dict[str, Any]], console: Console) -> None:

@@ -10,7 +10,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, seeds_in, workspace_here
+from paramove.cli.evaluation_io import seeds_in, workspace_here
 from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def imitation(
     for sentence in numbers["why"]:
         console.print(f"\n{sentence}", markup=False)
     console.print(f"\nreport: {folder / 'report.html'}", markup=False, soft_wrap=True)
-    raise typer.Exit(exit_codes.OK if all(one.met is not False for one in rows) else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if all(one.met is not False for one in rows) else exit_codes.JUDGED_A_FAILURE)
 
 
 def _table(rows: list[Compared]) -> Table:

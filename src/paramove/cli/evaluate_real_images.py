@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, JsonFileOption, write_numbers
+from paramove.cli.evaluation_io import JsonFileOption, write_numbers
 from paramove.supervision import exit_codes
 
 REAL_IMAGES_FOLDER = Path("runs/evaluation/real_images")
@@ -47,7 +47,7 @@ def real_images(
     _print(numbers, console)
     write_numbers(json_file, numbers, console)
     console.print(f"report: {page}", markup=False, soft_wrap=True)
-    raise typer.Exit(exit_codes.OK if numbers["met"] else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if numbers["met"] else exit_codes.JUDGED_A_FAILURE)
 
 
 def _print(numbers: dict[str, Any], console: Console) -> None:

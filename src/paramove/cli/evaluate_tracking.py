@@ -11,7 +11,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE, JsonFileOption, stored_results, write_numbers
+from paramove.cli.evaluation_io import JsonFileOption, stored_results, write_numbers
 from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _report(
     write_numbers(json_file, numbers, console)
     console.print(f"report: {folder / 'report.html'}", markup=False, soft_wrap=True)
     judged = [goal.met for goal in goals if goal.met is not None]
-    raise typer.Exit(exit_codes.OK if judged and all(judged) else JUDGED_A_FAILURE)
+    raise typer.Exit(exit_codes.OK if judged and all(judged) else exit_codes.JUDGED_A_FAILURE)
 
 
 def _print_findings(findings: Sequence[dict[str, str]], console: Console) -> None:

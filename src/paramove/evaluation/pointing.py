@@ -16,25 +16,18 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from paramove.evaluation.after_a_run import evaluated
 from paramove.evaluation.pointing_run import FARTHEST_M, MEDIAN_M, load_pointing_run
-from paramove.evaluation.recorded_run import RunFolderError
-from paramove.supervision import exit_codes
-
-JUDGED_A_FAILURE = 3
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m paramove.evaluation.pointing", description=__doc__)
-    parser.add_argument("run_folder", type=Path)
-    parser.add_argument("--no-video", action="store_true", help="write no pointing.mp4")
-    options = parser.parse_args(arguments)
-    console = Console(highlight=False, emoji=False)
-    try:
-        run = load_pointing_run(options.run_folder.resolve())
-    except RunFolderError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        return exit_codes.INPUT_MISSING
+    flags = {"--no-video": "write no pointing.mp4"}
+    return evaluated("paramove.evaluation.pointing", __doc__, flags, _evaluate, arguments)
+
+
+def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
+    run = load_pointing_run(options.run_folder)
     from paramove.evaluation.pointing_report import write_pointing_report
     from paramove.evaluation.pointing_video import write_pointing_video
 
@@ -44,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     video = None if options.no_video else write_pointing_video(run.folder, console)
     written = [write_pointing_report(run, summary, video), *([video] if video is not None else []), numbers]
     show(summary, written, console)
-    return JUDGED_A_FAILURE if summary["success"] is False else exit_codes.OK
+    success: bool | None = summary["success"]
+    return success
 
 
 def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:

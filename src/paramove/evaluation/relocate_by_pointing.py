@@ -17,27 +17,21 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from paramove.evaluation.recorded_run import RunFolderError, load_run
+from paramove.evaluation.after_a_run import evaluated
+from paramove.evaluation.recorded_run import load_run
 from paramove.evaluation.relocate_by_pointing_run import GOAL, SCALE, pointed_relocations_of, summary_of
-from paramove.supervision import exit_codes
-
-JUDGED_A_FAILURE = 3
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m paramove.evaluation.relocate_by_pointing", description=__doc__)
-    parser.add_argument("run_folder", type=Path)
-    parser.add_argument("--no-video", action="store_true", help="write no relocations.mp4")
-    options = parser.parse_args(arguments)
-    console = Console(highlight=False, emoji=False)
-    try:
-        run = load_run(options.run_folder.resolve())
-        relocations = pointed_relocations_of(run)
-        summary = summary_of(run, relocations)
-    except RunFolderError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        return exit_codes.INPUT_MISSING
+    flags = {"--no-video": "write no relocations.mp4"}
+    return evaluated("paramove.evaluation.relocate_by_pointing", __doc__, flags, _evaluate, arguments)
+
+
+def _evaluate(options: argparse.Namespace, console: Console) -> bool:
+    run = load_run(options.run_folder)
+    relocations = pointed_relocations_of(run)
+    summary = summary_of(run, relocations)
     from paramove.evaluation.relocate_by_pointing_report import write_relocation_report
     from paramove.evaluation.relocate_by_pointing_video import write_relocation_video
 
@@ -46,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     video = None if options.no_video else write_relocation_video(run, console)
     report = write_relocation_report(run, relocations, summary, video)
     show(summary, [report, *([video] if video is not None else []), numbers], console)
-    return exit_codes.OK if summary["success"] else JUDGED_A_FAILURE
+    return bool(summary["success"])
 
 
 def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:

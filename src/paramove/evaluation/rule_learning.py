@@ -13,13 +13,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from paramove.evaluation.recorded_run import RunFolderError, load_run
+from paramove.evaluation.after_a_run import evaluated
+from paramove.evaluation.recorded_run import load_run
 from paramove.evaluation.run_summary import RunEvaluation, as_json
 from paramove.evaluation.verdict_table import show_verdict
 from paramove.robots.description import RobotDescription
-from paramove.supervision import exit_codes
 
-JUDGED_A_FAILURE = 3
 ROBOT = Path("robot_description/hoap3")
 
 
@@ -37,17 +36,12 @@ def write_summary(evaluation: RunEvaluation) -> Path:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m paramove.evaluation.rule_learning", description=__doc__)
-    parser.add_argument("run_folder", type=Path)
-    parser.add_argument("--no-video", action="store_true", help="write no demo.mp4")
-    parser.add_argument("--no-report", action="store_true", help="write run.json alone")
-    options = parser.parse_args(arguments)
-    console = Console(highlight=False, emoji=False)
-    try:
-        evaluation = evaluate(options.run_folder.resolve(), Path.cwd())
-    except RunFolderError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        return exit_codes.INPUT_MISSING
+    flags = {"--no-video": "write no demo.mp4", "--no-report": "write run.json alone"}
+    return evaluated("paramove.evaluation.rule_learning", __doc__, flags, _evaluate, arguments)
+
+
+def _evaluate(options: argparse.Namespace, console: Console) -> bool:
+    evaluation = evaluate(options.run_folder, Path.cwd())
     written = [write_summary(evaluation)]
     if not options.no_report:
         from paramove.evaluation.demo_video import write_video
@@ -56,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         video = None if options.no_video else write_video(evaluation, console)
         written = [write_report(evaluation, video), *([video] if video is not None else []), *written]
     show_verdict(evaluation.summary, written, console)
-    return exit_codes.OK if evaluation.summary["success"] else JUDGED_A_FAILURE
+    return bool(evaluation.summary["success"])
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ FAILURE = 1
 """A node was given up, a required node ended, or the run was judged a failure."""
 USAGE = 2
 """Wrong arguments; the same again would fail again."""
+JUDGED_A_FAILURE = 3
+"""An evaluation found that what it judges is not as it should be."""
 INPUT_MISSING = 66
 """A launch file, an overlay or a node's input does not exist; a restart does not help."""
 TEMPORARY = 75

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from paramove.cli import evaluate_chapters
 from paramove.cli.evaluate import app
-from paramove.cli.evaluation_io import JUDGED_A_FAILURE
 from paramove.evaluation.chapter4.experiments import QUICK, experiments
+from paramove.supervision.exit_codes import JUDGED_A_FAILURE
 
 
 def test_quick_writes_a_report_that_needs_no_other_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

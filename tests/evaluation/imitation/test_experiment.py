@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from paramove.cli import evaluate_imitation
 from paramove.cli.evaluate import app
 from paramove.demonstrations.reaching import reaching_grid_demonstrations
 from paramove.evaluation.imitation.experiment import (
@@ -28,6 +27,7 @@ from paramove.evaluation.imitation.thesis import compared
 from paramove.hmm import TrainingOptions
 from paramove.hmm.sequences import resample
 from paramove.phmm.synchronisation import synchronised
+from paramove.supervision import exit_codes
 from tests.imitation.reaching import ROBOT_FOLDER, reaching_model, solver
 
 
@@ -133,7 +133,7 @@ def test_the_report_needs_no_other_file(tmp_path: Path) -> None:
 def test_the_command_prints_the_thesis_beside_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("paramove.evaluation.imitation.experiment.run_experiment", lambda *_: experiment())
     done = CliRunner().invoke(app, ["imitation", "--seeds", "0", "--report", str(tmp_path)])
-    assert done.exit_code in (0, evaluate_imitation.JUDGED_A_FAILURE), done.output
+    assert done.exit_code in (0, exit_codes.JUDGED_A_FAILURE), done.output
     assert "gripper at the target" in done.output
     assert "up to 25" in done.output
     assert str(tmp_path) in done.output.replace("\n", "")

@@ -1,0 +1,37 @@
+"""The command that evaluates a run: the launcher calls it when the run has ended, or people by hand."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from paramove.evaluation.recorded_run import RunFolderError
+from paramove.supervision import exit_codes
+
+Evaluate = Callable[[argparse.Namespace, Console], bool | None]
+
+
+def evaluated(
+    module: str, described: str | None, flags: Mapping[str, str], evaluate: Evaluate, arguments: Sequence[str] | None
+) -> int:
+    """Reads the command's arguments and evaluates; returns the exit code.
+
+    Args:
+        module: whose command it is. described: its help.
+        flags: options without a value, such as "--no-video", with their help.
+        evaluate: what is to be done with `run_folder`, an absolute path, and the flags; returns whether the run did
+            what it should, None if nobody knows. Raises RunFolderError for a folder that holds no such run.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m {module}", description=described)
+    parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
+    for flag, told in flags.items():
+        parser.add_argument(flag, action="store_true", help=told)
+    try:
+        success = evaluate(parser.parse_args(arguments), Console(highlight=False, emoji=False))
+    except RunFolderError as error:
+        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+        return exit_codes.INPUT_MISSING
+    return exit_codes.JUDGED_A_FAILURE if success is False else exit_codes.OK
