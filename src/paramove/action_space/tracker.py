@@ -163,8 +163,10 @@ class ActionTracker:
             if likelihoods is None
             else self.filter.measure(likelihoods, self.options.filter.independence(elapsed_s))
         )
-        self._judge(time_s, elapsed_s, measured, presence)
-        self._belief = self._estimates(time_s, measured)
+        average = mean_pose(self.filter.particles.poses, self.filter.particles.weights)
+        present = None if presence is None or measured is None else presence(self.placement.in_world(average))
+        self._judge(time_s, elapsed_s, measured, present)
+        self._belief = self._estimates(time_s, measured, average)
         self._count_jumps(elapsed_s)
         return self._belief
 
@@ -193,31 +195,22 @@ class ActionTracker:
         finite = values[np.isfinite(values)]
         return None if len(finite) == 0 or (len(finite) == len(values) and np.ptp(finite) == 0.0) else values
 
-    def _judge(
-        self,
-        time_s: float,
-        elapsed_s: float,
-        measured: Measurement | None,
-        presence: Callable[[Floats], Presence] | None,
-    ) -> None:
+    def _judge(self, time_s: float, elapsed_s: float, measured: Measurement | None, present: Presence | None) -> None:
         if measured is None:
             self._blind_since_s = time_s if self._blind_since_s is None else self._blind_since_s
             return
         self._blind_since_s = None
-        was_lost, particles = self.health.lost, self.filter.particles
-        pose = self.placement.in_world(mean_pose(particles.poses, particles.weights))
-        present = None if presence is None else presence(pose)
+        was_lost = self.health.lost
         self.health.update(time_s, elapsed_s, measured.best, measured.temper, present)
         if self.health.lost and not was_lost:
             self._just_lost = True
             self.detector.forget()
 
-    def _estimates(self, time_s: float, measured: Measurement | None) -> ActionBelief:
+    def _estimates(self, time_s: float, measured: Measurement | None, average: Floats) -> ActionBelief:
         particles, placement = self.filter.particles, self.placement
         action = self.filter.propagation.actions[particles.step]
         probabilities = action_probabilities(action, particles.weights, len(self.vocabulary))
         theta, targets = self._theta(action)
-        average = mean_pose(particles.poses, particles.weights)
         best = average if measured is None else best_pose(particles.poses, particles.weights)
         reached = reached_place(self.vocabulary, action, particles)
         widths = tuple(width / placement.scale for width in KERNEL_WIDTHS)
