@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -187,3 +188,24 @@ def test_presence_tells_an_arm_from_the_background_and_from_a_picture_that_has_c
     assert presence(elsewhere).changed > 8.0
     observer.look([None])
     assert observer.presence(there) == Presence(0.0, 0.0)
+
+
+def test_presence_looks_along_a_bent_wrist():
+    """Of a hand bent by a right angle the line from elbow to fingertip lies beside it."""
+    (camera,) = four_cameras(width_px=160, height_px=120)[:1]
+    sizes = ArmSizes()
+    sideways, downward, _ = camera.camera_from_world[:3, :3]
+    shoulder = TRUE[:3]
+    elbow = shoulder + sizes.upper_arm * downward
+    wrist = elbow + sizes.forearm * sideways
+    bent = np.concatenate([shoulder, elbow, wrist - sizes.hand * downward, wrist])
+    observer = ArmObserver(sizes, [camera], threads=1)
+    room = np.random.default_rng(0).integers(90, 96, (120, 160, 3), dtype=np.uint8)
+    for _ in range(3):
+        observer.look([room])
+        observer.learn(TRUE + np.tile([0.0, -0.4, 0.0], 3), 0.1)
+    image = cv2.fillPoly(room.copy(), [observer.outline(bent, 0).round().astype(np.int32)], (200, 40, 40))
+    observer.look([image])
+    observer.log_likelihoods(bent[None])
+    assert observer.presence(bent).there > 0.8
+    assert observer.presence(bent[:9]).there < 0.3

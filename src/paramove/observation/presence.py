@@ -15,7 +15,7 @@ from paramove.observation.cameras import CalibratedCamera
 Floats = NDArray[np.float64]
 
 AXIS_SHARES = np.linspace(0.25, 0.95, 15)
-"""Of the line from elbow to fingertip: places at which something must be seen."""
+"""Of the line from elbow over the wrist to the fingertip: places at which something must be seen."""
 CHANGED = 30
 """Of `FULL`: a pixel that has changed."""
 AROUND = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1)), axis=-1).reshape(-1, 2)
@@ -54,7 +54,11 @@ def seen_presence(
         arm_area: px.
     """
     changed = np.count_nonzero(change > CHANGED) / arm_area
-    axis = pose[3:6] + AXIS_SHARES[:, None] * (pose[HAND] - pose[3:6])
+    elbow, hand = pose[3:6], pose[HAND]
+    wrist = pose[9:12] if len(pose) > 9 else 0.5 * (elbow + hand)
+    corners = np.stack([elbow, wrist, hand])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    axis = np.stack([np.interp(AXIS_SHARES * lengths[-1], lengths, column) for column in corners.T], axis=1)
     places = np.round(camera.project(axis, distorted=False))
     size, stride = (camera.width_px, camera.height_px), camera.width_px + 2
     inside = ((places >= 0.0) & (places < size)).all(axis=1)  # NaN, behind the camera, is not
