@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.observation import ArmObserver, ArmSizes, ObservationOptions
-from paramove.observation.contour_kernels import NORMAL_STEP, fill_segments, new_contour, place_key_points
+from paramove.observation.contour_kernels import EVERY, NORMAL_STEP, fill_segments, new_contour, place_key_points
 from paramove.observation.edge_images import EdgeImages
 from paramove.observation.edge_kernels import DIRECTIONS, MARGIN
 from paramove.observation.likelihood_kernels import outline
@@ -29,27 +29,31 @@ def edges():
 
 
 def prepared(pose):
-    """Contour, number of points, number of key points."""
+    """Contour, number of compared points, number of key points."""
     contour = new_contour(320, 240)
-    points = outline(pose, BODY, kernel_camera(CAMERA), new_canvas(320, 240), contour)
-    number = place_key_points(points, 7.0, contour)
-    fill_segments(number, (320 + 2 * MARGIN) * (240 + 2 * MARGIN), contour)
+    count = outline(pose, BODY, kernel_camera(CAMERA), new_canvas(320, 240), contour)
+    number = place_key_points(count, 7.0, contour)
+    points = fill_segments(number, (320 + 2 * MARGIN) * (240 + 2 * MARGIN), contour)
     return contour, points, number
 
 
 class Objective:
     """Equation (6.26) from the contour pixels alone, all of it, in double precision."""
 
-    def __init__(self, contour, points, edges):
-        self.pixels = np.stack([contour.x[:points], contour.y[:points]], axis=1).astype(float)
+    def __init__(self, contour, number, edges):
+        points = contour.starts[number]
+        loop = np.stack([contour.x[:points], contour.y[:points]], axis=1).astype(float)
         self.images = edges.distances.reshape(DIRECTIONS, -1, edges.stride) / 255.0
         count = max(round(points / 7.0), -(-points // 8))
         self.starts = np.arange(count) * points // count
-        chord = self.pixels[(self.starts + NORMAL_STEP) % points] - self.pixels[self.starts - NORMAL_STEP]
+        chord = loop[(self.starts + NORMAL_STEP) % points] - loop[self.starts - NORMAL_STEP]
         self.normals = np.stack([-chord[:, 1], chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
         lengths = np.diff(np.append(self.starts, points))
-        self.segment = np.repeat(np.arange(count), lengths)
-        self.share = (np.arange(points) - self.starts[self.segment]) / lengths[self.segment]
+        segment = np.repeat(np.arange(count), lengths)
+        beyond = np.arange(points) - self.starts[segment]
+        compared = beyond % EVERY == 0
+        self.pixels, self.segment = loop[compared], segment[compared]
+        self.share = (beyond / lengths[segment])[compared]
         self.after = (self.segment + 1) % count
         n = self.between(self.normals)
         self.n = n / np.linalg.norm(n, axis=1, keepdims=True)
@@ -57,7 +61,7 @@ class Objective:
         cosines = np.abs(self.n @ np.stack([np.sin(angles), np.cos(angles)]))
         self.b = cosines.argmax(axis=1)
         self.or_b = DIRECTIONS - 1 - (cosines + 1e-5 >= cosines.max(axis=1, keepdims=True))[:, ::-1].argmax(axis=1)
-        self.keys = self.pixels[self.starts] + 0.5 * self.normals - 0.5
+        self.keys = loop[self.starts] + 0.5 * self.normals - 0.5
 
     def between(self, values):
         share = self.share if values.ndim == 1 else self.share[:, None]
@@ -93,13 +97,13 @@ class Objective:
 
 def test_the_step_sizes_are_the_thesiss():
     assert_allclose(0.5 ** STEP_BITS[:8], [1, 0.5, 1, 0.25, 1, 0.5, 1, 0.125], rtol=0.0, atol=0.0)
-    assert len(STEP_BITS) == 20
+    assert len(STEP_BITS) == 15
 
 
 def test_the_incremental_objective_is_the_full_one(edges):
     for pose in [TRUE, *displaced(TRUE, 20, 0.03), *some_poses(20)]:
         contour, points, number = prepared(pose)
-        full, shifts = Objective(contour, points, edges), new_shifts(number + 1)
+        full, shifts = Objective(contour, number, edges), new_shifts(number + 1)
         assert len(full.starts) == number
         total = begin(edges.distances.reshape(-1), edges.stride, number, UNIT, contour, shifts)
         least, greatest = (values.sum() for values in full.gradients(np.zeros(number)))
@@ -107,7 +111,7 @@ def test_the_incremental_objective_is_the_full_one(edges):
         energy = match(edges.distances.reshape(-1), edges.stride, number, points, UNIT, contour, shifts)
         least, greatest = full(shifts.shift[:number].astype(float))
         assert least - 1e-5 <= energy <= greatest + 1e-5
-        assert greatest - least < 0.3
+        assert greatest - least < 0.5
         assert energy > full(np.zeros(number))[1]
 
 
@@ -152,7 +156,7 @@ def test_the_matching_comes_near_to_the_exact_optimum(edges):
         contour, points, number = prepared(pose)
         shifts = new_shifts(number + 1)
         energy = match(edges.distances.reshape(-1), edges.stride, number, points, UNIT, contour, shifts)
-        shares.append(energy / exact_optimum(Objective(contour, points, edges), number))
+        shares.append(energy / exact_optimum(Objective(contour, number, edges), number))
     assert np.median(shares) > 0.97
     assert min(shares) > 0.8
 
@@ -166,9 +170,11 @@ def test_the_matching_moves_a_displaced_contour_onto_the_arm(edges):
     shifts = 0.012 * (np.cos(turns)[:, None] * sideways + np.sin(turns)[:, None] * downward)
     moved = [observer.match(TRUE + np.tile(shift, 3), 0) for shift in shifts]
     truth = observer.match(TRUE, 0)
+    between = 0.5 * (truth.contour + np.roll(truth.contour, -1, axis=0))
+    line = np.concatenate([truth.contour, between])
 
     def apart(points):
-        return np.linalg.norm(points[:, None] - truth.contour[None], axis=2).min(axis=1).mean()
+        return np.linalg.norm(points[:, None] - line[None], axis=2).min(axis=1).mean()
 
     assert np.mean([apart(one.contour) for one in moved]) > 1.9
     assert np.mean([apart(one.matched) for one in moved]) < 1.0

@@ -18,7 +18,7 @@ from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
 from paramove.observation.background_kernels import FULL
 from paramove.observation.cameras import CalibratedCamera
-from paramove.observation.contour_kernels import Contour, fill_segments, new_contour, place_key_points
+from paramove.observation.contour_kernels import EVERY, Contour, fill_segments, new_contour, place_key_points
 from paramove.observation.edge_images import EdgeImages
 from paramove.observation.edge_kernels import DIRECTIONS
 from paramove.observation.likelihood_kernels import (
@@ -48,7 +48,7 @@ class ContourMatch:
     """One posture's contour in one view and where it was matched, px of the image as captured.
 
     Attributes:
-        contour: the outline of the projected arm, (N, 2).
+        contour: the compared points of the outline of the projected arm, (N, 2).
         matched: the same points shifted along their normals, (N, 2).
         shifts: s_i, px of the compared image, (N,).
         strengths: G+ of each point, (N,), 0 to 1.
@@ -275,23 +275,23 @@ class ArmObserver:
         if count == 0:
             return None
         number = place_key_points(count, self.options.key_point_px, contour)
-        fill_segments(number, len(edges.distances[0]), contour)
+        points = fill_segments(number, len(edges.distances[0]), contour)
         shifts, values = new_shifts(number + 1), np.empty((SCRATCH, len(contour.lanes[0])), np.float32)
         unit, least = self._numbers[1:]
-        energy = match(edges.distances.reshape(-1), edges.stride, number, count, unit, contour, shifts)
+        energy = match(edges.distances.reshape(-1), edges.stride, number, points, unit, contour, shifts)
         strengths(edges.intensities.reshape(-1), edges.stride, number, least, contour, shifts, values)
-        return self._matched(view, count, number, contour, shifts.shift, values, energy)
+        return self._matched(view, number, contour, shifts.shift, values, energy)
 
-    def _matched(
-        self, view: int, count: int, number: int, contour: Contour, s: Any, values: Any, energy: float
-    ) -> ContourMatch:
+    def _matched(self, view: int, number: int, contour: Contour, s: Any, values: Any, energy: float) -> ContourMatch:
         """The matching of a contour with the kernels' filling up of segments taken away."""
-        filled = np.arange(LANES) < np.diff(contour.starts[: number + 1])[:, None]
+        lane = np.arange(LANES)
+        filled = EVERY * lane < np.diff(contour.starts[: number + 1])[:, None]
+        compared = (contour.starts[:number, None] + EVERY * lane)[filled]
         rows = contour.lanes[:, LANES : (number + 1) * LANES].reshape(-1, number, LANES)[:, filled].astype(np.float64)
         segment = np.nonzero(filled)[0]
         moved = (1.0 - rows[SHARE]) * s[segment] + rows[SHARE] * s[(segment + 1) % number]
         normals = np.stack([rows[NX], rows[NY]], axis=1)
-        edge = np.stack([contour.x[:count], contour.y[:count]], axis=1) + 0.5 * normals
+        edge = np.stack([contour.x[compared], contour.y[compared]], axis=1) + 0.5 * normals
         matched = edge + moved[:, None] * normals
         strength = values[0, LANES : (number + 1) * LANES].reshape(number, LANES)[filled].astype(np.float64)
         return ContourMatch(self._captured(view, edge), self._captured(view, matched), moved, strength, float(energy))

@@ -15,6 +15,8 @@ Ints32 = NDArray[np.int32]
 
 LEAST_POINTS = 24
 """A shorter contour is none: the arm is as good as out of sight."""
+EVERY = 2
+"""Of the contour pixels every second one is compared: in a smoothed image the one between says the same."""
 NORMAL_STEP = 4
 """The normal at a point is across the line between the points so many places before and after it."""
 
@@ -115,7 +117,7 @@ def place_key_points(count: int, spacing: float, contour: Contour) -> int:
 
     A contour pixel lies half a pixel inside the outline, and the edge images half a pixel up and left.
     """
-    number = max(int(np.round(count / spacing)), (count + LANES - 1) // LANES)
+    number = max(int(np.round(count / spacing)), (count + EVERY * LANES - 1) // (EVERY * LANES))
     half = np.float32(0.5)
     for k in range(number):
         i = (k * count) // number
@@ -136,25 +138,26 @@ def place_key_points(count: int, spacing: float, contour: Contour) -> int:
 
 
 @compiled_arithmetic
-def fill_segments(number: int, area: int, contour: Contour) -> None:
-    """Places, normals and directions of all contour points, segment by segment.
+def fill_segments(number: int, area: int, contour: Contour) -> int:
+    """Places, normals and directions of the compared contour points, segment by segment; returns their number.
 
     Normals between key points are interpolated. A segment is filled up with points in the margin.
     """
-    lanes, aside = contour.lanes, np.float32(1 - MARGIN)
+    lanes, aside, points = contour.lanes, np.float32(1 - MARGIN), 0
     for k in range(number):
         after = k + 1 if k + 1 < number else 0
         begin, length, at = contour.starts[k], contour.starts[k + 1] - contour.starts[k], (k + 1) * LANES
         nx, ny = contour.normals[0, k], contour.normals[1, k]
         turn_x, turn_y = contour.normals[0, after] - nx, contour.normals[1, after] - ny
-        step = np.float32(1.0) / np.float32(length)
-        for lane in range(length):
+        step, taken = np.float32(EVERY) / np.float32(length), (length + EVERY - 1) // EVERY
+        points += taken
+        for lane in range(taken):
             share = np.float32(lane) * step
             lanes[SHARE, at + lane] = share
             lanes[NX, at + lane], lanes[NY, at + lane] = nx + share * turn_x, ny + share * turn_y
-            lanes[PX, at + lane] = np.float32(contour.x[begin + lane])
-            lanes[PY, at + lane] = np.float32(contour.y[begin + lane])
-        for lane in range(length, LANES):
+            lanes[PX, at + lane] = np.float32(contour.x[begin + EVERY * lane])
+            lanes[PY, at + lane] = np.float32(contour.y[begin + EVERY * lane])
+        for lane in range(taken, LANES):
             lanes[SHARE, at + lane] = lanes[NX, at + lane] = lanes[NY, at + lane] = np.float32(0.0)
             lanes[PX, at + lane] = lanes[PY, at + lane] = aside
     place_points(lanes[PX], lanes[PY], lanes[NX], lanes[NY], (number + 1) * LANES)
@@ -162,6 +165,7 @@ def fill_segments(number: int, area: int, contour: Contour) -> None:
     for field in range(FIELDS):
         for lane in range(LANES):
             lanes[field, lane] = lanes[field, number * LANES + lane]
+    return points
 
 
 @compiled_arithmetic

@@ -162,7 +162,7 @@ def matched_errors(
         points, regions[0, i], regions[1, i] = outline_over(poses[i], body, camera, canvas, contour, change)
         if points > 0:
             number = place_key_points(points, numbers[0], contour)
-            fill_segments(number, area, contour)
+            points = fill_segments(number, area, contour)
             match(distances, stride, number, points, numbers[1], contour, shifts)
             strengths(intensities, stride, number, numbers[2], contour, shifts, values)
             errors[i] = mean_error(number, points, values[0])

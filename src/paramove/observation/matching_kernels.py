@@ -18,7 +18,8 @@ Bytes = NDArray[np.uint8]
 Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
-ITERATIONS = 20
+ITERATIONS = 15
+"""The 16th would be the first with steps of 1/16 px, and images are compared by whole pixels."""
 GRADIENTS, SHIFTS, DISTORTIONS = 7.5, 1.0, 4.0
 """Factors of alpha_1(x) = 7.5 x^2, alpha_2(x) = x, alpha_3(x) = 4 x."""
 LEAST_GAIN = 1e-9
@@ -100,7 +101,7 @@ def begin(images: Bytes, stride: int, number: int, unit: float, contour: Contour
 def match(images: Bytes, stride: int, number: int, points: int, unit: float, contour: Contour, shifts: Shifts) -> float:
     """Maximise E (6.26) from s = 0; leaves the shifts in `shifts` and returns E.
 
-    images: distance images, 255 for 1; unit: what a pixel counts in the penalties.
+    images: distance images, 255 for 1; points: that are compared; unit: what a pixel counts in the penalties.
     """
     s, bends, sums, fruitless, row = shifts.shift, shifts.bends, shifts.sums, shifts.fruitless, np.float32(stride)
     total = begin(images, stride, number, unit, contour, shifts)

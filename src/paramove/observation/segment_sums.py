@@ -1,8 +1,8 @@
 """Sums of edge intensities along two neighbouring segments for two trial shifts of their common key point.
 
-This is the inner loop of the matching: sixteen contour points in one vector. Written as the compiler's vector
+This is the inner loop of the matching: eight contour points in one vector. Written as the compiler's vector
 instructions, since it does not find them in a loop whose loads depend on computed addresses: a third of the time.
-Processors that read sixteen scattered numbers fast do that too in one instruction, in another third less.
+Processors that read eight scattered numbers fast do that too in one instruction, in another third less.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-LANES = 8
-"""Contour points of a segment; shorter segments are filled up with points in the margin, where nothing is."""
+LANES = 4
+"""Compared contour points of a segment; shorter segments are filled up with points in the margin, where nothing is."""
 FIELDS = 6
 PX, PY, NX, NY, SHARE, BASE = range(FIELDS)
 """Rows of the lanes: places in the edge images, normals, share of the later key point, start of the direction."""
@@ -64,7 +64,7 @@ def _sums_of_loaded(builder: Any, data: Any, up: Any, down: Any) -> list[Any]:
 
 
 def _sums_of_gathered(builder: Any, data: Any, up: Any, down: Any) -> list[Any]:
-    """The same with vectors of loads. A sum of eight bytes fits in half a number: both moves are summed at once."""
+    """The same with vectors of loads. A sum of a few bytes fits in half a number: both moves are summed at once."""
     lower, shift = ir.Constant(_INT, 0xFFFF), ir.Constant(_INT, 16)
     moved = builder.shl(_gathered(builder, data, down), ir.Constant(_INTS, [16] * (2 * LANES)))
     both, width = builder.or_(_gathered(builder, data, up), moved), LANES
