@@ -35,14 +35,11 @@ def run(bus: Bus, config: Config) -> None:
         elif (camera := event.topic.name.removesuffix("/image")) in tracker.cameras:
             try:
                 for moment in tracker.see(camera, event.captured_ns, decode(event.message)):
-                    estimate = estimate_message(moment, names, config.particles, place)
-                    pose, outline, ball = (
-                        arm_pose_message(moment),
-                        outline_message(moment),
-                        scene_message(moment, place),
-                    )
-                    for topic, message in zip(SAYS, (estimate, pose, outline, ball), strict=True):
-                        bus.publish(topic, message, moment.captured_ns)
+                    at = moment.captured_ns
+                    bus.publish(topics.ACTION_ESTIMATE, estimate_message(moment, names, config.particles, place), at)
+                    bus.publish(topics.HUMAN_ARM_POSE, arm_pose_message(moment), at)
+                    bus.publish(topics.ACTION_OUTLINE, outline_message(moment), at)
+                    bus.publish(topics.ACTION_SCENE, scene_message(moment, place), at)
             except FrameError as error:
                 tracker.cannot_see(camera, event.captured_ns, str(error))
         trouble = tracker.trouble()

@@ -51,11 +51,19 @@ class TrackedMoment:
 
 def believed(tracker: ActionTracker, observer: ArmObserver, time_s: float) -> ActionBelief:
     """The belief after the images that the observer looks at; the observer learns the background beside that arm."""
-    last = tracker.belief
+    elapsed_s = _since_last(tracker, time_s)
     belief = tracker.update(time_s, observer.log_likelihoods, observer.presence)
-    if tracker.health.absence or not (belief.lost or belief.degraded):  # what has come to stay is learned slowly
-        observer.learn(belief.pose, 0.0 if last is None else time_s - last.time_s)
+    _learn(tracker, observer, belief, elapsed_s)
     return belief
+
+
+def _since_last(tracker: ActionTracker, time_s: float) -> float:
+    return 0.0 if tracker.belief is None else time_s - tracker.belief.time_s
+
+
+def _learn(tracker: ActionTracker, observer: ArmObserver, belief: ActionBelief, elapsed_s: float) -> None:
+    if tracker.health.absence or not (belief.lost or belief.degraded):  # what has come to stay is learned slowly
+        observer.learn(belief.pose, elapsed_s)
 
 
 class VideoTracker:
@@ -103,10 +111,13 @@ class VideoTracker:
         return {action.name: action.parameter_names for action in self._tracker.vocabulary.actions}
 
     def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[TrackedMoment]:
-        """The moments that this image completes. An image of another size than calibrated counts as none."""
+        """The moments that this image completes. An image of another size than calibrated counts as none.
+
+        The background is learned when the next moment is asked for: what is believed need not wait for that.
+        """
         if self._watch.accepts(camera, captured_ns, image):
             for views in self._views.add(camera, captured_ns, image):
-                yield self._tracked(views)
+                yield from self._tracked(views)
 
     def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
         """An image that could not even be read."""
@@ -127,16 +138,17 @@ class VideoTracker:
         lost = belief is not None and belief.lost
         return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._unsure else ()))
 
-    def _tracked(self, views: Views) -> TrackedMoment:
+    def _tracked(self, views: Views) -> Iterator[TrackedMoment]:
         self._started_ns = views.captured_ns if self._started_ns is None else self._started_ns
         self._dark = self._look(views.images)
         time_s = (views.captured_ns - self._started_ns) * 1e-9
-        belief = believed(self._tracker, self._observer, time_s)
+        elapsed_s = _since_last(self._tracker, time_s)
+        belief = self._tracker.update(time_s, self._observer.log_likelihoods, self._observer.presence)
         self._unsure = belief.sentence
         first = next(iter(self._cameras.values()))
         theta, found = belief.theta[belief.action], belief.target
         pointed = belief.targets[belief.action]
-        return TrackedMoment(
+        yield TrackedMoment(
             captured_ns=views.captured_ns,
             belief=belief,
             outline=self._observer.outline(belief.pose, 0),
@@ -149,6 +161,7 @@ class VideoTracker:
             n_views=sum(self._observer.seen),
             trouble="; ".join([*(f"{name} is silent" for name in views.silent), *self._dark, *self._watch.refused()]),
         )
+        _learn(self._tracker, self._observer, belief, elapsed_s)
 
     def _look(self, images: Sequence[Image | None]) -> list[str]:
         """Gives the observer the images in which there are edges; sentences about the others."""
