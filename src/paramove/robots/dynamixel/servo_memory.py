@@ -1,0 +1,134 @@
+"""The control table of one servo: reading, checked writing, and what stands for other addresses."""
+
+from __future__ import annotations
+
+from paramove.robots.dynamixel.packets import StatusError
+from paramove.robots.dynamixel.servo_models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
+
+MULTI_TURN = 1_048_575
+"""Greatest goal position in the extended modes, pulses, either way (e-Manual, "Goal Position")."""
+POSITION_MODE, EXTENDED_MODES = 3, (4, 5)
+
+
+class RefusedError(Exception):
+    """What was asked for cannot be; carries the error number of the answer."""
+
+    def __init__(self, error: StatusError) -> None:
+        super().__init__(error.name)
+        self.error = error
+
+
+class ServoMemory:
+    """Numbers by name for the servo itself, bytes by address for the bus."""
+
+    def __init__(self, model: ServoModel) -> None:
+        self.model = model
+        self._bytes = bytearray(model.size)
+        self._at = {one.address + i: one for one in model.registers.values() for i in range(one.size)}
+        self.reset(0)
+
+    def reset(self, first: int) -> None:
+        """Initial values from this address on, indirect addresses too."""
+        for register in self.model.registers.values():
+            if register.address >= first:
+                self[register.name] = register.initial
+        self["Firmware Version"] = self.model.firmware
+        for block in self.model.indirect:
+            for i in range(block.count):
+                at = block.addresses + 2 * i
+                self._bytes[at : at + 2] = (block.data + i).to_bytes(2, "little")
+                self._bytes[block.data + i] = 0
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.model.registers
+
+    def __getitem__(self, name: str) -> int:
+        register = self.model.registers[name]
+        data = self._bytes[register.address : register.address + register.size]
+        return int.from_bytes(data, "little", signed=register.signed)
+
+    def __setitem__(self, name: str, value: int) -> None:
+        register = self.model.registers[name]
+        data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
+        self._bytes[register.address : register.address + register.size] = data
+
+    def read(self, address: int, size: int) -> bytes:
+        """Raises RefusedError beyond the end of the table."""
+        if size == 0 or address + size > len(self._bytes):
+            raise RefusedError(StatusError.ACCESS)
+        return bytes(self._bytes[self._meant(place)] for place in range(address, address + size))
+
+    def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
+        """The registers that would be written and their values. Raises RefusedError if one of them cannot be.
+
+        Bytes of the indirect access are judged by what they stand for.
+        """
+        if not data or address + len(data) > len(self._bytes):
+            raise RefusedError(StatusError.ACCESS)
+        written: dict[int, int] = {}
+        for place, byte in zip(range(address, address + len(data)), data, strict=True):
+            if not self._is_indirect_address(place):
+                written[self._meant(place)] = byte
+            elif self["Torque Enable"]:
+                raise RefusedError(StatusError.ACCESS)
+        return [self._checked(register, written) for register in self._touched(written)]
+
+    def write(self, address: int, data: bytes) -> None:
+        """Bytes that were checked. What they do is up to the servo."""
+        for place, byte in zip(range(address, address + len(data)), data, strict=True):
+            target = place if self._is_indirect_address(place) else self._meant(place)
+            self._bytes[target] = byte
+
+    def _touched(self, written: dict[int, int]) -> list[Register]:
+        found: dict[str, Register] = {}
+        for place in written:
+            if place >= FIRST_INDIRECT and place not in self._at:
+                continue  # data of the indirect access that stand for nothing else
+            register = self._at.get(place)
+            if register is None or not register.writable:
+                raise RefusedError(StatusError.ACCESS)
+            if register.address < RAM_BEGINS and self["Torque Enable"]:
+                raise RefusedError(StatusError.ACCESS)
+            found[register.name] = register
+        return list(found.values())
+
+    def _checked(self, register: Register, written: dict[int, int]) -> tuple[Register, int]:
+        places = range(register.address, register.address + register.size)
+        if any(place not in written for place in places):
+            raise RefusedError(StatusError.DATA_LENGTH)
+        value = int.from_bytes(bytes(written[place] for place in places), "little", signed=register.signed)
+        assert register.allowed is not None
+        low, high = register.allowed
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise RefusedError(StatusError.DATA_RANGE)
+        if register.name == "Operating Mode" and value not in self.model.modes:
+            raise RefusedError(StatusError.DATA_RANGE)
+        if register.name == "Bus Watchdog":
+            return register, value
+        if register.name.startswith("Goal") and self["Bus Watchdog"] == 0xFF:  # tripped: goals are read only
+            raise RefusedError(StatusError.DATA_RANGE)
+        low, high = self._limits(register.name)
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise RefusedError(StatusError.DATA_LIMIT)
+        return register, value
+
+    def _limits(self, name: str) -> tuple[int | None, int | None]:
+        """Of goals, by other registers."""
+        if name == "Goal Position":
+            if self["Operating Mode"] in EXTENDED_MODES:
+                return -MULTI_TURN, MULTI_TURN
+            return self["Min Position Limit"], self["Max Position Limit"]
+        limit = {"Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Goal Velocity": "Velocity Limit"}.get(name)
+        return (None, None) if limit is None else (-self[limit], self[limit])
+
+    def _is_indirect_address(self, place: int) -> bool:
+        return any(one.addresses <= place < one.addresses + 2 * one.count for one in self.model.indirect)
+
+    def _meant(self, place: int) -> int:
+        """The address for which a byte of indirect data stands; any other stands for itself."""
+        for block in self.model.indirect:
+            if block.data <= place < block.data + block.count:
+                at = block.addresses + 2 * (place - block.data)
+                meant = int.from_bytes(self._bytes[at : at + 2], "little")
+                return meant if RAM_BEGINS <= meant < len(self._bytes) else place
+        return place

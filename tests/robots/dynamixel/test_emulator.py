@@ -1,0 +1,273 @@
+"""To the unmodified dynamixel-sdk the emulated port is a bus of servos, in all that its sample programs do."""
+
+import time
+
+import pytest
+from dynamixel_sdk import (
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    GroupBulkRead,
+    GroupBulkWrite,
+    GroupSyncRead,
+    GroupSyncWrite,
+    PacketHandler,
+    PortHandler,
+    port_handler,
+)
+
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.packets import StatusError
+from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250, XM430_W350
+
+TORQUE, LED, GOAL, PRESENT, MODE, WATCHDOG, ERROR_STATUS = 64, 65, 116, 132, 11, 98, 70
+ID, BAUD, LEVEL, PROFILE_VELOCITY, REGISTERED, MOVING = 7, 8, 68, 112, 69, 122
+INDIRECT_ADDRESS, INDIRECT_DATA = 168, 224
+
+
+class Client:
+    """The SDK at the emulated port, with the emulator at hand."""
+
+    def __init__(self, emulator, baud_rate=57600):
+        self.emulator, self.handler = emulator, PacketHandler(2.0)
+        self.port = PortHandler(emulator.port)
+        assert self.port.openPort()
+        assert self.port.setBaudRate(baud_rate)
+
+    def servo(self, number):
+        return next(one for one in self.emulator.bus.servos if one.id == number)
+
+    def write(self, number, address, value, size=1):
+        name = f"write{size}ByteTxRx"
+        result, error = getattr(self.handler, name)(self.port, number, address, value)
+        assert result == COMM_SUCCESS
+        return error
+
+    def read(self, number, address, size=4):
+        value, result, error = getattr(self.handler, f"read{size}ByteTxRx")(self.port, number, address)
+        assert (result, error) == (COMM_SUCCESS, 0)
+        return value
+
+    def until(self, done, within_s=5.0):
+        """Asks again until it is so: each question takes its time on the wire."""
+        end_s = time.monotonic() + within_s
+        while not done():
+            assert time.monotonic() < end_s, "did not happen"
+
+    def moves_to(self, number, goal):
+        assert self.write(number, GOAL, goal, 4) == 0
+        self.until(lambda: abs(self.read(number, PRESENT) - goal) <= 1)
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch):
+    """The SDK waits for answers by the clock: longer here, as other programs may keep the emulator waiting."""
+    monkeypatch.setattr(port_handler, "LATENCY_TIMER", 150)  # ms; half of what it waits
+
+
+@pytest.fixture
+def client():
+    servos = [EmulatedServo(XL430_W250, 1), EmulatedServo(XM430_W350, 2), EmulatedServo(XL330_M288, 3)]
+    with DynamixelEmulator(servos) as emulator:
+        client = Client(emulator)
+        yield client
+        client.port.closePort()
+
+
+def test_ping(client):
+    assert client.handler.ping(client.port, 2) == (1020, COMM_SUCCESS, 0)
+    assert client.handler.ping(client.port, 9)[1] == COMM_RX_TIMEOUT
+
+
+def test_broadcast_ping(client):
+    found, result = client.handler.broadcastPing(client.port)
+    assert result == COMM_SUCCESS
+    assert {number: model for number, (model, _) in found.items()} == {1: 1060, 2: 1020, 3: 1200}
+
+
+def test_read_and_write(client):
+    assert client.write(1, TORQUE, 1) == 0
+    client.moves_to(1, 1000)
+    client.moves_to(1, 3000)
+    assert client.write(1, TORQUE, 0) == 0
+
+
+def test_a_slow_profile_takes_its_time(client):
+    client.write(1, PROFILE_VELOCITY, 20, 4)  # 4.58 rev/min: 1000 pulses in 3.2 s
+    client.write(1, TORQUE, 1)
+    client.write(1, GOAL, 3048, 4)
+    client.until(lambda: client.read(1, MOVING, 1) == 1)
+    client.until(lambda: client.read(1, PRESENT) > 2100)
+    assert client.read(1, PRESENT) < 2600
+    assert abs(client.read(1, 128) - 20) <= 1
+
+
+def test_sync_write_and_read(client):
+    for number in (1, 2, 3):
+        client.write(number, TORQUE, 1)
+    goals = {1: 1500, 2: 1800, 3: 2500}
+    group = GroupSyncWrite(client.port, client.handler, GOAL, 4)
+    for number, goal in goals.items():
+        assert group.addParam(number, list(goal.to_bytes(4, "little")))
+    assert group.txPacket() == COMM_SUCCESS
+    reader = GroupSyncRead(client.port, client.handler, PRESENT, 4)
+    for number in goals:
+        assert reader.addParam(number)
+
+    def there():
+        assert reader.txRxPacket() == COMM_SUCCESS
+        return all(abs(reader.getData(number, PRESENT, 4) - goal) <= 1 for number, goal in goals.items())
+
+    client.until(there)
+    assert reader.fastSyncRead() == COMM_SUCCESS
+    assert [reader.getData(number, PRESENT, 4) for number in goals] == pytest.approx(list(goals.values()), abs=1)
+
+
+def test_bulk_write_and_read(client):
+    writer = GroupBulkWrite(client.port, client.handler)
+    assert writer.addParam(1, GOAL, 4, list((1700).to_bytes(4, "little")))
+    assert writer.addParam(2, LED, 1, [1])
+    assert writer.txPacket() == COMM_SUCCESS
+    reader = GroupBulkRead(client.port, client.handler)
+    assert reader.addParam(1, GOAL, 4)
+    assert reader.addParam(2, LED, 1)
+    assert reader.txRxPacket() == COMM_SUCCESS
+    assert (reader.getData(1, GOAL, 4), reader.getData(2, LED, 1)) == (1700, 1)
+    assert reader.fastBulkRead() == COMM_SUCCESS
+    assert (reader.getData(1, GOAL, 4), reader.getData(2, LED, 1)) == (1700, 1)
+
+
+def test_indirect_access(client):
+    places = [*range(GOAL, GOAL + 4), LED]
+    for i, place in enumerate(places):
+        assert client.write(1, INDIRECT_ADDRESS + 2 * i, place, 2) == 0
+    client.write(1, TORQUE, 1)
+    assert client.write(1, INDIRECT_ADDRESS, 132, 2) == StatusError.ACCESS
+    data = [*(1234).to_bytes(4, "little"), 1]
+    assert client.handler.writeTxRx(client.port, 1, INDIRECT_DATA, 5, data) == (COMM_SUCCESS, 0)
+    assert (client.read(1, GOAL), client.read(1, LED, 1)) == (1234, 1)
+    assert client.handler.readTxRx(client.port, 1, INDIRECT_DATA, 5)[0] == data
+
+
+def test_what_is_registered_happens_at_the_action(client):
+    data = list((900).to_bytes(4, "little"))
+    assert client.handler.regWriteTxRx(client.port, 1, GOAL, 4, data) == (COMM_SUCCESS, 0)
+    assert (client.read(1, GOAL), client.read(1, REGISTERED, 1)) == (2048, 1)
+    assert client.handler.action(client.port, 254) == COMM_SUCCESS
+    client.until(lambda: client.read(1, GOAL) == 900)
+    assert client.read(1, REGISTERED, 1) == 0
+
+
+def test_a_reboot_switches_torque_off_and_is_deaf_for_a_while(client):
+    client.write(1, TORQUE, 1)
+    client.moves_to(1, 1000)
+    assert client.handler.reboot(client.port, 1) == (COMM_SUCCESS, 0)
+    assert client.handler.ping(client.port, 1)[1] == COMM_RX_TIMEOUT
+    client.until(lambda: client.handler.ping(client.port, 1)[1] == COMM_SUCCESS)
+    assert (client.read(1, TORQUE, 1), client.read(1, GOAL)) == (0, pytest.approx(1000, abs=5))
+
+
+def test_factory_reset_keeps_id_and_baud_rate_if_asked_to(client):
+    client.write(3, ID, 12)
+    client.write(12, MODE, 4)
+    assert client.handler.factoryReset(client.port, 12, 0x02) == (COMM_SUCCESS, 0)
+    client.until(lambda: client.handler.ping(client.port, 12)[1] == COMM_SUCCESS)
+    assert client.read(12, MODE, 1) == 3
+    client.handler.factoryReset(client.port, 254, 0xFF)  # would leave all of them with one id
+    assert set(client.handler.broadcastPing(client.port)[0]) == {1, 2, 12}
+
+
+def test_clear_multi_turn(client):
+    client.write(1, MODE, 4)
+    client.write(1, TORQUE, 1)
+    client.moves_to(1, 5000)
+    client.write(1, GOAL, 9000, 4)
+    assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, StatusError.RESULT_FAIL)  # it moves
+    client.moves_to(1, 5000)
+    client.until(lambda: client.read(1, 128) == 0)
+    assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, 0)
+    assert client.read(1, PRESENT) == pytest.approx(5000 - 4096, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("address", "value", "size", "error"),
+    [
+        (ID, 253, 1, StatusError.DATA_RANGE),
+        (MODE, 0, 1, StatusError.DATA_RANGE),  # an XL430 has no current to control
+        (GOAL, 4096, 4, StatusError.DATA_LIMIT),
+        (GOAL, 100, 2, StatusError.DATA_LENGTH),
+        (PRESENT, 100, 4, StatusError.ACCESS),
+        (40, 1, 1, StatusError.ACCESS),  # nothing is there
+        (5000, 1, 1, StatusError.ACCESS),
+    ],
+)
+def test_what_cannot_be_written_is_refused_and_changes_nothing(client, address, value, size, error):
+    before = bytes(client.servo(1).memory.read(0, 140))
+    assert client.write(1, address, value, size) == error
+    with client.emulator.lock:
+        after = bytes(client.servo(1).memory.read(0, 140))
+    assert before[:120] == after[:120]  # beyond is what is measured
+
+
+def test_what_is_kept_without_power_is_locked_while_torque_is_on(client):
+    client.write(1, TORQUE, 1)
+    assert client.write(1, ID, 5) == StatusError.ACCESS
+    client.write(1, TORQUE, 0)
+    assert client.write(1, ID, 5) == 0
+    assert client.handler.ping(client.port, 5)[1] == COMM_SUCCESS
+
+
+def test_a_servo_at_another_baud_rate_hears_nothing(client):
+    assert client.write(1, BAUD, 3) == 0
+    assert client.handler.ping(client.port, 1)[1] == COMM_RX_TIMEOUT
+    client.port.setBaudRate(1_000_000)
+    assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
+    assert client.handler.ping(client.port, 2)[1] == COMM_RX_TIMEOUT
+
+
+def test_status_return_level(client):
+    assert client.write(1, LEVEL, 1) == 0
+    assert client.handler.write1ByteTxRx(client.port, 1, LED, 1)[0] == COMM_RX_TIMEOUT
+    assert client.read(1, LED, 1) == 1
+    client.handler.write1ByteTxOnly(client.port, 1, LEVEL, 0)
+    assert client.handler.read1ByteTxRx(client.port, 1, LED)[1] == COMM_RX_TIMEOUT
+    assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
+
+
+def test_the_bus_watchdog_stops_the_servo_and_refuses_goals_until_it_is_cleared(client):
+    client.write(1, PROFILE_VELOCITY, 20, 4)
+    client.write(1, TORQUE, 1)
+    client.write(1, GOAL, 4000, 4)
+    assert client.write(1, WATCHDOG, 1) == 0  # 20 ms
+    servo = client.servo(1)
+
+    def tripped():
+        with client.emulator.lock:
+            return servo.memory["Bus Watchdog"] == 0xFF and servo.velocity == 0.0
+
+    client.until(tripped)
+    assert client.read(1, PRESENT) < 3000
+    assert client.write(1, GOAL, 2000, 4) == StatusError.DATA_RANGE
+    assert client.write(1, WATCHDOG, 0) == 0
+    client.write(1, PROFILE_VELOCITY, 0, 4)
+    client.moves_to(1, 2000)
+
+
+def test_a_hardware_error_is_told_with_every_answer(client):
+    with client.emulator.lock:
+        client.servo(1).memory["Hardware Error Status"] = 0x20  # overload
+    _, _, error = client.handler.ping(client.port, 1)
+    assert error & 0x80
+    assert client.handler.read1ByteTxRx(client.port, 1, ERROR_STATUS) == (0x20, COMM_SUCCESS, 0x80)
+
+
+def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
+    link = tmp_path / "usb-emulated"
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:
+        assert str(link.resolve()) == emulator.port
+        port = PortHandler(str(link))
+        port.openPort()
+        port.setBaudRate(57600)
+        assert PacketHandler(2.0).ping(port, 1)[0] == 1060
+        port.closePort()
+    assert not link.exists()
