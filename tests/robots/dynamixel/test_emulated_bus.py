@@ -65,6 +65,14 @@ def test_servos_with_one_id_both_answer():
     ]
 
 
+def test_a_secondary_id_is_obeyed_without_an_answer():
+    bus = a_bus()
+    for servo in bus.servos:
+        servo.memory["Secondary(Shadow) ID"] = 9
+    assert said(bus, Packet(9, Instruction.WRITE, bytes([65, 0, 1]))) == b""
+    assert [servo.memory["LED"] for servo in bus.servos] == [1, 1]
+
+
 def test_a_packet_that_was_damaged_is_told_by_its_servo():
     data = bytearray(encoded(Packet(2, Instruction.READ, PRESENT)))
     data[-1] ^= 0x40

@@ -74,12 +74,13 @@ class EmulatedBus:
         else:
             for servo in servos:
                 if servo.id == packet.id and packet.instruction != Instruction.STATUS:
-                    answering = servo.answers(packet.instruction)
-                    before = servo.return_delay_s
-                    number = servo.id
+                    # Who is told another ID, delay or level answers with the old ones.
+                    answers, delay_s, number = servo.answers(packet.instruction), servo.return_delay_s, servo.id
                     answer = servo.do(packet.instruction, packet.parameters)
-                    if answering:
-                        yield before, _encoded(number, answer)
+                    if answers:
+                        yield delay_s, _encoded(number, answer)
+                elif servo.memory["Secondary(Shadow) ID"] == packet.id:
+                    servo.do(packet.instruction, packet.parameters)
 
     def _for_several(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[tuple[float, bytes]]:
         """Instructions that name servos in their parameters: each acts, and those that read answer in that order."""
