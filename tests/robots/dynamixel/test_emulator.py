@@ -271,3 +271,20 @@ def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
         assert PacketHandler(2.0).ping(port, 1)[0] == 1060
         port.closePort()
     assert not link.exists()
+
+
+def test_a_pulled_plug_ends_the_port_and_a_new_one_has_the_old_link(tmp_path):
+    link = tmp_path / "usb-emulated"
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:
+        client = Client(emulator)
+        client.write(1, LED, 1)
+        emulator.unplug()
+        assert not link.exists()
+        with pytest.raises(OSError, match=r"returned no data|Input/output|Bad file"):
+            client.until(lambda: client.port.ser.read(1) == b"?")
+        emulator.plug_in()
+        assert str(link.resolve()) == emulator.port
+        again = Client(emulator)
+        assert again.read(1, LED, 1) == 1  # the servos kept their power
+        again.port.closePort()
+        client.port.closePort()

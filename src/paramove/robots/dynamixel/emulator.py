@@ -15,6 +15,7 @@ from typing import Self
 
 from paramove.robots.dynamixel.emulated_bus import EmulatedBus
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.wire_faults import WireFaults
 
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
@@ -32,24 +33,25 @@ class DynamixelEmulator:
     Args:
         servos: In the order of the chain.
         link: A symbolic link to make to the port, so that its name does not change from run to run.
+
+    Attributes:
+        faults: What goes wrong on the wire; may be replaced at any time.
+        port: Name of the terminal; another one after `plug_in`.
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
         self.bus = EmulatedBus(servos)
-        self._link = link
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        self.port = os.ttyname(self._theirs)
-        self._began_s = time.monotonic()
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
+        self.faults = WireFaults()
         self.lock = threading.Lock()
         """Held while the servos hear and move; hold it to look at them."""
+        self._link = link
+        self._began_s = time.monotonic()
+        self._stopped, self._moved = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
+        self._wanted = self.plugged_in = False
+        self._open()
 
     def __enter__(self) -> Self:
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
-            self._link.symlink_to(self.port)
         self._thread.start()
         return self
 
@@ -58,10 +60,39 @@ class DynamixelEmulator:
     ) -> None:
         self._stopped.set()
         self._thread.join()
+        if self.plugged_in:
+            self._close()
+
+    def unplug(self) -> None:
+        """Takes the port away, as if its plug were pulled; the servos keep their power and go on."""
+        self._move_plug(False)
+
+    def plug_in(self) -> None:
+        """A new port, usually of another name; the link leads to it."""
+        self._move_plug(True)
+
+    def _move_plug(self, wanted: bool) -> None:
+        """The thread that serves the port does it, between two questions; returns when it is done."""
+        self._moved.clear()
+        self._wanted = wanted
+        while self._thread.is_alive() and self.plugged_in != wanted:
+            self._moved.wait(IDLE_S)
+
+    def _open(self) -> None:
+        self._ours, self._theirs = os.openpty()
+        tty.setraw(self._theirs)
+        self.port = os.ttyname(self._theirs)
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+            self._link.symlink_to(self.port)
+        self._wanted = self.plugged_in = True
+
+    def _close(self) -> None:
         os.close(self._ours)
         os.close(self._theirs)
         if self._link is not None:
             self._link.unlink(missing_ok=True)
+        self.plugged_in = False
 
     @property
     def baud_rate(self) -> int:
@@ -73,18 +104,28 @@ class DynamixelEmulator:
 
     def _serve(self) -> None:
         while not self._stopped.is_set():
-            ready, _, _ = select.select([self._ours], [], [], IDLE_S)
+            if self._wanted != self.plugged_in:
+                self._open() if self._wanted else self._close()
+                self._moved.set()
+            heard = self._hear()
             with self.lock:
-                self.bus.run_to(self._now_s())
-            if ready:
-                self._hear(os.read(self._ours, MOST_BYTES))
+                now_s = self._now_s()
+                self.bus.run_to(now_s)
+                answers = self.bus.receive(heard, self.baud_rate, now_s) if heard else []
+            if heard:
+                self._say(heard, self.faults.told(heard, answers))
 
-    def _hear(self, data: bytes) -> None:
-        baud_rate, free_s = self.baud_rate, self._now_s()
-        with self.lock:
-            answers = self.bus.receive(data, baud_rate, free_s)
-        byte_s = BITS_PER_BYTE / baud_rate if baud_rate else 0.0
-        free_s += len(data) * byte_s  # the bytes were there at once; on a wire they take their time
+    def _hear(self) -> bytes:
+        """What the client has written, waiting a little for it."""
+        if not self.plugged_in:
+            self._stopped.wait(IDLE_S)
+            return b""
+        ready, _, _ = select.select([self._ours], [], [], IDLE_S)
+        return os.read(self._ours, MOST_BYTES) if ready else b""
+
+    def _say(self, question: bytes, answers: list[tuple[float, bytes]]) -> None:
+        byte_s = BITS_PER_BYTE / self.baud_rate if self.baud_rate else 0.0
+        free_s = self._now_s() + len(question) * byte_s  # it was there at once; on a wire it takes its time
         for delay_s, answer in answers:
             free_s += delay_s + len(answer) * byte_s
             self._stopped.wait(max(0.0, free_s - self._now_s()))
