@@ -15,6 +15,7 @@ from dynamixel_sdk import (
     port_handler,
 )
 
+from paramove.robots.dynamixel import emulated_servo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.packets import StatusError
@@ -158,7 +159,8 @@ def test_what_is_registered_happens_at_the_action(client):
     assert client.read(1, REGISTERED, 1) == 0
 
 
-def test_a_reboot_switches_torque_off_and_is_deaf_for_a_while(client):
+def test_a_reboot_switches_torque_off_and_is_deaf_for_a_while(client, monkeypatch):
+    monkeypatch.setattr(emulated_servo, "REBOOT_S", 1.5)  # longer than other programs may keep this one waiting
     client.write(1, TORQUE, 1)
     client.moves_to(1, 1000)
     assert client.handler.reboot(client.port, 1) == (COMM_SUCCESS, 0)
@@ -181,8 +183,10 @@ def test_clear_multi_turn(client):
     client.write(1, MODE, 4)
     client.write(1, TORQUE, 1)
     client.moves_to(1, 5000)
+    client.write(1, PROFILE_VELOCITY, 20, 4)  # so slow that it surely moves still
     client.write(1, GOAL, 9000, 4)
-    assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, StatusError.RESULT_FAIL)  # it moves
+    assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, StatusError.RESULT_FAIL)
+    client.write(1, PROFILE_VELOCITY, 0, 4)
     client.moves_to(1, 5000)
     client.until(lambda: client.read(1, 128) == 0)
     assert client.handler.clearMultiTurn(client.port, 1) == (COMM_SUCCESS, 0)
