@@ -66,6 +66,13 @@ def test_the_sdk_writes_the_same(packet):
     assert wire.written == encoded(packet)
 
 
+def test_the_sdk_does_not_stuff():
+    """The day it does, `ServoPort` must not do it a second time."""
+    wire = Wire()
+    Protocol2PacketHandler().txPacket(wire, [0, 0, 0, 0, 1, 6, 0, Instruction.WRITE, *HEADER, 0, 0])
+    assert wire.written[7:-2] == bytes([Instruction.WRITE]) + HEADER
+
+
 @given(st.integers(0, 252), tricky_bytes)
 def test_the_sdk_reads_the_same(number, parameters):
     read, result = Protocol2PacketHandler().rxPacket(

@@ -1,0 +1,157 @@
+# ruff: noqa: N802 - the packet handlers of dynamixel-sdk call these names
+"""The serial port of a Dynamixel bus, in the place of the SDK's PortHandler and without what is wrong with that one.
+
+The SDK's (4.1.0) stays busy for ever after an unplugged cable, waits 34 ms for a servo that is not there, asks the
+clock on the wall, spins while it waits, lets a second program open the port, and sends FF FF FD within a packet bare.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import select
+import termios
+import time
+from collections.abc import Sequence
+from typing import Any, Self
+
+import serial
+
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, HEADER, Packet, encoded
+
+BITS_PER_BYTE = 10
+LATENCY_S = 0.004
+"""Beyond the time of the bytes and the servo's own delay; an adapter with a latency timer of 16 ms needs more."""
+LONGEST_RETURN_DELAY_S = 254 * 2e-6
+
+
+class PortLostError(OSError):
+    """The port went away while it was open: unplugged, or its adapter failed."""
+
+
+class ServoPort:
+    """A port that is open while it is a context, for one program at a time.
+
+    Args:
+        name: For example /dev/ttyUSB0, or a link in /dev/serial/by-id.
+        baud_rate: bit/s.
+        latency_s: That an answer may take beyond the time of its bytes.
+
+    Attributes:
+        is_using: Whether an exchange is under way; the packet handlers set it.
+        low_latency: Whether the adapter was told to hand over bytes at once; a pseudo-terminal cannot be.
+        timeout_s: For the answer that was last waited for.
+    """
+
+    def __init__(self, name: str, baud_rate: int = 1_000_000, latency_s: float = LATENCY_S) -> None:
+        self.name, self.baud_rate, self.latency_s = name, baud_rate, latency_s
+        self.is_using = False
+        self.low_latency = False
+        self.timeout_s = 0.0
+        self._due_s = 0.0
+        self._serial: Any = None
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def open(self) -> None:
+        """Raises InputError, with the remedy, for a port that is missing, forbidden or in use."""
+        self.close()
+        try:
+            self._serial = serial.Serial(self.name, self.baud_rate, timeout=0, exclusive=True)
+            fcntl.ioctl(self._serial.fd, termios.TIOCEXCL)  # others than pyserial, such as the SDK and the Wizard
+        except serial.SerialException as error:
+            raise InputError(_reason(self.name, error), missing=error.errno == errno.ENOENT) from error
+        self.is_using, self.low_latency = False, True
+        try:
+            self._serial.set_low_latency_mode(True)
+        except (ValueError, OSError):  # not every adapter has such a mode
+            self.low_latency = False
+
+    def close(self) -> None:
+        """Also after a loss; a second time does nothing."""
+        port, self._serial = self._serial, None
+        self.is_using = False
+        if port is not None:
+            with contextlib.suppress(OSError):  # a lost one may refuse even that
+                port.close()
+
+    def getBaudRate(self) -> int:
+        """As the packet handlers ask for it."""
+        return self.baud_rate
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Of the line, from now on."""
+        self.baud_rate = baudrate
+        if self._serial is not None:
+            self._serial.baudrate = baudrate
+        return True
+
+    def clearPort(self) -> None:
+        """Drop what came in late."""
+        self._do(lambda port: port.reset_input_buffer())
+
+    def writePort(self, packet: Sequence[int]) -> int:
+        """Send a packet that is not stuffed, stuffed where it must be; returns the length of the given one."""
+        data = bytes(packet)
+        content = data[BEFORE_INSTRUCTION:-2]
+        if HEADER in content:
+            data = encoded(Packet(data[BEFORE_LENGTH - 1], content[0], content[1:]))
+        self._do(lambda port: port.write(data))
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:
+        """At most so many bytes, waiting for the first of them until the answer is overdue."""
+        return bytes(self._do(lambda port: self._read(port, length)))
+
+    def _read(self, port: Any, length: int) -> bytes:
+        ready, _, _ = select.select([port.fd], [], [], max(0.0, self._due_s - time.monotonic()))
+        if not ready:
+            return b""
+        data = os.read(port.fd, length)
+        if not data:
+            raise OSError(errno.EIO, "end of file")
+        return data
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """For an answer of so many bytes, from now on."""
+        wire_s = packet_length * BITS_PER_BYTE / self.baud_rate
+        self._wait_for(wire_s + LONGEST_RETURN_DELAY_S + self.latency_s)
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """For an answer that takes at most so long, from now on."""
+        self._wait_for(1e-3 * msec)
+
+    def isPacketTimeout(self) -> bool:
+        """Whether the answer is overdue."""
+        return time.monotonic() >= self._due_s
+
+    def _wait_for(self, timeout_s: float) -> None:
+        self.timeout_s = timeout_s
+        self._due_s = time.monotonic() + timeout_s
+
+    def _do(self, work: Any) -> Any:
+        if self._serial is None:
+            raise PortLostError(f"{self.name} is not open")
+        try:
+            return work(self._serial)
+        except (OSError, termios.error, TypeError) as error:  # pyserial has all of them for a port that went away
+            self.close()
+            raise PortLostError(f"{self.name} went away: {error}. Is its cable plugged in?") from error
+
+
+def _reason(name: str, error: serial.SerialException) -> str:
+    if error.errno == errno.ENOENT:
+        return f"no serial port {name}: plug in the adapter, and look for its name in /dev/serial/by-id"
+    if error.errno == errno.EACCES:
+        return f"{name} may not be opened by this user: sudo usermod -aG dialout $USER, then log in again"
+    if error.errno in (errno.EAGAIN, errno.EBUSY):
+        return f"{name} is in use by another program: close it (lsof {name} names it)"
+    return f"{name} cannot be opened as a serial port: {error}"
