@@ -31,9 +31,10 @@ after:
     - withdraw(a)
   redirect(a, b): withdraw(b)
   withdraw(b): point(a)
-switching: {share: 0.2, before: 0.25}
+switching: {share: 0.1, before: 0.8}
 """
-"""Simple and dual pointing, figure 6.26; the hand rests for the first quarter of what follows at a place."""
+"""Simple and dual pointing, figure 6.26. What follows a place may be taken for the other until late: where the second
+place is not known, few hypotheses of going on to it are near the right one, and at first going back fits better."""
 
 ACTIONS: dict[str, tuple[str, ...]] = {
     "pointing_50fps": ("pointing",),
