@@ -80,7 +80,9 @@ class ServoPort:
         port, self._serial = self._serial, None
         self.is_using = False
         if port is not None:
-            with contextlib.suppress(OSError):  # a lost one may refuse even that
+            with contextlib.suppress(OSError, TypeError):  # a lost one may refuse, or have no descriptor any more
+                fcntl.ioctl(port.fd, termios.TIOCNXCL)  # the terminal would keep it while anybody has it open
+            with contextlib.suppress(OSError):
                 port.close()
 
     def getBaudRate(self) -> int:
