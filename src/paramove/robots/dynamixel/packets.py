@@ -107,6 +107,12 @@ def encoded(packet: Packet) -> bytes:
     return data + checksum(data).to_bytes(2, "little")
 
 
+def decoded(data: bytes) -> Packet:
+    """The packet of its bytes on the wire, from the header on; the checksum is not looked at."""
+    content = data[BEFORE_INSTRUCTION:-2].replace(HEADER + b"\xfd", HEADER)
+    return Packet(data[BEFORE_LENGTH - 1], content[0], content[1:])
+
+
 class PacketReader:
     """Finds packets in what comes in, byte by byte or in any pieces; what is none is passed over."""
 
@@ -141,8 +147,7 @@ class PacketReader:
                 del self._bytes[: len(HEADER)]  # a packet may begin within what only seemed to be one
                 return DamagedPacket(data[BEFORE_LENGTH - 1])
             del self._bytes[:size]
-            content = data[BEFORE_INSTRUCTION:-2].replace(HEADER + b"\xfd", HEADER)
-            return Packet(data[BEFORE_LENGTH - 1], content[0], content[1:])
+            return decoded(data)
         return None
 
     def _to_header(self) -> bool:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, Instruction, Packet, encoded
+from paramove.robots.dynamixel.packets import decoded, encoded
 
 LONGEST_NOISE = 12
+UNUSED_ID = 253
+"""Servos have lower ones."""
 
 
 @dataclass
@@ -62,10 +64,11 @@ class WireFaults:
 
     def _changed(self, answer: bytes) -> bytes:
         if self._happens(self.bare):
-            error = answer[BEFORE_INSTRUCTION + 1 :][:1]
-            answer = encoded(Packet(answer[BEFORE_LENGTH - 1], Instruction.STATUS, error))
+            packet = decoded(answer)
+            answer = encoded(replace(packet, parameters=packet.parameters[:1]))
         if self._happens(self.foreign):
-            answer = _from_another(answer)
+            packet = decoded(answer)
+            answer = encoded(replace(packet, id=(packet.id + 1) % UNUSED_ID))
         if self._happens(self.damaged):
             place = int(self._rng.integers(len(answer)))
             answer = answer[:place] + bytes([answer[place] ^ int(self._rng.integers(1, 256))]) + answer[place + 1 :]
@@ -77,9 +80,3 @@ class WireFaults:
 
     def _happens(self, share: float) -> bool:
         return share > 0.0 and bool(self._rng.random() < share)
-
-
-def _from_another(answer: bytes) -> bytes:
-    """The same content with the next id."""
-    content = answer[BEFORE_INSTRUCTION:-2].replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
-    return encoded(Packet((answer[BEFORE_LENGTH - 1] + 1) % 253, content[0], content[1:]))
