@@ -45,7 +45,7 @@ def test_bytes_like_a_header_arrive(emulator, handler, data):
 def test_a_missing_servo_is_waited_for_as_long_as_its_bytes_take(emulator, handler):
     with ServoPort(emulator.port) as port:
         assert handler.ping(port, 9)[1] == COMM_RX_TIMEOUT
-        assert port.timeout_s == pytest.approx(11 * 10 / 1_000_000 + 508e-6 + LATENCY_S)
+        assert port.timeout_s == pytest.approx((10 + 11) * 10 / 1_000_000 + 508e-6 + LATENCY_S)
 
 
 def test_a_pulled_plug_is_told_and_leaves_nothing_busy(emulator, handler):

@@ -44,14 +44,17 @@ class ServoPort:
         is_using: Whether an exchange is under way; the packet handlers set it.
         low_latency: Whether the adapter was told to hand over bytes at once; a pseudo-terminal cannot be.
         timeout_s: For the answer that was last waited for.
+        return_delay_s: That a servo may take before it answers; the longest that can be set, until it is known.
     """
 
     def __init__(self, name: str, baud_rate: int = 1_000_000, latency_s: float = LATENCY_S) -> None:
         self.name, self.baud_rate, self.latency_s = name, baud_rate, latency_s
         self.is_using = False
         self.low_latency = False
+        self.return_delay_s = LONGEST_RETURN_DELAY_S
         self.timeout_s = 0.0
         self._due_s = 0.0
+        self._asked_bytes = 0
         self._serial: Any = None
 
     def __enter__(self) -> Self:
@@ -107,6 +110,7 @@ class ServoPort:
         if HEADER in content:
             data = encoded(Packet(data[BEFORE_LENGTH - 1], content[0], content[1:]))
         self._do(lambda port: port.write(data))
+        self._asked_bytes = len(data)
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
@@ -122,10 +126,10 @@ class ServoPort:
             raise OSError(errno.EIO, "end of file")
         return data
 
-    def setPacketTimeout(self, packet_length: int) -> None:
-        """For an answer of so many bytes, from now on."""
-        wire_s = packet_length * BITS_PER_BYTE / self.baud_rate
-        self._wait_for(wire_s + LONGEST_RETURN_DELAY_S + self.latency_s)
+    def setPacketTimeout(self, packet_length: int, answers: int = 1) -> None:
+        """For so many bytes of so many answers to what was just sent, from now on."""
+        wire_s = (self._asked_bytes + packet_length) * BITS_PER_BYTE / self.baud_rate
+        self._wait_for(wire_s + answers * self.return_delay_s + self.latency_s)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
         """For an answer that takes at most so long, from now on."""

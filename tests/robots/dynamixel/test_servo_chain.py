@@ -1,0 +1,128 @@
+"""Questions to servos over the wire: every answer is the right servo's, and what never came is not made up."""
+
+import pytest
+
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_chain import PingedServo, ServoChain, ServoRefusedError, ServoSilentError
+from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
+from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.wire_faults import WireFaults
+
+BAUD_RATE = 1_000_000
+REGISTERS = XL430_W250.registers
+POSITION = [REGISTERS["Present Velocity"], REGISTERS["Present Position"]]
+PATIENT_S = 0.3
+"""Other programs may keep the emulator waiting."""
+PLACES = {1: 1000.0, 2: 2000.0, 3: 3000.0}
+
+
+@pytest.fixture
+def emulator():
+    models = {1: XL430_W250, 2: XL330_M288, 3: XL330_M288}
+    servos = [EmulatedServo(models[number], number, BAUD_RATE, place) for number, place in PLACES.items()]
+    with DynamixelEmulator(servos) as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def chain(emulator):
+    with ServoPort(emulator.port, BAUD_RATE, latency_s=PATIENT_S) as port:
+        yield ServoChain(port)
+
+
+def impatient(chain: ServoChain) -> ServoChain:
+    """For faults that are waited for again and again."""
+    chain.port.latency_s = 0.03
+    return chain
+
+
+def positions(chain: ServoChain, *numbers: int) -> dict[int, int]:
+    return {number: one.values["Present Position"] for number, one in chain.sync_read(numbers, POSITION).items()}
+
+
+def test_who_is_there(chain):
+    assert chain.ping(2) == PingedServo(2, 1200, 45)
+    assert chain.ping_all() == [PingedServo(1, 1060, 45), PingedServo(2, 1200, 45), PingedServo(3, 1200, 45)]
+    assert impatient(chain).ping(7) is None
+
+
+def test_numbers_are_written_and_read(chain):
+    chain.write(1, REGISTERS["Homing Offset"], -300)
+    assert chain.read(1, REGISTERS["Homing Offset"]) == -300
+    assert positions(chain, 1, 2, 3) == {1: 700, 2: 2000, 3: 3000}
+    with pytest.raises(OverflowError):
+        chain.write(1, REGISTERS["Torque Enable"], 256)
+
+
+def test_one_packet_writes_to_several(chain):
+    chain.sync_write(REGISTERS["Goal Position"], {1: 1100, 3: 2900})
+    found = chain.sync_read([1, 2, 3], [REGISTERS["Goal Position"]])
+    assert [found[number].values["Goal Position"] for number in (1, 2, 3)] == [1100, 2000, 2900]
+
+
+def test_a_refusal_names_servo_register_and_reason(chain):
+    chain.write(1, REGISTERS["Torque Enable"], 1)
+    with pytest.raises(ServoRefusedError, match=r"servo 1 .*EEPROM is locked while torque is on.*write ID = 5"):
+        chain.write(1, REGISTERS["ID"], 5)
+
+
+def test_a_silent_servo_is_told_with_the_remedy(chain):
+    with pytest.raises(ServoSilentError, match=r"servo 7 did not answer \(read ID, 3 attempts\).*scan"):
+        impatient(chain).read(7, REGISTERS["ID"])
+
+
+def test_a_missing_servo_leaves_the_others_and_no_number_in_its_place(chain):
+    assert positions(impatient(chain), 1, 7, 3) == {1: 1000, 3: 3000}
+    assert chain.counts.missing == 2
+
+
+def test_an_alert_comes_with_the_answer(chain, emulator):
+    with emulator.lock:
+        emulator.bus.servos[1].memory["Hardware Error Status"] = 0x20
+    found = chain.sync_read([1, 2], POSITION)
+    assert not found[1].alert
+    assert found[2].alert
+
+
+def test_after_a_reboot_torque_is_off(chain, emulator):
+    chain.write(2, REGISTERS["Torque Enable"], 1)
+    chain.reboot(2)
+    with emulator.lock:
+        assert emulator.bus.servos[1].memory["Torque Enable"] == 0
+
+
+@pytest.mark.parametrize(
+    ("faults", "told"),
+    [
+        (WireFaults(damaged=0.3, seed=1), "damaged"),
+        (WireFaults(cut=0.3, seed=2), "missing"),
+        (WireFaults(lost=0.3, seed=3), "missing"),
+        (WireFaults(noisy=0.5, seed=4), ""),
+        (WireFaults(bare=0.3, seed=5), "stray"),
+        (WireFaults(foreign=0.3, seed=6), "stray"),
+        (WireFaults(echo=True), "echoed"),
+    ],
+)
+def test_what_goes_wrong_on_the_wire_never_gives_a_wrong_number(chain, emulator, faults, told):
+    emulator.faults = faults
+    right = {number: int(place) for number, place in PLACES.items()}
+    answered = 0
+    impatient(chain)
+    for _ in range(10):
+        found = positions(chain, 1, 2, 3)
+        assert found.items() <= right.items()
+        answered += len(found)
+    assert answered > 15
+    assert not told or getattr(chain.counts, told) > 0
+
+
+def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(chain, emulator):
+    impatient(chain)
+    emulator.faults = WireFaults(late=0.4, late_s=0.05, seed=7)
+    servo = emulator.bus.servos[0]
+    for place in range(1000, 1020):
+        with emulator.lock:
+            servo.position = float(place)
+        found = positions(chain, 1)
+        assert found in ({}, {1: place})
