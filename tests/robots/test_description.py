@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.hoap3.firmware import Firmware
 from tests.robots.hoap3.movements import HOAP3, ROBOT_DESCRIPTION
+from tests.robots.servo_arms import FOLDER, KOCH, OPEN_MANIPULATOR_X
 
 
 def test_order_is_that_of_the_state_vector() -> None:
@@ -96,6 +98,67 @@ def test_wrong_files_are_refused_with_the_reason(tmp_path: Path, old: str, new: 
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(DescriptionError, match=reason):
         RobotDescription.load(path)
+
+
+def test_a_robot_of_servos_has_a_bus_and_a_chain_and_hoap3_has_not() -> None:
+    assert (HOAP3.bus, HOAP3.servo_ids, HOAP3.chain) == (None, (), None)
+    for robot, number_of_joints in ((OPEN_MANIPULATOR_X, 4), (KOCH, 5)):
+        assert robot.firmware is None
+        assert robot.arms == {}
+        assert robot.bus is not None
+        assert robot.bus.baud_rate == 1_000_000
+        assert robot.chain is not None
+        assert robot.chain.joints == robot.joint_names[:number_of_joints]
+        np.testing.assert_array_equal(robot.chain.indices, range(number_of_joints))
+        assert robot.joint_names[robot.chain.gripper_index] == robot.chain.gripper == "gripper"
+        np.testing.assert_array_equal(robot.chain.kinematics.upper, robot.soft_upper[:number_of_joints])
+        assert (robot.soft_lower <= robot.base_pose).all()
+        assert (robot.base_pose <= robot.soft_upper).all()
+        for angle in (robot.chain.gripper_open, robot.chain.gripper_closed):
+            assert robot.soft_lower[-1] <= angle <= robot.soft_upper[-1]
+        assert robot.stream.period_us == 10_000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("servo_id: 12", "servo_id: 11", "servo_id given twice: 11"),
+        ("servo_id: 12, ", "", "expected a bus and a servo_id for every joint.* found a bus and 4 of 5 joints"),
+        ("bus: {baud_rate: 1000000}", "", "found no bus and 5 of 5"),
+        ("servo_id: 12", "servo_id: 254", r"joints\.1\.servo_id: input should be less than or equal to 252, found 254"),
+        (
+            "lower_deg: -162,",
+            "lower_deg: -182,",
+            "joint1: expected a range within 0 to 4095 counts.* found -23 to 3891",
+        ),
+        ("chain:\n  joints: [joint1,", "chain:\n  joints: [joint9,", "the chain names unknown joints: joint9"),
+        ("gripper: {joint: gripper,", "gripper: {joint: grip,", "the chain names unknown joints: grip"),
+        ("open_deg: -80", "open_deg: 51", "different angles of the open and the closed gripper"),
+        ("open_deg: -80", "open_deg: -90", r"gripper: -90.0 deg is outside -87.0 to 52.7 deg of joint gripper"),
+        ("hand: [0.126, 0.0, 0.0]", "hand: [0.126, 0.0]", r"chain\.links\.hand\.2: field required"),
+        ("baud_rate: 1000000", "baud_rate: 0", r"bus\.baud_rate: input should be greater than 0"),
+    ],
+)
+def test_wrong_files_of_servos_are_refused_with_the_reason(tmp_path: Path, old: str, new: str, reason: str) -> None:
+    text = (FOLDER / "open_manipulator_x" / "robot.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "robot.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=reason):
+        RobotDescription.load(path)
+
+
+def test_what_needs_an_arm_like_hoap3_refuses_a_robot_of_servos() -> None:
+    assert HOAP3.arm("left") is HOAP3.arms["left"]
+    with pytest.raises(DescriptionError, match="hoap3 describes the arms right, left, found side 'middle'"):
+        HOAP3.arm("middle")
+    with pytest.raises(DescriptionError, match="koch_v1_1 describes no arm of five joints like HOAP-3's"):
+        KOCH.arm("right")
+
+
+def test_the_firmware_of_hoap3_refuses_a_robot_of_servos() -> None:
+    with pytest.raises(DescriptionError, match="koch_v1_1 has no firmware"):
+        Firmware(KOCH)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "hoap3", "a: 1", "\x00", "joints: []"])

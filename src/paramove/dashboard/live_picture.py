@@ -55,7 +55,7 @@ class LivePicture:
         side: str = "right",
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._sites = robot.arms[side].sites
+        self._sites = robot.arm(side).sites
         self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
         self._beliefs = Beliefs((surface.x, surface.y))
         self._nodes = NodeTable()

@@ -68,7 +68,7 @@ class ClearanceChecker:
     def __init__(
         self, robot: RobotDescription, side: str, surface: WorkSurface, cylinder: UprightCylinder, n_standing: int = 3
     ) -> None:
-        self._robot, self._arm = robot, robot.arms[side]
+        self._robot, self._arm = robot, robot.arm(side)
         self._cylinder, self._n_standing, self._surface = cylinder, n_standing, surface
         self._model = self._compile(robot.model_path)
         self._data = mujoco.MjData(self._model)

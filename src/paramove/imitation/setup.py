@@ -86,9 +86,7 @@ def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, sur
 def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> ClearPlans:
     """What plans the robot's movements, from files."""
     robot = RobotDescription.load(robot_folder)
-    if side not in robot.arms:
-        raise DescriptionError(f"{robot_folder} describes the arms {', '.join(robot.arms)}, found side {side!r}")
-    arm = robot.arms[side]
+    arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)
     converted = robot_movement(movement.trained(), solver.length)
     joints = [*arm.indices, arm.fingers_index]

@@ -18,6 +18,9 @@ from paramove.robots.arm_kinematics import ArmKinematics
 from paramove.robots.description_file import (
     ArmPart,
     ArmSites,
+    BusParameters,
+    ChainPart,
+    ChainSites,
     DescriptionError,
     FirmwareParameters,
     RobotFile,
@@ -25,8 +28,9 @@ from paramove.robots.description_file import (
     read_robot_file,
 )
 from paramove.robots.joint_units import JointUnits
+from paramove.robots.planar_arm import PlanarArm
 
-__all__ = ["Arm", "DescriptionError", "RobotDescription"]
+__all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
 
 FloatArray = NDArray[np.float64]
 
@@ -60,11 +64,35 @@ class Arm:
 
 
 @dataclass(frozen=True, eq=False)
+class Chain:
+    """A servo arm of yaw, three pitches and perhaps a roll, with a gripper.
+
+    Attributes:
+        joints: From the base on, without the gripper.
+        indices: Their places in the robot's joint vector.
+        gripper: Name of the joint that closes the gripper; `gripper_index` its place.
+        gripper_open, gripper_closed: Its angles, rad.
+        kinematics: Keeps to the robot's soft limits; in the frame of the base site.
+    """
+
+    joints: tuple[str, ...]
+    indices: NDArray[np.intp]
+    gripper: str
+    gripper_index: int
+    gripper_open: float
+    gripper_closed: float
+    sites: ChainSites
+    kinematics: PlanarArm
+
+
+@dataclass(frozen=True, eq=False)
 class RobotDescription:
     """A robot's joints, limits, units and arms. Joint vectors are in the order of `joint_names`.
 
     All arrays have shape [J]; angles in rad. `lower`, `upper` are the mechanical range, `soft_lower`, `soft_upper` what
-    commands keep to. `velocity` is the motor's limit; `operating_*` are our limits for planned movement.
+    commands keep to. `velocity` is the motor's limit; `operating_*` are our limits for planned movement. A robot like
+    HOAP-3 has `firmware` and `arms`; one of servos on a bus has `bus`, `servo_ids` in the order of the joints, and a
+    `chain`. What a robot has not is None or empty.
     """
 
     name: str
@@ -85,9 +113,12 @@ class RobotDescription:
     torque_peak: FloatArray
     base_pose: FloatArray
     units: JointUnits
-    firmware: FirmwareParameters
+    firmware: FirmwareParameters | None
     stream: StreamParameters
     arms: dict[str, Arm]
+    bus: BusParameters | None
+    servo_ids: tuple[int, ...]
+    chain: Chain | None
 
     @property
     def n_joints(self) -> int:
@@ -115,6 +146,17 @@ class RobotDescription:
         """Places of several joints, ready to index a joint vector."""
         return np.array([self.index(joint) for joint in joints], dtype=np.intp)
 
+    def arm(self, side: str) -> Arm:
+        """One of `arms`.
+
+        Raises:
+            DescriptionError: No such arm; names those that there are.
+        """
+        if side not in self.arms:
+            there = f"the arms {', '.join(self.arms)}" if self.arms else "no arm of five joints like HOAP-3's"
+            raise DescriptionError(f"{self.model_path.parent} describes {there}, found side {side!r}")
+        return self.arms[side]
+
     @classmethod
     def load(cls, path: str | Path) -> RobotDescription:
         """Read and check a `robot.yaml`, or the one in the folder `path`.
@@ -135,6 +177,7 @@ def _assemble(path: Path, file: RobotFile) -> RobotDescription:
     lower = _radians(joint.lower_deg for joint in joints)
     upper = _radians(joint.upper_deg for joint in joints)
     margin = _radians(motor.margin_deg for motor in motors)
+    soft_lower, soft_upper = _frozen(lower + margin), _frozen(upper - margin)
     units = JointUnits(
         names=names,
         counts_per_rad=_frozen(np.rad2deg([joint.counts_per_deg for joint in joints])),
@@ -150,8 +193,8 @@ def _assemble(path: Path, file: RobotFile) -> RobotDescription:
         velocity_loop=np.array([motor.loop == "velocity" for motor in motors]),
         lower=lower,
         upper=upper,
-        soft_lower=_frozen(lower + margin),
-        soft_upper=_frozen(upper - margin),
+        soft_lower=soft_lower,
+        soft_upper=soft_upper,
         velocity=_radians(motor.velocity_deg_s for motor in motors),
         operating_velocity=_radians(motor.operating_velocity_deg_s for motor in motors),
         operating_acceleration=_radians(motor.operating_acceleration_deg_s2 for motor in motors),
@@ -164,6 +207,9 @@ def _assemble(path: Path, file: RobotFile) -> RobotDescription:
         firmware=file.firmware,
         stream=file.stream,
         arms={side: _arm(names, arm) for side, arm in file.arms.items()},
+        bus=file.bus,
+        servo_ids=tuple(joint.servo_id for joint in joints if joint.servo_id is not None),
+        chain=None if file.chain is None else _chain(names, file.chain, soft_lower, soft_upper),
     )
 
 
@@ -177,6 +223,30 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
         fingers_closed=float(np.deg2rad(arm.fingers.closed_deg)),
         sites=arm.sites,
         kinematics=ArmKinematics(arm.upper_arm, arm.gripper_from_elbow, arm.fingertip_from_elbow),
+    )
+
+
+def _chain(names: tuple[str, ...], chain: ChainPart, lower: FloatArray, upper: FloatArray) -> Chain:
+    indices = np.array([names.index(joint) for joint in chain.joints], dtype=np.intp)
+    links = chain.links
+    return Chain(
+        joints=chain.joints,
+        indices=indices,
+        gripper=chain.gripper.joint,
+        gripper_index=names.index(chain.gripper.joint),
+        gripper_open=float(np.deg2rad(chain.gripper.open_deg)),
+        gripper_closed=float(np.deg2rad(chain.gripper.closed_deg)),
+        sites=chain.sites,
+        kinematics=PlanarArm(
+            names=chain.joints,
+            lower=lower[indices],
+            upper=upper[indices],
+            yaw_axis=links.yaw_axis,
+            shoulder=links.shoulder,
+            upper_arm=links.upper_arm,
+            forearm=links.forearm,
+            hand=links.hand,
+        ),
     )
 
 

@@ -12,6 +12,7 @@ from ruamel.yaml.error import YAMLError
 from paramove.input_error import InputError
 
 MOST_FINDINGS = 5
+POSITION_MODE_MOST = 4095
 
 
 class DescriptionError(InputError):
@@ -23,7 +24,7 @@ class _Part(BaseModel):
 
 
 class JointPart(_Part):
-    """One joint, degrees."""
+    """One joint, degrees. `servo_id` is the address of a joint on a servo bus."""
 
     name: str
     motor: str
@@ -32,6 +33,7 @@ class JointPart(_Part):
     counts_per_deg: float
     zero_counts: int
     base_deg: float
+    servo_id: int | None = Field(default=None, ge=0, le=252)
 
 
 class MotorPart(_Part):
@@ -70,7 +72,7 @@ class StreamParameters(_Part):
 
 
 class FingersPart(_Part):
-    """The joint that closes a hand."""
+    """The joint that closes a hand or a gripper."""
 
     joint: str
     open_deg: float
@@ -97,6 +99,38 @@ class ArmPart(_Part):
     fingertip_from_elbow: tuple[float, float, float]
 
 
+class BusParameters(_Part):
+    """The servos' bus; they speak Dynamixel Protocol 2.0."""
+
+    baud_rate: int = Field(gt=0)
+
+
+class ChainSites(_Part):
+    """Names of a chain's sites in the model file."""
+
+    base: str
+    end_effector: str
+
+
+class ChainLinks(_Part):
+    """Lengths in the zero pose, m; see `paramove.robots.planar_arm.PlanarArm`."""
+
+    yaw_axis: tuple[float, float]
+    shoulder: tuple[float, float, float]
+    upper_arm: tuple[float, float]
+    forearm: tuple[float, float]
+    hand: tuple[float, float, float]
+
+
+class ChainPart(_Part):
+    """An arm with a yaw, three pitches and perhaps a roll, and a gripper at its end."""
+
+    joints: tuple[str, str, str, str] | tuple[str, str, str, str, str]
+    gripper: FingersPart
+    sites: ChainSites
+    links: ChainLinks
+
+
 class RobotFile(_Part):
     """All of robot.yaml."""
 
@@ -104,9 +138,11 @@ class RobotFile(_Part):
     model: str
     joints: tuple[JointPart, ...]
     motors: dict[str, MotorPart]
-    firmware: FirmwareParameters
+    firmware: FirmwareParameters | None = None
     stream: StreamParameters
-    arms: dict[str, ArmPart]
+    arms: dict[str, ArmPart] = {}
+    bus: BusParameters | None = None
+    chain: ChainPart | None = None
 
 
 def read_robot_file(path: Path) -> RobotFile:
@@ -171,10 +207,53 @@ def _check(path: Path, file: RobotFile) -> None:
                 f"{joint.lower_deg} to {joint.upper_deg} deg"
             )
     for side, arm in file.arms.items():
-        if arm.fingers.open_deg == arm.fingers.closed_deg:
-            raise DescriptionError(f"{path}: arm {side!r}: expected different angles of the open and the closed hand")
-        unknown = [name for name in (*arm.joints, arm.fingers.joint) if name not in names]
-        if unknown:
-            raise DescriptionError(f"{path}: arm {side!r} names unknown joints: {', '.join(unknown)}")
+        _check_arm(path, names, side, arm)
+    _check_servos(path, file)
+    if file.chain is not None:
+        _check_chain(path, file.joints, file.chain)
     if not (path.parent / file.model).is_file():
         raise DescriptionError(f"{path}: the model file {path.parent / file.model} does not exist", missing=True)
+
+
+def _check_arm(path: Path, names: list[str], side: str, arm: ArmPart) -> None:
+    if arm.fingers.open_deg == arm.fingers.closed_deg:
+        raise DescriptionError(f"{path}: arm {side!r}: expected different angles of the open and the closed hand")
+    unknown = [name for name in (*arm.joints, arm.fingers.joint) if name not in names]
+    if unknown:
+        raise DescriptionError(f"{path}: arm {side!r} names unknown joints: {', '.join(unknown)}")
+
+
+def _check_servos(path: Path, file: RobotFile) -> None:
+    numbers = [joint.servo_id for joint in file.joints if joint.servo_id is not None]
+    if (file.bus is not None) != bool(numbers) or 0 < len(numbers) < len(file.joints):
+        raise DescriptionError(
+            f"{path}: expected a bus and a servo_id for every joint, or neither, found "
+            f"{'a' if file.bus else 'no'} bus and {len(numbers)} of {len(file.joints)} joints with a servo_id"
+        )
+    if len(set(numbers)) != len(numbers):
+        twice = sorted({number for number in numbers if numbers.count(number) > 1})
+        raise DescriptionError(f"{path}: servo_id given twice: {', '.join(map(str, twice))}")
+    for joint in file.joints:
+        ends = sorted(joint.zero_counts + joint.counts_per_deg * end for end in (joint.lower_deg, joint.upper_deg))
+        if joint.servo_id is not None and not (ends[0] >= 0 and ends[1] <= POSITION_MODE_MOST):
+            raise DescriptionError(
+                f"{path}: joint {joint.name}: expected a range within 0 to {POSITION_MODE_MOST} counts, what a "
+                f"servo's position mode takes, found {ends[0]:.0f} to {ends[1]:.0f}"
+            )
+
+
+def _check_chain(path: Path, joints: tuple[JointPart, ...], chain: ChainPart) -> None:
+    parts = {joint.name: joint for joint in joints}
+    gripper = chain.gripper
+    unknown = [name for name in (*chain.joints, gripper.joint) if name not in parts]
+    if unknown:
+        raise DescriptionError(f"{path}: the chain names unknown joints: {', '.join(unknown)}")
+    if gripper.open_deg == gripper.closed_deg:
+        raise DescriptionError(f"{path}: the chain: expected different angles of the open and the closed gripper")
+    joint = parts[gripper.joint]
+    for angle in (gripper.open_deg, gripper.closed_deg):
+        if not joint.lower_deg <= angle <= joint.upper_deg:
+            raise DescriptionError(
+                f"{path}: the chain's gripper: {angle} deg is outside {joint.lower_deg} to {joint.upper_deg} deg of "
+                f"joint {joint.name}"
+            )

@@ -106,7 +106,7 @@ class Experiment:
 def run_experiment(setup: Setup, progress: Callable[[str], None] = lambda _: None) -> Experiment:
     """Train, convert and compare for every seed and target."""
     robot = RobotDescription.load(setup.robot_folder)
-    arm = robot.arms["right"]
+    arm = robot.arm("right")
     solver = ArmPoseSolver(robot, arm)
     along, aside, _ = arm.kinematics.gripper_from_elbow
     lengths = (arm.kinematics.upper_arm, float(np.hypot(along, aside)))

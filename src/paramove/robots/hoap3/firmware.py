@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.robots.description import RobotDescription
+from paramove.robots.description import DescriptionError, RobotDescription
 
 FloatArray = NDArray[np.float64]
 
@@ -25,6 +25,10 @@ class Firmware:
 
     def __init__(self, description: RobotDescription) -> None:
         p = description.firmware
+        if p is None:
+            raise DescriptionError(
+                f"the description of {description.name} has no firmware; HOAP-3's loop needs one, servos do not"
+            )
         units = description.units
         step_s = p.period_us * 1e-6
         counts_per_rad = np.abs(units.counts_per_rad)

@@ -1,0 +1,10 @@
+"""Draws preview.png: the arm before a cube. Usage: python -m robot_description.open_manipulator_x.preview"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robot_description.arm_preview import write
+
+if __name__ == "__main__":
+    write(Path(__file__).parent, thing="red_cube", height=0.05)

@@ -1,0 +1,34 @@
+"""What an arm cannot reach, and why, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class OutOfReachError(ValueError):
+    """A pose that an arm cannot take; the message names the cause and the nearest that is reachable.
+
+    Attributes:
+        pitch: Nearest reachable pitch at the same position, rad, if there is one.
+        position: If not, a reachable point [3] nearer to the shoulder, frame of the base, m, if there is one.
+    """
+
+    def __init__(self, sentence: str, pitch: float | None = None, position: FloatArray | None = None) -> None:
+        super().__init__(sentence)
+        self.pitch = pitch
+        self.position = position
+
+
+def describe_miss(names: tuple[str, ...], lower: FloatArray, upper: FloatArray, solutions: FloatArray) -> str:
+    """Why none of the solutions [S, J], nan where the arm's length does not suffice, is within the limits."""
+    long_enough = solutions[np.isfinite(solutions).all(axis=-1)]
+    if len(long_enough) == 0:
+        return "it is too far from the shoulder, or too near"
+    beyond = np.maximum(lower - long_enough, long_enough - upper)
+    best = beyond.max(axis=-1).argmin()
+    joint = int(beyond[best].argmax())
+    angle, least, most = np.rad2deg([long_enough[best, joint], lower[joint], upper[joint]])
+    return f"{names[joint]} would have to turn to {angle:.1f} deg, its range is {least:.1f} to {most:.1f} deg"
