@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -88,7 +90,9 @@ def test_without_a_posture_the_arm_faces_the_position_with_the_elbow_above() -> 
 @each_arm
 def test_a_point_too_far_away_is_refused_with_a_reachable_one(robot: RobotDescription) -> None:
     arm = arm_of(robot)
-    with pytest.raises(OutOfReachError, match=r"too far from the shoulder.*first reachable point is \(0\.") as refusal:
+    with pytest.raises(
+        OutOfReachError, match=r"wrist .* found links for 0\.\d+ to .*first reachable point is \(0\."
+    ) as refusal:
         arm.joint_angles((0.60, 0.0, 0.20), 0.0)
     nearer = refusal.value.position
     assert nearer is not None
@@ -133,6 +137,19 @@ def test_an_arm_without_a_roll_joint_refuses_a_roll() -> None:
         arm_of(OPEN_MANIPULATOR_X).joint_angles((0.2, 0.0, 0.1), 0.0, roll=0.3)
     angles = arm_of(KOCH).joint_angles((0.2, 0.0, 0.1), 0.3, roll=0.3)
     assert angles[4] == pytest.approx(0.3, rel=0, abs=1e-12)
+
+
+def test_a_point_beside_the_yaw_axis_is_refused_where_the_arm_lies_further_out() -> None:
+    with pytest.raises(OutOfReachError, match="nearer to the yaw axis than the plane of the arm"):
+        arm_of(KOCH).joint_angles((0.001, 0.0, 0.2), 0.0)
+
+
+def test_nothing_is_proposed_where_no_point_on_the_way_is_reachable() -> None:
+    arm = replace(arm_of(OPEN_MANIPULATOR_X), upper=np.array([-2.5, 0.1, 1.3, 1.9]), lower=np.full(4, -2.7))
+    with pytest.raises(OutOfReachError, match="so is every point between it and the shoulder") as refusal:
+        arm.joint_angles((0.0, 0.2, 0.1), 0.5)
+    assert refusal.value.pitch is None
+    assert refusal.value.position is None
 
 
 @pytest.mark.parametrize("position", [(0.1, 0.0), (0.1, np.nan, 0.1), [(0.1, 0.0, 0.1)]])

@@ -23,10 +23,8 @@ class OutOfReachError(ValueError):
 
 
 def describe_miss(names: tuple[str, ...], lower: FloatArray, upper: FloatArray, solutions: FloatArray) -> str:
-    """Why none of the solutions [S, J], nan where the arm's length does not suffice, is within the limits."""
+    """Why none of the solutions [S, J], some of them nan, is within the limits: the joint that breaks one by least."""
     long_enough = solutions[np.isfinite(solutions).all(axis=-1)]
-    if len(long_enough) == 0:
-        return "it is too far from the shoulder, or too near"
     beyond = np.maximum(lower - long_enough, long_enough - upper)
     best = beyond.max(axis=-1).argmin()
     joint = int(beyond[best].argmax())

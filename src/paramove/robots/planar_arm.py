@@ -162,29 +162,33 @@ class PlanarArm:
 
     def _solutions(self, goal: FloatArray, pitch: Floats, roll: float, near: ArrayLike | None) -> FloatArray:
         """All four, [..., 4, J], where the arm is long enough, else nan, for positions [..., 3] and pitches [...]."""
-        ahead_x, ahead_y = goal[..., 0] - self.yaw_axis[0], goal[..., 1] - self.yaw_axis[1]
-        left, up = self._rolled(np.float64(roll))
-        left = self.shoulder[1] + left
-        upper, fore = np.hypot(*self.upper_arm), np.hypot(*self.forearm)
+        upper, fore = self._lengths
         solutions = []
         with np.errstate(invalid="ignore"):
             for facing in (1.0, -1.0):
-                ahead = facing * np.sqrt(ahead_x**2 + ahead_y**2 - left**2)
-                yaw = np.arctan2(ahead_y, ahead_x) - np.arctan2(left, ahead)
-                wrist = np.stack(
-                    np.broadcast_arrays(ahead - self.shoulder[0], goal[..., 2] - self.shoulder[2]), axis=-1
-                )
-                wrist = wrist - _turned(self.hand[0], up, pitch)
+                yaw, wrist = self._wrist(goal, pitch, roll, facing)
                 bend = self._bend(wrist, upper, fore)
                 for elbow in (bend, -bend):
-                    down = np.arctan2(-wrist[..., 1], wrist[..., 0])
-                    first = (
-                        down - np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow)) - _down(self.upper_arm)
-                    )
+                    first = np.arctan2(-wrist[..., 1], wrist[..., 0]) - _down(self.upper_arm)
+                    first = first - np.arctan2(fore * np.sin(elbow), upper + fore * np.cos(elbow))
                     second = elbow + _down(self.upper_arm) - _down(self.forearm)
                     columns = np.broadcast_arrays(yaw, first, second, pitch - first - second, np.float64(roll))
                     solutions.append(np.stack(columns[: self.n_joints], axis=-1))
         return self._whole_turns(np.stack(solutions, axis=-2), near)
+
+    @property
+    def _lengths(self) -> tuple[float, float]:
+        return float(np.hypot(*self.upper_arm)), float(np.hypot(*self.forearm))
+
+    def _wrist(self, goal: FloatArray, pitch: Floats, roll: float, facing: float) -> tuple[FloatArray, FloatArray]:
+        """Yaw, rad, and the wrist from the shoulder, forward and up, m, facing (1) the goal or with the back to it."""
+        left, up = self._rolled(np.float64(roll))
+        left = self.shoulder[1] + left
+        x, y = goal[..., 0] - self.yaw_axis[0], goal[..., 1] - self.yaw_axis[1]
+        ahead = facing * np.sqrt(x**2 + y**2 - left**2)
+        yaw = np.arctan2(y, x) - np.arctan2(left, ahead)
+        end = np.stack([ahead - self.shoulder[0], goal[..., 2] - self.shoulder[2]], axis=-1)
+        return yaw, end - _turned(self.hand[0], up, pitch)
 
     @staticmethod
     def _bend(wrist: FloatArray, upper: float, fore: float) -> FloatArray:
@@ -212,8 +216,19 @@ class PlanarArm:
     def _reachable(self, goal: FloatArray, pitch: Floats, roll: float) -> NDArray[np.bool_]:
         return np.asarray(self._within(self._solutions(goal, pitch, roll, None)).any(axis=-1))
 
+    def _cause(self, goal: FloatArray, pitch: float, roll: float, found: FloatArray) -> str:
+        if np.isfinite(found).all(axis=-1).any():
+            return describe_miss(self.names, self.lower, self.upper, found)
+        with np.errstate(invalid="ignore"):
+            away = np.linalg.norm(self._wrist(goal, np.float64(pitch), roll, 1.0)[1])
+        if np.isnan(away):
+            return "it is nearer to the yaw axis than the plane of the arm"
+        upper, fore = self._lengths
+        reach = f"{abs(upper - fore):.3f} to {upper + fore:.3f} m"
+        return f"the wrist would have to be {away:.3f} m from the shoulder, found links for {reach}"
+
     def _out_of_reach(self, goal: FloatArray, pitch: float, roll: float, found: FloatArray) -> OutOfReachError:
-        cause = describe_miss(self.names, self.lower, self.upper, found)
+        cause = self._cause(goal, pitch, roll, found)
         where = f"{_metres(goal)} with pitch {np.rad2deg(pitch):.1f} deg"
         other = self._nearest_pitch(goal, pitch, roll)
         if other is not None:
