@@ -64,7 +64,7 @@ class StopButton:
         if not sentences:
             return
         self.sentence = sentences[0]
-        if safety.state == SafetyState.STATE_HOLD:
+        if safety.state in (SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP):
             self.progress = Progress.STOPPED
             self._stopped_ns = heard.published_ns if self._stopped_ns is None else self._stopped_ns
         else:

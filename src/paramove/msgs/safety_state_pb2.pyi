@@ -17,12 +17,14 @@ class SafetyState(_message.Message):
         STATE_ARMED: _ClassVar[SafetyState.State]
         STATE_STOPPING: _ClassVar[SafetyState.State]
         STATE_HOLD: _ClassVar[SafetyState.State]
+        STATE_ESTOP: _ClassVar[SafetyState.State]
     STATE_UNSPECIFIED: SafetyState.State
     STATE_DISCONNECTED: SafetyState.State
     STATE_DISARMED: SafetyState.State
     STATE_ARMED: SafetyState.State
     STATE_STOPPING: SafetyState.State
     STATE_HOLD: SafetyState.State
+    STATE_ESTOP: SafetyState.State
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     FAULTS_FIELD_NUMBER: _ClassVar[int]

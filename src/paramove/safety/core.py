@@ -6,18 +6,23 @@ No clock, no input or output, no threads. Not armed by default, and it never arm
 Each step takes the rows proposed for the stream and gives the rows that may be sent. Whatever it gives ends at rest:
 the rows are followed by their own stop ramp, so a sender that dies leaves a robot that stops by itself.
 
-Gates, in order: 1 names, length, finite values; 2 epoch and age; 3 continuity with what was accepted; 4 soft position
-range; 5 jump; 6 velocity and acceleration with the nominal period. A violation is answered by a controlled stop along
-the path, then HOLD with the fault latched.
+Gates, in order: 1 names, length, epoch and age; 2 rate; 3 continuity with what was accepted; 4 finite values, soft
+position range, jump, velocity, acceleration and jerk with the nominal period; 5 the same for the stop that follows; 6
+clearance of both. A violation is answered by a controlled stop along the path that was accepted before, then HOLD with
+the fault latched.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.gate_io import (
     ArmWord,
+    Clearance,
     Fault,
     Inputs,
     Measured,
@@ -26,8 +31,9 @@ from paramove.safety.gate_io import (
     State,
     Targets,
 )
-from paramove.safety.limits import SPAN, MotionLimits
-from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.limits import MotionLimits
+from paramove.safety.proposal_gate import ProposalGate
+from paramove.safety.watches import EmergencyWatch, FollowingWatch, RateWatch
 
 FloatArray = NDArray[np.float64]
 
@@ -40,6 +46,7 @@ class SafetyCore:
         mechanical: Lower and upper mechanical limits, each [J], rad, for the check of the pose at arming.
         epoch: Of the stream that this gate serves.
         start_ns: Arm words captured at or before this time are another life's and are not heard.
+        clearance: Measures how near parts of the robot come to each other; None: that is not looked at.
     """
 
     def __init__(
@@ -49,45 +56,80 @@ class SafetyCore:
         epoch: int,
         start_ns: int,
         settings: SafetySettings | None = None,
+        clearance: Clearance | None = None,
     ) -> None:
         self.limits = limits
         self.settings = settings or SafetySettings()
         self.state = State.DISCONNECTED
         self.faults: tuple[Fault, ...] = ()
         self._mechanical = mechanical
-        self._epoch = epoch
+        self._now_ns = start_ns
         self._heard_ns = start_ns  # only later arm words count
-        self._sent: Targets | None = None
+        self._measured_ns = start_ns
+        self._stopping_since_ns = start_ns
         self._disarm_after_stop = False
-        self._stopping_since_ns = 0
+        self._played = 0
+        self._accepted = AcceptedRows(limits)
+        self._gate = ProposalGate(limits, self.settings, epoch, clearance)
+        self._emergency = EmergencyWatch(self.settings.emergency_timeout_ms, start_ns)
+        self._following = FollowingWatch(limits.names, self.settings.following, self.settings.following_ms)
+        self._words = RateWatch(self.settings.words_per_s)
 
     def step(self, now_ns: int, inputs: Inputs) -> tuple[Targets | None, State, tuple[Fault, ...]]:
         """Advance to `now_ns`; returns the rows that may be sent (None: send nothing), the state and the faults."""
-        if not self._connected(now_ns, inputs.measured):
-            return None, self.state, self.faults
-        measured = inputs.measured
-        assert measured is not None  # _connected
+        stop = self._clock_fault(now_ns) or inputs.stop
+        pressed = self._emergency.fault(now_ns, inputs.emergency)
+        if pressed is not None:
+            targets = self._emergency_stop(now_ns, pressed, inputs)
+        else:
+            if self.state is State.ESTOP:
+                self.state = State.STOPPING  # and disarmed once it rests
+            targets = self._step(now_ns, inputs.measured, replace(inputs, stop=stop))
+        return targets, self.state, self.faults
+
+    def held(self, next_index: int) -> FloatArray | None:
+        """The last accepted row [J] if the robot has played them all: its own report of it is rounded to its units."""
+        return self._accepted.held(next_index)
+
+    def _step(self, now_ns: int, measured: Measured | None, inputs: Inputs) -> Targets | None:
+        if not self._connected(now_ns, measured) or measured is None:
+            return None
         targets: Targets | None = None
         if inputs.word is not None:
-            targets = self._hear(now_ns, inputs.word, measured, inputs.proposal)
+            targets = self._hear(now_ns, inputs.word, measured, inputs)
         if self.state is State.ARMED:
             targets = self._armed(now_ns, measured, inputs)
         elif inputs.stop is not None:
             self._latch(now_ns, inputs.stop)
         if self.state is State.STOPPING and targets is None:
             self._rest(now_ns, measured)
-        return targets, self.state, self.faults
+        return targets
 
-    def held(self, next_index: int) -> FloatArray | None:
-        """The last accepted row [J] if the robot has played them all: its own report of it is rounded to its units."""
-        if self._sent is None or next_index < self._sent.end_index:
+    def _clock_fault(self, now_ns: int) -> Fault | None:
+        back_ms = (self._now_ns - now_ns) * 1e-6
+        self._now_ns = now_ns
+        if back_ms <= 0.0:
             return None
-        return np.asarray(self._sent.rows[-1])
+        return Fault("clock", "", f"the time went back by {back_ms:.0f} ms, allowed 0 ms; arm again")
+
+    def _emergency_stop(self, now_ns: int, pressed: Fault, inputs: Inputs) -> Targets | None:
+        """Latch ESTOP; if something moves, the rows of a stop that begins as early as the stream allows."""
+        targets = None
+        if self.state is State.ARMED:
+            targets = self._early_ramp(inputs.proposal, inputs.measured)
+        self.state = State.ESTOP
+        self._add(pressed)
+        if inputs.stop is not None:
+            self._add(inputs.stop)
+        self._heard_ns = max(self._heard_ns, now_ns)  # an arm word must be said after the release
+        self._stopping_since_ns = now_ns
+        self._disarm_after_stop = True
+        return targets
 
     def _connected(self, now_ns: int, measured: Measured | None) -> bool:
-        if measured is None:
-            return False
-        age_ms = (now_ns - measured.captured_ns) * 1e-6
+        if measured is not None:
+            self._measured_ns = measured.captured_ns
+        age_ms = abs(now_ns - self._measured_ns) * 1e-6
         if age_ms > self.settings.measured_timeout_ms:
             if self.state is not State.DISCONNECTED:
                 allowed = f"{self.settings.measured_timeout_ms:.0f} ms"
@@ -97,33 +139,39 @@ class SafetyCore:
                 )
                 self._disconnect(Fault("robot_silent", "", sentence))
             return False
-        if self.state is State.DISCONNECTED:
+        if self.state is State.DISCONNECTED and measured is not None:
             self.state = State.DISARMED
         return True
 
     def _disconnect(self, fault: Fault) -> None:
         self.state = State.DISCONNECTED
         self.faults = (fault,)
-        self._sent = None
+        self._disarm_after_stop = False
+        self._accepted.clear()
 
-    def _hear(self, now_ns: int, word: ArmWord, measured: Measured, proposal: Proposal | None) -> Targets | None:
+    def _hear(self, now_ns: int, word: ArmWord, measured: Measured, inputs: Inputs) -> Targets | None:
         if word.captured_ns <= self._heard_ns:
             return None
         self._heard_ns = word.captured_ns
+        too_often = self._words.exceeded(now_ns)
         if not word.armed:
             if self.state is State.STOPPING:
                 self._disarm_after_stop = True
             elif self.state is State.ARMED and self._moving(measured):
                 self._disarm_after_stop = True
-                return self._stop(now_ns, None, proposal, measured)
+                return self._stop(now_ns, None, inputs.proposal, measured)
             else:
                 self.state = State.DISARMED
         elif self.state in (State.DISARMED, State.HOLD):
-            refusals = (*self._age_fault(now_ns, word), *self.arming_faults(word, measured))
+            refusals = (*self._age_fault(now_ns, word), *inputs.arming_faults, *self.arming_faults(word, measured))
+            if too_often:
+                allowed = f"{self._words.allowed} within 250 ms"
+                refusals = (*refusals, Fault("arming_rate", "", f"more arm words than allowed: {allowed}; wait"))
             self.faults = refusals
             if not refusals:
                 self.state = State.ARMED
-                self._sent = None
+                self._accepted.clear()
+                self._played = measured.next_index
         return None
 
     def _age_fault(self, now_ns: int, word: ArmWord) -> tuple[Fault, ...]:
@@ -154,104 +202,64 @@ class SafetyCore:
                     f"{np.rad2deg(lower[joint]):.2f} to {np.rad2deg(upper[joint]):.2f} deg; move it inside by hand"
                 )
                 faults.append(Fault("arming_pose_outside", self.limits.names[joint], sentence))
+        if not faults:
+            away = [self.limits.names[joint] for joint in np.flatnonzero(self._following.away(measured))]
+            if away:
+                sentence = f"{', '.join(away)} not where commanded; see what holds them or command where they are"
+                faults.append(Fault("arming_following", away[0], sentence))
         return tuple(faults)
 
     def _armed(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
         proposal = inputs.proposal
-        if inputs.stop is not None:
-            return self._stop(now_ns, inputs.stop, proposal, measured)
-        if proposal is None:
-            return None
-        fault = self._judge(now_ns, proposal, measured)
+        fault = inputs.stop or self._report_fault(measured) or self._following.fault(measured)
+        if fault is None and proposal is not None:
+            fault = self._gate.fault(now_ns, proposal, measured, self._accepted)
         if fault is not None:
             return self._stop(now_ns, fault, proposal, measured)
-        ahead = proposal.ahead
-        ramp = stop_ramp(proposal.rows[-1], ahead, self.limits) if len(ahead) else ahead
-        return self._accept(proposal.first_index, proposal.rows, ramp, measured)
+        if proposal is None:
+            return None
+        ramp = self._gate.ramp_after(proposal)
+        return self._accepted.accept(proposal.first_index, proposal.rows, ramp, measured)
 
-    def _judge(self, now_ns: int, proposal: Proposal, measured: Measured) -> Fault | None:
-        """The first gate that refuses."""
-        fault = self._judge_form(now_ns, proposal) or self._judge_place(proposal, measured)
-        if fault is not None:
-            return fault
-        # The rows ahead are judged too: the stop ramp will run over them.
-        rows = np.concatenate([proposal.rows, proposal.ahead])
-        before = self._before(proposal.first_index, measured)
-        violation = self.limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
-        return Fault(violation.code, violation.joint, violation.sentence) if violation else None
-
-    def _judge_form(self, now_ns: int, proposal: Proposal) -> Fault | None:
-        names, n_joints = self.limits.names, len(self.limits.names)
-        if proposal.joint_names != names:
-            return Fault(
-                "names", "", f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
-            )
-        for rows in (proposal.rows, proposal.ahead):
-            if rows.ndim != 2 or rows.shape[1] != n_joints:
-                return Fault("length", "", f"rows have shape {rows.shape}, allowed [N, {n_joints}]")
-        if not len(proposal.rows):
-            return Fault("length", "", "the proposal is empty, at least one row is needed")
-        if proposal.epoch != self._epoch:
-            return Fault("epoch", "", f"rows of epoch {proposal.epoch}, allowed {self._epoch}: of an earlier life")
-        age_ms = (now_ns - proposal.captured_ns) * 1e-6
-        if not 0.0 <= age_ms <= self.settings.proposal_age_ms:
-            allowed = f"0 to {self.settings.proposal_age_ms:.0f} ms"
-            return Fault("stale", "", f"rows were made {age_ms:.0f} ms ago, allowed {allowed}")
+    def _report_fault(self, measured: Measured) -> Fault | None:
+        """A report that cannot be true."""
+        shape, end = (len(self.limits.names),), self._accepted.end_index
+        if measured.positions.shape != shape or measured.commanded.shape != shape:
+            found = f"{measured.positions.shape} and {measured.commanded.shape}"
+            return Fault("report", "", f"the robot says poses of shape {found}, allowed {shape}")
+        if not self._played <= measured.next_index <= end:
+            sentence = f"the robot is at row {measured.next_index}, allowed {self._played} to {end}; was it restarted?"
+            return Fault("report", "", sentence)
+        self._played = measured.next_index
         return None
-
-    def _judge_place(self, proposal: Proposal, measured: Measured) -> Fault | None:
-        first, end = proposal.first_index, self._sent.end_index if self._sent else measured.next_index
-        if first < measured.next_index:
-            sentence = f"rows from index {first}, allowed from {measured.next_index}: earlier ones are played"
-            return Fault("played", "", sentence)
-        if first > end:
-            return Fault("gap", "", f"rows from index {first}, allowed up to {end}: no gap")
-        return None
-
-    def _before(self, first_index: int, measured: Measured) -> FloatArray:
-        """The rows already accepted just before `first_index`; the commanded pose where there are none."""
-        sent = self._sent
-        if sent is None:
-            return measured.commanded[None]
-        upto = first_index - sent.first_index
-        return sent.rows[max(0, upto - 2 * SPAN) : upto]
-
-    def _accept(self, first_index: int, rows: FloatArray, ramp: FloatArray, measured: Measured) -> Targets:
-        """Give the rows and their ramp; keep all that the robot has yet to play and a little of what it played."""
-        targets = Targets(first_index, np.concatenate([rows, ramp]), len(ramp))
-        sent = self._sent
-        if sent is None:
-            kept_index, kept = first_index - 1, measured.commanded[None]
-        else:
-            kept_index = max(sent.first_index, measured.next_index - 2 * SPAN)
-            kept = sent.rows[kept_index - sent.first_index : first_index - sent.first_index]
-        self._sent = Targets(kept_index, np.concatenate([kept, targets.rows]), targets.ramp_rows)
-        return targets
 
     def _stop(self, now_ns: int, fault: Fault | None, proposal: Proposal | None, measured: Measured) -> Targets | None:
-        """Latch the fault; give the rows of a stop that begins as early as the stream allows.
-
-        Without good rows to stop along, nothing: what was sent before ends in its own ramp.
-        """
+        """Latch the fault; give the rows of a stop that begins as early as the stream allows."""
         if fault is not None:
-            self.faults = (*self.faults, fault)
+            self._add(fault)
         self.state = State.STOPPING
         self._stopping_since_ns = now_ns
-        if proposal is None or self._judge_form(now_ns, proposal) or self._judge_place(proposal, measured):
+        targets = self._early_ramp(proposal, measured)
+        if fault is not None and fault.code == "following":
+            return self._accepted.give_way(targets, measured)
+        return targets
+
+    def _early_ramp(self, proposal: Proposal | None, measured: Measured | None) -> Targets | None:
+        """From where the proposal may begin, along what was accepted: nothing else of the proposal is used.
+
+        Where that is not possible, nothing: what was sent before ends in its own ramp.
+        """
+        if proposal is None or measured is None:
             return None
-        before = self._before(proposal.first_index, measured)
-        path = np.concatenate([proposal.rows, proposal.ahead])
-        while len(path) and (violation := self.limits.first_violation(path, before)) is not None:
-            path = path[: violation.row]
-        if not len(path):
-            return None
-        ramp = stop_ramp(before[-1], path, self.limits)
-        return self._accept(proposal.first_index, ramp[:0], ramp, measured) if len(ramp) else None
+        return self._accepted.early_ramp(proposal.first_index, measured)
+
+    def _add(self, fault: Fault) -> None:
+        if all(fault.code != known.code or fault.joint != known.joint for known in self.faults):
+            self.faults = (*self.faults, fault)
 
     def _latch(self, now_ns: int, fault: Fault) -> None:
         """A fault while nothing is let through: it stays until a new arm word, and so nobody arms by an older one."""
-        if fault not in self.faults:
-            self.faults = (*self.faults, fault)
+        self._add(fault)
         self._disarm_after_stop = False
         if self.state is State.DISARMED:
             self.state = State.HOLD
@@ -259,7 +267,7 @@ class SafetyCore:
 
     def _moving(self, measured: Measured) -> bool:
         """Whether rows are played or still to be played: a report of rest can be older than the rows just sent."""
-        return not measured.at_rest or (self._sent is not None and measured.next_index < self._sent.end_index)
+        return not measured.at_rest or self._accepted.unplayed(measured.next_index)
 
     def _rest(self, now_ns: int, measured: Measured) -> None:
         """Leave STOPPING once the robot says that it rests."""
@@ -267,7 +275,7 @@ class SafetyCore:
         lost = now_ns - self._stopping_since_ns >= self.settings.lost_rows_ms * 1e6
         if self._moving(measured) and not (lost and measured.at_rest):
             return
-        self._sent = None
+        self._accepted.clear()
         self._heard_ns = max(self._heard_ns, now_ns)  # a new arm word must be said after the stop
         self.state = State.HOLD if self.faults else State.DISARMED
         if self._disarm_after_stop:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ class State(enum.Enum):
     ARMED = "armed"
     STOPPING = "stopping"
     HOLD = "hold"  # at rest after a fault, which stays until a new arm word
+    ESTOP = "emergency stop"  # pressed or not heard; wins in every state and is left, disarmed, by its release alone
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,19 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """All that a step may know. `stop` is a fault that the driver has found."""
+    """All that a step may know.
+
+    `stop` is a fault that the driver has found, `arming_faults` are those that only forbid arming (ids, models,
+    voltage, …). `emergency` says whether the emergency stop is pressed; None: its source said nothing since the last
+    step.
+    """
 
     measured: Measured | None = None
     word: ArmWord | None = None
     proposal: Proposal | None = None
     stop: Fault | None = None
+    arming_faults: tuple[Fault, ...] = ()
+    emergency: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +98,32 @@ class Targets:
         return self.first_index + len(self.rows)
 
 
-@dataclass(frozen=True)
+class Clearance(Protocol):
+    """How near the robot's parts come to each other and to what is fixed around it."""
+
+    def distances(self, q: FloatArray) -> tuple[float, str, str]:
+        """The smallest distance in the pose `q` [J], rad: metres (negative: penetration) and the names of the two."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
 class SafetySettings:
-    """Ages in ms, angles in rad."""
+    """Ages in ms, angles in rad, rates per second.
+
+    Attributes:
+        following: How far each joint may be from where it is commanded, [J], for up to `following_ms`; inf for a joint
+            that may be held off for good, such as fingers by what they hold; None: for no joint.
+        emergency_timeout_ms: An emergency stop not heard for so long counts as pressed; None if the robot has none.
+        proposals_per_s, words_per_s: Nominal rates; 1.2 times as many within 250 ms pass. None: not counted.
+    """
 
     measured_timeout_ms: float = 500.0
     proposal_age_ms: float = 250.0
     word_age_ms: float = 1000.0
     lost_rows_ms: float = 500.0
     pose_tolerance: float = float(np.deg2rad(0.5))
+    following: FloatArray | None = None
+    following_ms: float = 100.0
+    emergency_timeout_ms: float | None = None
+    proposals_per_s: float | None = None
+    words_per_s: float | None = 20.0

@@ -15,13 +15,23 @@ from paramove.robots.description import RobotDescription
 
 FloatArray = NDArray[np.float64]
 
-# Accelerations are taken over two spans of this many rows. A single 1 ms difference of angles that were rounded to six
-# decimals is noise of 1 rad/s²; over 4 ms it is 0.06 rad/s².
-SPAN = 4
+# Accelerations are taken over two spans of this length; a span is at least one row. A single 1 ms difference of angles
+# that were rounded to six decimals is noise of 1 rad/s²; over 4 ms it is 0.06 rad/s².
+SPAN_S = 0.004
+# Jerks are taken over three spans of this length. HOAP-3's planned movements are splines through points 5 ms apart:
+# over 4 ms they reach 3.6 times robot.yaml's jerk, over 8 ms 1.3 times, over 12 ms 0.8 times. What is shorter does not
+# reach a joint whose position loop has a time constant of 5 ms.
+JERK_SPAN_S = 0.012
+# What rounding to six decimals adds to a third difference, rad: half a unit times 1 + 3 + 3 + 1.
+ROUNDING = 8 * 0.5e-6
 # Slack for rounding: a movement planned exactly at a limit passes.
 SLACK = 1.001
 # A step of more than this many times the motors' fastest is a jump: a wrong number, not a fast movement.
 JUMP_FACTOR = 1.5
+# Joints outside their soft range may only come back, at this share of the operating velocity.
+INWARD_SHARE = 0.2
+# A controlled stop has the path's own jerk and as much again for the slowing down.
+STOP_JERK_FACTOR = 2.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,7 @@ class Violation:
             "jump": "jumps",
             "velocity": "is too fast",
             "acceleration": "accelerates too hard",
+            "jerk": "changes its acceleration too fast",
         }[self.code]
         return (
             f"joint {self.joint} {what} at row {self.row}: asked {self.asked:.4g} {self.unit}, allowed {self.allowed}"
@@ -79,43 +90,75 @@ class MotionLimits:
             dt_s=description.stream.period_us * 1e-6,
         )
 
-    def first_violation(self, rows: FloatArray, before: FloatArray, *, rest_at_end: bool = False) -> Violation | None:
+    @property
+    def span(self) -> int:
+        """Rows over which differences for the acceleration are taken."""
+        return max(1, round(SPAN_S / self.dt_s))
+
+    @property
+    def jerk_span(self) -> int:
+        """Rows over which differences for the jerk are taken."""
+        return max(1, round(JERK_SPAN_S / self.dt_s))
+
+    @property
+    def history(self) -> int:
+        """Rows before the first that its judgement needs."""
+        return 3 * self.jerk_span
+
+    def first_violation(
+        self, rows: FloatArray, before: FloatArray, *, rest_at_end: bool = False, stopping: bool = False
+    ) -> Violation | None:
         """The first rule that `rows` break, in the gate's order, or None.
 
         Args:
-            rows: Shape [N, J], rad.
-            before: The rows commanded just before, [B, J], newest last, B >= 1; shorter than 2 SPAN is taken as rest.
+            rows: Shape [N, J], rad, N >= 1.
+            before: The rows commanded just before, [B, J], newest last, B >= 1; what lies before them is taken as rest.
             rest_at_end: Judge as if the last row were held after the end.
+            stopping: Judge by what a controlled stop may use, with rest at the end.
         """
         found = self._first("not_finite", ~np.isfinite(rows), rows, "a finite number", 1.0, "")
         if found is not None:
             return found
-        outside = (rows < self.lower - 1e-9) | (rows > self.upper + 1e-9)
-        found = self._first("joint_limit", outside, rows, "{low:.4g} to {high:.4g} deg", 180 / np.pi, "deg")
-        return found or self._first_too_fast(rows, before, rest_at_end)
-
-    def _first_too_fast(self, rows: FloatArray, before: FloatArray, rest_at_end: bool) -> Violation | None:
-        steps = np.abs(np.diff(np.concatenate([before[-1:], rows]), axis=0)) / self.dt_s
-        for code, limit in (("jump", JUMP_FACTOR * self.motor_velocity), ("velocity", SLACK * self.velocity)):
-            found = self._first(code, steps > limit, steps, "{limit:.4g} deg/s", 180 / np.pi, "deg/s", limit)
-            if found is not None:
-                return found
-        accelerations = self._accelerations(rows, before, rest_at_end)
-        limit = SLACK * self.acceleration
-        return self._first(
-            "acceleration", accelerations > limit, accelerations, "{limit:.4g} deg/s²", 180 / np.pi, "deg/s²", limit
-        )
-
-    def _accelerations(self, rows: FloatArray, before: FloatArray, rest_at_end: bool) -> FloatArray:
-        """Magnitudes over two spans, one row each for the row in which the newer span ends, [N(+2 SPAN), J]."""
-        missing = max(0, 2 * SPAN - len(before))
-        parts = [np.repeat(before[:1], missing, axis=0), before[-2 * SPAN :], rows]
-        if rest_at_end and len(rows):
-            parts.append(np.repeat(rows[-1:], 2 * SPAN, axis=0))
+        history = self.history
+        parts = [np.repeat(before[:1], max(0, history - len(before)), axis=0), before[-history:], rows]
+        if rest_at_end or stopping:
+            parts.append(np.repeat(rows[-1:], history, axis=0))
         whole = np.concatenate(parts)
-        span_s = SPAN * self.dt_s
-        second = whole[2 * SPAN :] - 2.0 * whole[SPAN:-SPAN] + whole[: -2 * SPAN]
-        return np.asarray(np.abs(second) / span_s**2)
+        excess = np.maximum(np.maximum(self.lower - whole, whole - self.upper), 0.0)[history - 1 :]
+        outward = (excess[1:] > 1e-9) & ~(excess[1:] <= excess[:-1])
+        values = whole[history:]
+        found = self._first("joint_limit", outward, values, "{low:.4g} to {high:.4g} deg", 180 / np.pi, "deg")
+        return found or self._first_too_fast(whole, excess[:-1] > 1e-9, stopping)
+
+    def _first_too_fast(self, whole: FloatArray, outside: NDArray[np.bool_], stopping: bool) -> Violation | None:
+        """`whole` begins with the history; `outside` says where the row before lies outside the soft range."""
+        h, end = self.history, len(whole)
+        span_s, jerk_span_s = self.span * self.dt_s, self.jerk_span * self.dt_s
+
+        def earlier(rows: int) -> FloatArray:
+            return whole[h - rows : end - rows]
+
+        n, m = self.span, self.jerk_span
+        steps = (earlier(0) - earlier(1)) / self.dt_s
+        bends = (earlier(0) - 2.0 * earlier(n) + earlier(2 * n)) / span_s**2
+        jerks = (earlier(0) - 3.0 * (earlier(m) - earlier(2 * m)) - earlier(3 * m)) / jerk_span_s**3
+        acceleration = self.stop_acceleration if stopping else self.acceleration
+        jerk = (STOP_JERK_FACTOR if stopping else 1.0) * SLACK * self.jerk + ROUNDING / jerk_span_s**3
+        slow = np.where(outside, INWARD_SHARE, 1.0)
+        for code, found, limit, unit in (
+            ("jump", steps, JUMP_FACTOR * self.motor_velocity, "deg/s"),
+            ("velocity", steps, slow * SLACK * self.velocity, "deg/s"),
+            ("acceleration", bends, SLACK * acceleration, "deg/s²"),
+            ("jerk", jerks, jerk, "deg/s³"),
+        ):
+            values, limits = np.abs(found), np.broadcast_to(limit, found.shape)
+            # Written so that a NaN among the rows before is a violation too.
+            violation = self._first(
+                code, ~(values <= limits), values, f"{{limit:.4g}} {unit}", 180 / np.pi, unit, limits
+            )
+            if violation is not None:
+                return violation
+        return None
 
     def _first(
         self,
@@ -133,6 +176,6 @@ class MotionLimits:
         text = allowed.format(
             low=scale * self.lower[joint],
             high=scale * self.upper[joint],
-            limit=scale * limit[joint] if limit is not None else np.nan,
+            limit=scale * limit[row, joint] if limit is not None else np.nan,
         )
         return Violation(code, row, self.names[joint], float(scale * values[row, joint]), text, unit)

@@ -22,7 +22,8 @@ class TrajectoryRefusedError(ValueError):
     """A trajectory that will not be played.
 
     Attributes:
-        code: "joints", "times", "not_finite", "joint_limit", "start", "detour", "jump", "velocity" or "acceleration".
+        code: "joints", "times", "not_finite", "joint_limit", "start", "detour", "jump", "velocity", "acceleration"
+            or "jerk".
         index: Point of the trajectory, from 0; -1 where no single point is at fault.
         joint: Name of the joint; "" where no single joint is at fault.
         asked, allowed: What was found and what would have passed.
@@ -143,17 +144,20 @@ def _check_points(
     limits: MotionLimits,
     tolerance: FloatArray,
 ) -> None:
-    lower, upper = np.rad2deg(limits.lower[places]), np.rad2deg(limits.upper[places])
+    # A joint commanded outside its range may begin there; the rows are judged to come inward.
+    held = commanded[places]
+    lower = np.rad2deg(np.minimum(limits.lower[places], held))
+    upper = np.rad2deg(np.maximum(limits.upper[places], held))
     degrees = np.rad2deg(points)
     outside = np.argwhere((degrees < lower - 1e-6) | (degrees > upper + 1e-6))
     if len(outside):
         index, column = (int(i) for i in outside[0])
         allowed = f"{lower[column]:.4g} to {upper[column]:.4g} deg"
         raise TrajectoryRefusedError("joint_limit", index, joints[column], f"{degrees[index, column]:.4g} deg", allowed)
-    away = np.abs(points[0] - commanded[places])
+    away = np.abs(points[0] - held)
     if (away > tolerance).any():
         column = int(np.argmax(np.where(away > tolerance, away, 0.0)))
-        allowed = f"within {np.rad2deg(tolerance[column]):.3g} deg of the commanded {_deg(commanded[places][column])}"
+        allowed = f"within {np.rad2deg(tolerance[column]):.3g} deg of the commanded {_deg(held[column])}"
         raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 

@@ -22,8 +22,9 @@ from paramove.robots.hoap3.execution import Execution
 from paramove.robots.hoap3.robot_report import RobotReport
 from paramove.robots.hoap3.stream import StreamWriter
 from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import PERSON_STOP, ArmWord, Fault, Inputs, Proposal, State
+from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
 from paramove.safety.limits import MotionLimits
+from paramove.safety.stop_ramp import longest_path_s
 from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
 
 FloatArray = NDArray[np.float64]
@@ -34,13 +35,12 @@ SAFETY_STATES = {
     State.ARMED: SafetyState.STATE_ARMED,
     State.STOPPING: SafetyState.STATE_STOPPING,
     State.HOLD: SafetyState.STATE_HOLD,
+    State.ESTOP: SafetyState.STATE_ESTOP,
 }
 # A trajectory heard later than this after it was made is a replay or comes from a queue that was stuck.
 MAX_TRAJECTORY_AGE_S = 1.0
 # A driver that did nothing for longer has let the robot run out of rows; what waited for it meanwhile is dropped.
 MAX_STALL_S = 0.5
-# The stop ramp's path ahead of the last row sent; a ramp from the operating limits runs over 0.1 s of it.
-AHEAD_ROWS = 400
 # Batches that came too late make the guard longer, for this trajectory, and so a stop as much later.
 GUARD_STEP_MS = 70
 LONGEST_GUARD_MS = 240
@@ -58,18 +58,28 @@ class DriverSays:
 
 
 class ArmDriver:
-    """Drives all joints of HOAP-3. Hear messages with the `on_…` methods, then call `tick`.
+    """Drives all joints of a robot, such as HOAP-3. Hear messages with the `on_…` methods, then call `tick`.
 
     Args:
         description: Of the robot.
+        settings: Of the safety gate.
+        clearance: For the gate; None: it does not look how near parts of the robot come to each other.
 
     The driver begins with its first tick. Arm words and trajectories from before it are not heard, so a restarted
     driver is disarmed; the stream's epoch is made of that tick's time.
     """
 
-    def __init__(self, description: RobotDescription) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        settings: SafetySettings | None = None,
+        clearance: Clearance | None = None,
+    ) -> None:
         self._description = description
+        self._settings = settings
+        self._clearance = clearance
         self._limits = MotionLimits.of(description)
+        self._ahead_rows = int(np.ceil(longest_path_s(self._limits) / self._limits.dt_s))
         self._start_tolerance = _start_tolerance(description)
         self._begin_at(0)
         self._report: RobotReport | None = None
@@ -77,6 +87,8 @@ class ArmDriver:
         self._words: list[ArmWord] = []
         self._asked: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
+        self._arming_faults: tuple[Fault, ...] = ()
+        self._emergency: bool | None = None
         self._execution: Execution | None = None
         self._statuses: list[TrajectoryStatus] = []
         self._last_status: dict[str, TrajectoryStatus] = {}
@@ -89,7 +101,8 @@ class ArmDriver:
         epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
         self._now_ns = start_ns
         self._writer = StreamWriter(d, epoch)
-        self._core = SafetyCore(self._limits, (d.lower, d.upper), epoch, start_ns)
+        mechanical = (d.lower, d.upper)
+        self._core = SafetyCore(self._limits, mechanical, epoch, start_ns, self._settings, self._clearance)
 
     @property
     def state(self) -> State:
@@ -123,6 +136,18 @@ class ArmDriver:
         """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
         self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
 
+    def on_fault(self, fault: Fault) -> None:
+        """Hear what is wrong with the robot: the next `tick` begins a controlled stop and latches it."""
+        self._stop = fault
+
+    def on_arming_checks(self, faults: tuple[Fault, ...]) -> None:
+        """Hear which checks of the robot fail now; while one does, nobody arms."""
+        self._arming_faults = faults
+
+    def on_emergency(self, pressed: bool) -> None:
+        """Hear the emergency stop; pressed once since the last `tick` is pressed."""
+        self._emergency = pressed or bool(self._emergency)
+
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Hear a trajectory: `tick` accepts or refuses it by its own time.
 
@@ -146,8 +171,10 @@ class ArmDriver:
         proposal = self._proposal(now_ns)
         targets = None
         for word in words:
-            given, _, _ = self._core.step(now_ns, Inputs(measured, word, proposal, stop))
+            inputs = Inputs(measured, word, proposal, stop, self._arming_faults, self._emergency)
+            given, _, _ = self._core.step(now_ns, inputs)
             targets = given or targets
+        self._emergency = None
         if self._core.state is not State.DISCONNECTED:  # there a stop waits until the robot is heard again
             self._stop = None
         stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
@@ -210,7 +237,7 @@ class ArmDriver:
         stream = self._description.stream
         known = report.next_index if report.epoch == self._writer.epoch else 0
         guard, cover = (ms * 1000 // stream.period_us for ms in (self._guard_ms, stream.cover_ms))
-        rows, ahead, first_index = execution.window(known, guard, cover, AHEAD_ROWS)
+        rows, ahead, first_index = execution.window(known, guard, cover, self._ahead_rows)
         if not len(rows):
             return None
         return Proposal(now_ns, self._writer.epoch, self._description.joint_names, first_index, rows, ahead)

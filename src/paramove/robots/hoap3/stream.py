@@ -19,8 +19,9 @@ Frames = NDArray[np.int16]
 FloatArray = NDArray[np.float64]
 
 MAX_FRAMES = 5000
-# Accelerations are judged over spans of this many frames: over one, rounding to counts is larger than the limit.
-SPAN = 4
+# Accelerations are judged over spans of this length, at least one frame: over 1 ms, rounding to counts is larger than
+# the limit.
+SPAN_S = 0.004
 _FRAME_TYPE = np.dtype("<i2")
 
 
@@ -83,10 +84,11 @@ class StreamReader:
         counts_per_rad = np.abs(description.units.counts_per_rad)
         # Each rounded frame is off by up to half a count, hence +1 for a step and +2 for a second difference.
         self._step = np.floor(counts_per_rad * description.velocity * period_s) + 1
-        self._bend = np.floor(counts_per_rad * description.stop_acceleration * (SPAN * period_s) ** 2) + 2
+        self._span = max(1, round(SPAN_S / period_s))
+        self._bend = np.floor(counts_per_rad * description.stop_acceleration * (self._span * period_s) ** 2) + 2
         self._low, self._high = self._units.counts_range()
-        # The last 2 SPAN played frames, then the frames to come.
-        self._played = np.repeat(np.asarray(held_counts, dtype=np.int16)[None], 2 * SPAN, axis=0)
+        # The last two spans of played frames, then the frames to come.
+        self._played = np.repeat(np.asarray(held_counts, dtype=np.int16)[None], 2 * self._span, axis=0)
         self._coming = self._played[:0]
         self._ramp_frames = 0
 
@@ -185,15 +187,16 @@ class StreamReader:
 
     def _refusal_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
         kept = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
-        before = np.concatenate([self._played, self._coming[:kept]])[-2 * SPAN :]
-        whole = np.concatenate([before, frames, np.repeat(frames[-1:], 2 * SPAN, axis=0)]).astype(np.float64)
+        span = self._span
+        before = np.concatenate([self._played, self._coming[:kept]])[-2 * span :]
+        whole = np.concatenate([before, frames, np.repeat(frames[-1:], 2 * span, axis=0)]).astype(np.float64)
         outside = (frames < self._low) | (frames > self._high)
-        steps = np.abs(np.diff(whole[2 * SPAN - 1 :], axis=0))
-        bends = np.abs(whole[2 * SPAN :] - 2 * whole[SPAN:-SPAN] + whole[: -2 * SPAN])
+        steps = np.abs(np.diff(whole[2 * span - 1 :], axis=0))
+        bends = np.abs(whole[2 * span :] - 2 * whole[span:-span] + whole[: -2 * span])
         for values, bad, what in (
             (frames, outside, "{0:.0f} counts, allowed {1:.0f} to {2:.0f}"),
             (steps, steps > self._step, "a step of {0:.0f} counts, allowed {3:.0f}"),
-            (bends, bends > self._bend, "speed changes by {0:.0f} counts in " + f"{SPAN} frames, allowed {{4:.0f}}"),
+            (bends, bends > self._bend, "speed changes by {0:.0f} counts in " + f"{span} frames, allowed {{4:.0f}}"),
         ):
             if bad.any():
                 row, joint = (int(i) for i in np.argwhere(bad)[0])

@@ -1,0 +1,90 @@
+"""What a proposal must keep to before its rows are let pass; the order is that of `ProposalGate.fault`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.safety.accepted_rows import AcceptedRows
+from paramove.safety.clearance import clearance_fault
+from paramove.safety.gate_io import Clearance, Fault, Measured, Proposal, SafetySettings
+from paramove.safety.limits import MotionLimits
+from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.watches import RateWatch
+
+FloatArray = NDArray[np.float64]
+
+MAX_ROWS = 5000
+
+
+class ProposalGate:
+    """Judges proposals for the stream `epoch`; all joints and rows pass, or none."""
+
+    def __init__(self, limits: MotionLimits, settings: SafetySettings, epoch: int, clearance: Clearance | None) -> None:
+        self._limits = limits
+        self._settings = settings
+        self._epoch = epoch
+        self._clearance = clearance
+        self._rate = RateWatch(settings.proposals_per_s)
+        self._counted_ns: int | None = None
+
+    def fault(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | None:
+        """The first gate that refuses: form, age, rate, place, movement, the stop after it, clearance."""
+        return (
+            self._form(proposal)
+            or self._time(now_ns, proposal)
+            or self._place(proposal, accepted.allowed_from(measured))
+            or self._movement(proposal, accepted.before(proposal.first_index, measured))
+        )
+
+    def ramp_after(self, proposal: Proposal) -> FloatArray:
+        """The stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest."""
+        return stop_ramp(proposal.rows[-1], proposal.ahead, self._limits) if len(proposal.ahead) else proposal.ahead
+
+    def _form(self, proposal: Proposal) -> Fault | None:
+        names, n_joints = self._limits.names, len(self._limits.names)
+        if proposal.joint_names != names:
+            return Fault(
+                "names", "", f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
+            )
+        for rows in (proposal.rows, proposal.ahead):
+            if rows.ndim != 2 or rows.shape[1] != n_joints or len(rows) > MAX_ROWS:
+                return Fault("length", "", f"rows have shape {rows.shape}, allowed [up to {MAX_ROWS}, {n_joints}]")
+        if not len(proposal.rows):
+            return Fault("length", "", "the proposal is empty, at least one row is needed")
+        if proposal.epoch != self._epoch:
+            return Fault("epoch", "", f"rows of epoch {proposal.epoch}, allowed {self._epoch}: of an earlier life")
+        return None
+
+    def _time(self, now_ns: int, proposal: Proposal) -> Fault | None:
+        age_ms = (now_ns - proposal.captured_ns) * 1e-6
+        if not 0.0 <= age_ms <= self._settings.proposal_age_ms:
+            allowed = f"0 to {self._settings.proposal_age_ms:.0f} ms"
+            return Fault("stale", "", f"rows were made {age_ms:.0f} ms ago, allowed {allowed}")
+        known, self._counted_ns = proposal.captured_ns == self._counted_ns, proposal.captured_ns
+        if not known and self._rate.exceeded(now_ns):
+            return Fault("rate", "", f"more proposals than allowed: {self._rate.allowed} within 250 ms")
+        return None
+
+    def _place(self, proposal: Proposal, allowed: tuple[int, int]) -> Fault | None:
+        index, (first, last) = proposal.first_index, allowed
+        if index < first:
+            return Fault("played", "", f"rows from index {index}, allowed from {first}: earlier ones are played")
+        return Fault("gap", "", f"rows from index {index}, allowed up to {last}: no gap") if index > last else None
+
+    def _movement(self, proposal: Proposal, before: FloatArray) -> Fault | None:
+        # The rows ahead are judged too: the stop ramp will run over them.
+        rows = np.concatenate([proposal.rows, proposal.ahead])
+        violation = self._limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
+        if violation is not None:
+            return Fault(violation.code, violation.joint, violation.sentence)
+        ramp = self.ramp_after(proposal)
+        if len(ramp):
+            until = np.concatenate([before, proposal.rows])
+            violation = self._limits.first_violation(ramp, until, stopping=True)
+            if violation is not None:
+                return Fault(violation.code, violation.joint, f"in the stop after these rows: {violation.sentence}")
+        if self._clearance is None:
+            return None
+        given = np.concatenate([proposal.rows, ramp])
+        return clearance_fault(self._clearance, before[-1], given, self._limits, len(proposal.rows))

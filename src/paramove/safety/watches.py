@@ -1,0 +1,87 @@
+"""What the gate watches over several steps: the emergency stop, how joints follow, how often it is asked."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.safety.gate_io import Fault, Measured
+
+FloatArray = NDArray[np.float64]
+
+RATE_WINDOW_NS = 250_000_000
+RATE_FACTOR = 1.2
+
+
+class EmergencyWatch:
+    """Whether the emergency stop is pressed; a source that has not been heard for `timeout_ms` counts as pressed."""
+
+    def __init__(self, timeout_ms: float | None, start_ns: int) -> None:
+        self._timeout_ms = timeout_ms
+        self._heard_ns = start_ns
+        self._pressed = False
+
+    def fault(self, now_ns: int, pressed: bool | None) -> Fault | None:
+        """Hear what the source says, None: nothing; the newest word stays until the next."""
+        if pressed is not None:
+            self._heard_ns, self._pressed = now_ns, pressed
+        self._heard_ns = min(self._heard_ns, now_ns)
+        if self._pressed:
+            return Fault("emergency_stop", "", "the emergency stop is pressed; release it, then arm again")
+        silent_ms = (now_ns - self._heard_ns) * 1e-6
+        if self._timeout_ms is None or silent_ms <= self._timeout_ms:
+            return None
+        sentence = (
+            f"the emergency stop was not heard for {silent_ms:.0f} ms, allowed {self._timeout_ms:.0f} ms, and counts "
+            "as pressed; bring its source back, then arm again"
+        )
+        return Fault("emergency_silent", "", sentence)
+
+
+class FollowingWatch:
+    """Whether joints are where they are commanded. `allowed` [J], rad; None: not watched."""
+
+    def __init__(self, names: tuple[str, ...], allowed: FloatArray | None, patience_ms: float) -> None:
+        self._names = names
+        self._allowed = allowed
+        self._patience_ns = round(patience_ms * 1e6)
+        self._since_ns = np.full(len(names), -1, dtype=np.int64)
+
+    def away(self, measured: Measured) -> NDArray[np.bool_]:
+        """Which joints are too far away now, [J]; one that is not known is."""
+        if self._allowed is None:
+            return np.zeros(len(self._names), dtype=bool)
+        return np.asarray(~(np.abs(measured.positions - measured.commanded) <= self._allowed))
+
+    def fault(self, measured: Measured) -> Fault | None:
+        """Hear a report; the joint that has been too far away for too long, if any."""
+        away = self.away(measured)
+        self._since_ns = np.where(away, np.where(self._since_ns < 0, measured.captured_ns, self._since_ns), -1)
+        late = away & (measured.captured_ns - self._since_ns >= self._patience_ns)
+        if self._allowed is None or not late.any():
+            return None
+        joint = int(np.argmax(late))
+        error = np.rad2deg(abs(measured.positions[joint] - measured.commanded[joint]))
+        sentence = (
+            f"joint {self._names[joint]} is {error:.2f} deg from where it is commanded for "
+            f"{self._patience_ns * 1e-6:.0f} ms, allowed {np.rad2deg(self._allowed[joint]):.2f} deg; "
+            "see what holds it, then arm again"
+        )
+        return Fault("following", self._names[joint], sentence)
+
+
+class RateWatch:
+    """Whether something comes more often than 1.2 times its nominal rate, over 250 ms; None: not counted."""
+
+    def __init__(self, per_s: float | None) -> None:
+        self.allowed = 0 if per_s is None else max(1, int(RATE_FACTOR * per_s * RATE_WINDOW_NS * 1e-9))
+        self._times: deque[int] = deque(maxlen=self.allowed + 1)
+
+    def exceeded(self, now_ns: int) -> bool:
+        """Count one more."""
+        if not self.allowed:
+            return False
+        self._times.append(now_ns)
+        return len(self._times) > self.allowed and 0 <= now_ns - self._times[0] < RATE_WINDOW_NS
