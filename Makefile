@@ -8,7 +8,7 @@ BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
 
-.PHONY: help demo test check docs ci format setup messages lock benchmark-seeds bare clean
+.PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -18,6 +18,10 @@ demo: setup ## the robot learns where three objects belong and tidies them up, i
 
 test: setup ## all tests that need no hardware
 	@$(BIN)/python -m pytest -m "not hardware" $(ARGS)
+
+test-hardware: setup ## tests of a real servo arm, which moves a little: make test-hardware PORT=/dev/serial/by-id/… ROBOT=koch_v1_1
+	@test -n "$(PORT)" || { echo "which port? make test-hardware PORT=/dev/serial/by-id/…" >&2; exit 2; }
+	@$(BIN)/python -m pytest tests/hardware --servo-port $(PORT) --robot $(or $(ROBOT),open_manipulator_x) $(ARGS)
 
 check: setup ## formatting, lint, types, generated messages
 	$(BIN)/ruff format --check .

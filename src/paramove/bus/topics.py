@@ -23,6 +23,7 @@ from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
+from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
@@ -124,6 +125,9 @@ RELOCATION_STATUS = Topic("relocation/status", RelocationStatus, None, _QUEUE, r
 ARM_TRAJECTORY = Topic("arm/trajectory", JointTrajectory, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 ARM_TRAJECTORY_STATUS = Topic("arm/trajectory_status", TrajectoryStatus, None, _QUEUE, recorded=True)
 ARM_JOINT_STATES = Topic("arm/joint_states", JointStates, 15, _QUEUE, recorded=True)
+ARM_JOINT_STATES_FAST = Topic("arm/joint_states/fast", JointStates, 100, _QUEUE, recorded=True)
+"""At the rate of the loop that moves the arm."""
+ARM_MOTORS = Topic("arm/motors", MotorStatus, 1, _QUEUE, recorded=True)
 ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
 OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)

@@ -146,6 +146,12 @@ class RobotDescription:
         """Places of several joints, ready to index a joint vector."""
         return np.array([self.index(joint) for joint in joints], dtype=np.intp)
 
+    @property
+    def gripper_indices(self) -> tuple[int, ...]:
+        """Places of the joints that close hands; what they hold keeps them from where they are commanded."""
+        fingers = tuple(arm.fingers_index for arm in self.arms.values())
+        return fingers if self.chain is None else (*fingers, self.chain.gripper_index)
+
     def arm(self, side: str) -> Arm:
         """One of `arms`.
 

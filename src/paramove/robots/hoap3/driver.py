@@ -136,6 +136,11 @@ class ArmDriver:
         """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
         self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
 
+    @property
+    def wants_to_arm(self) -> bool:
+        """Whether a word to arm was heard that no `tick` has judged yet."""
+        return any(word.armed for word in self._words)
+
     def on_fault(self, fault: Fault) -> None:
         """Hear what is wrong with the robot: the next `tick` begins a controlled stop and latches it."""
         self._stop = fault
@@ -313,5 +318,5 @@ def _start_tolerance(description: RobotDescription) -> FloatArray:
     command. The way from there to the trajectory is judged like the rest of it.
     """
     tolerance = np.full(description.n_joints, np.deg2rad(description.stream.start_tolerance_deg))
-    tolerance[[arm.fingers_index for arm in description.arms.values()]] = np.inf
+    tolerance[list(description.gripper_indices)] = np.inf
     return tolerance

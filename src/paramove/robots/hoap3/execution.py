@@ -83,9 +83,9 @@ class Execution:
             self.played_ns = report.captured_ns
         away = np.abs(report.positions - self.rows[-1])
         arrived = away <= np.where(description.velocity_loop, GEARED_TOLERANCE, SERVO_TOLERANCE)
-        for arm in description.arms.values():
+        for gripper in description.gripper_indices:
             # Fingers that hold something never arrive; it is enough that they rest.
-            arrived[arm.fingers_index] |= bool(abs(report.velocities[arm.fingers_index]) < STILL)
+            arrived[gripper] |= bool(abs(report.velocities[gripper]) < STILL)
         if arrived.all():
             return ""
         if now_ns - self.played_ns < SETTLE_TIMEOUT_S * 1e9:

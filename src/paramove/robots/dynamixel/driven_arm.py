@@ -1,0 +1,156 @@
+"""A servo arm as the arm's driver node sees it: messages in, messages out, the loop in a thread of its own between."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+
+from paramove.bus import topics
+from paramove.bus.topics import Topic
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
+from paramove.msgs.motor_status_pb2 import MotorStatus
+from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
+from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.dynamixel.servo_arm import Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_loop import ServoLoop
+from paramove.robots.dynamixel.servo_models import model_named
+from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.hoap3.driver import ArmDriver
+from paramove.safety.gate_io import SafetySettings, State
+from paramove.safety.self_collision import SelfCollision
+
+FOLLOWING = float(np.deg2rad(10.0))
+"""How far a joint may be from where it is commanded: more means that somebody or something holds it."""
+SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
+
+
+class DrivenArm:
+    """An arm that is driven while this is a context.
+
+    Args:
+        description: Of an arm with servos.
+        port: Of its bus, closed.
+        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
+        patience: With silence.
+
+    Raises:
+        InputError: On entering: the port is missing, forbidden or in use.
+
+    Attributes:
+        readable: A descriptor that can be read when `said` has something.
+    """
+
+    def __init__(
+        self, description: RobotDescription, port: ServoPort, torque_off: bool = False, patience: Patience | None = None
+    ) -> None:
+        patience = patience or Patience()
+        following = np.full(description.n_joints, FOLLOWING)
+        following[list(description.gripper_indices)] = np.inf
+        settings = SafetySettings(measured_timeout_ms=1e3 * patience.silent_s, following=following)
+        self._driver = ArmDriver(description, settings, self_collision(description))
+        self.readable, self._written = os.pipe2(os.O_NONBLOCK)
+        self._loop = ServoLoop(
+            self._driver, description, servo_joints(description), port, torque_off, patience, self._wake
+        )
+        self._slow_ns = self._motors_ns = 0
+        self._state: State | None = None
+
+    def __enter__(self) -> Self:
+        self._loop.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._loop.__exit__(kind, error, where)
+
+    @property
+    def sentence(self) -> str:
+        """How the arm stands, for people."""
+        return self._driver.sentence
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong though the gate has no fault: a lost port, a low battery; "" if nothing is."""
+        return self._loop.lost or "; ".join(self._loop.arm.warnings())
+
+    def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
+        """Hear a trajectory; the loop accepts or refuses it within a period."""
+        with self._loop.lock:
+            self._driver.on_trajectory(message, captured_ns)
+
+    def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
+        """Hear a person's word to arm or disarm."""
+        with self._loop.lock:
+            self._driver.on_arm_request(message, captured_ns)
+
+    def on_stop(self, message: StopRequest, _captured_ns: int) -> None:
+        """Hear a person's stop: what is played from the next period on is the stop ramp."""
+        with self._loop.lock:
+            self._driver.on_stop(message)
+        self._loop.tick()
+
+    def said(self) -> Iterator[tuple[Topic, Any, int]]:
+        """What is to be said since the last time: topic, message, and when what it tells of was so, ns."""
+        with contextlib.suppress(BlockingIOError):
+            os.read(self.readable, 4096)
+        says, now_ns = self._loop.take(), time.monotonic_ns()
+        states = [one.joint_states for one in says if one.joint_states is not None]
+        yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
+        yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in says for status in one.statuses)
+        slow = now_ns - self._slow_ns >= SLOW_NS
+        if says and (slow or self._driver.state is not self._state):
+            self._state = self._driver.state
+            yield topics.ARM_SAFETY, says[-1].safety, now_ns
+        if states and slow:
+            self._slow_ns = now_ns
+            yield topics.ARM_JOINT_STATES, states[-1], states[-1].timestamp.ToNanoseconds()
+        if now_ns - self._motors_ns >= MOTORS_NS:
+            self._motors_ns = now_ns
+            yield topics.ARM_MOTORS, motor_status(self._loop.arm, now_ns), now_ns
+
+    def _wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # a full pipe is readable already
+            os.write(self._written, b".")
+
+
+def servo_port(description: RobotDescription, name: str) -> ServoPort:
+    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus."""
+    if description.bus is None:
+        raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
+    return ServoPort(name, description.bus.baud_rate)
+
+
+def self_collision(description: RobotDescription) -> SelfCollision:
+    """Distances between the parts of a described robot, as its model has them."""
+    model = mujoco.MjModel.from_xml_path(str(description.model_path))
+    d = description
+    return SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
+
+
+def servo_joints(description: RobotDescription) -> tuple[ServoJoint, ...]:
+    """The servos of a described arm, in the order of its joint vector."""
+    rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
+    return tuple(ServoJoint(name, number, model_named(motor)) for name, number, motor in rows)
+
+
+def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:
+    """What the servos of an arm said of themselves, and how long ago they were heard."""
+    message = MotorStatus(warnings=arm.warnings())
+    message.captured.FromNanoseconds(now_ns)
+    for joint in arm.joints:
+        health = arm.health[joint.name]
+        motor = message.motors.add(joint=joint.name, id=joint.number, model=joint.model.name)
+        if health.answers is not None:
+            motor.heard, motor.age_s = True, 1e-9 * (now_ns - health.answers.at_ns)
+        motor.torque = bool(health.torque)
+        motor.voltage_v, motor.temperature_c = health.voltage or 0.0, health.temperature or 0.0
+        motor.hardware_error = health.hardware_error
+    return message

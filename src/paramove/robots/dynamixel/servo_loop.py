@@ -1,0 +1,198 @@
+"""The loop of a servo arm: one thread that owns the port, plays the rows that the safety gate lets pass, and reads.
+
+What HOAP-3 does on the robot is done here: a `StreamReader` holds the rows, which end in a stop ramp, and plays one a
+period. So an arm whose driver has nothing more to say comes to rest in the same way.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from paramove.input_error import InputError
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
+from paramove.robots.hoap3.driver import ArmDriver, DriverSays
+from paramove.robots.hoap3.stream import StreamReader
+from paramove.safety.gate_io import Fault, State
+
+_log = logging.getLogger(__name__)
+
+MOVING = (State.ARMED, State.STOPPING)
+HOLDING = (*MOVING, State.HOLD)
+HEALTH_STEPS, SUPPLY_STEPS = 10, 100
+REOPEN_S = 0.5
+
+
+class ServoLoop:
+    """An arm that is driven while this is a context.
+
+    Args:
+        driver: Trajectories through the gate.
+        description: Of the arm.
+        joints: Its servos, in the order of the robot's joint vector.
+        port: Closed; it is opened here, and again after it was lost.
+        torque_off: Whether the arm goes limp when it is disarmed and when the loop ends; by default it holds.
+        patience: With silence.
+        said: Called in the loop's thread when `take` has something.
+
+    Raises:
+        InputError: On entering: the port is missing, forbidden or in use.
+    """
+
+    def __init__(
+        self,
+        driver: ArmDriver,
+        description: RobotDescription,
+        joints: tuple[ServoJoint, ...],
+        port: ServoPort,
+        torque_off: bool = False,
+        patience: Patience | None = None,
+        said: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.driver = driver
+        self.lost = ""
+        """Why the port is not open; "" while it is."""
+        self.lock = threading.Lock()
+        """Held while the loop uses the driver; hold it to tell the driver something."""
+        self._description = description
+        self._period_s = 1e-6 * description.stream.period_us
+        self._port = port
+        self._joints = joints
+        self._torque_off = torque_off
+        self._patience = patience
+        self._said = said
+        self._arm = ServoArm(joints, ServoChain(port), self._period_s, patience)
+        self._reader: StreamReader | None = None
+        self._says: list[DriverSays] = []
+        self._step = 0
+        self._reopen_s = 0.0
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="servo_loop", daemon=True)
+
+    @property
+    def arm(self) -> ServoArm:
+        """The servos."""
+        return self._arm
+
+    def __enter__(self) -> Self:
+        self._port.open()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._stopped.set()
+        self._thread.join()
+        self._port.close()
+
+    def take(self) -> list[DriverSays]:
+        """What the driver said since the last time."""
+        with self.lock:
+            says, self._says = self._says, []
+        return says
+
+    def tick(self) -> None:
+        """The driver's next word at once: a stop does not wait for the next period."""
+        with self.lock:
+            self._tick(time.monotonic_ns())
+
+    def _run(self) -> None:
+        due_s = time.monotonic()
+        while not self._stopped.is_set():
+            due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)  # a late period is not made up for
+            with self.lock:
+                self._one_period()
+            self._said()
+            self._stopped.wait(max(0.0, due_s - time.monotonic()))
+        with self.lock:
+            self._end()
+
+    def _one_period(self) -> None:
+        try:
+            if self.lost:
+                self._reopen()
+            if not self.lost:
+                self._move_and_read()
+        except PortLostError as error:
+            self.lost = str(error)
+            self._reopen_s = time.monotonic() + REOPEN_S
+            self._reader = None
+            self.driver.on_fault(
+                Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again")
+            )
+        self._tick(time.monotonic_ns())
+        self._step += 1
+
+    def _move_and_read(self) -> None:
+        reader = self._reader
+        if reader is not None and self._arm.holds:
+            self._arm.command(reader.play())
+        reading = self._arm.measured()
+        if reading is None:
+            return
+        if reader is None or not self._arm.holds:
+            reader = self._reader = StreamReader(self._description, reading.counts)
+        fault = self._fault(reading)
+        if fault is not None and self._arm.holds:
+            self.driver.on_fault(fault)
+        if self.driver.wants_to_arm and self.driver.state not in MOVING:
+            reading = self._prepare() or reading  # the checks took longer than a reading counts
+            reader = self._reader = StreamReader(self._description, reading.counts)
+        elif self._arm.holds and self.driver.state not in HOLDING:
+            self._let_go()
+        self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
+
+    def _prepare(self) -> ArmReading | None:
+        """Check the servos and let them hold where they are, before the gate hears the word to arm."""
+        self.driver.on_arming_checks(self._arm.check() or self._arm.take_hold())
+        return self._arm.measured()
+
+    def _fault(self, reading: ArmReading) -> Fault | None:
+        fault = self._arm.fault_of_answers(reading)
+        if self._step % HEALTH_STEPS == 0:
+            fault = self._arm.look_after() or fault
+        elif self._step % SUPPLY_STEPS == HEALTH_STEPS // 2:
+            fault = self._arm.look_after_supply() or fault
+        return fault
+
+    def _tick(self, now_ns: int) -> None:
+        says = self.driver.tick(now_ns)
+        if says.stream is not None and self._reader is not None:
+            self._reader.offer(says.stream)
+        self._says.append(says)
+
+    def _reopen(self) -> None:
+        """Under the same name, which is that of the adapter and not of its place."""
+        if time.monotonic() < self._reopen_s:
+            return
+        try:
+            self._port.open()
+        except InputError as error:
+            self.lost = str(error)
+            self._reopen_s = time.monotonic() + REOPEN_S
+            return
+        self.lost = ""
+        self._arm = ServoArm(self._joints, ServoChain(self._port), self._period_s, self._patience)
+
+    def _let_go(self) -> None:
+        for failed in self._arm.let_go(self._torque_off):
+            _log.warning("a servo did not hear the last word: %s", failed)
+
+    def _end(self) -> None:
+        """Come to rest by what the reader still holds, then the last word to every servo."""
+        try:
+            while self._arm.holds and self._reader is not None and not self._reader.at_rest:
+                self._arm.command(self._reader.play())
+                time.sleep(self._period_s)
+        except PortLostError as error:
+            self.lost = str(error)
+        if not self.lost:
+            self._let_go()

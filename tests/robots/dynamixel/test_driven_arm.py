@@ -1,0 +1,188 @@
+"""A driven arm, with all of its threads, on an emulated bus: it moves as told, and rests when something is wrong."""
+
+import time
+
+import numpy as np
+import pytest
+
+from paramove.input_error import InputError
+from paramove.msgs.safety_state_pb2 import StopRequest
+from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_joints, servo_port
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_arm import Patience
+from tests.robots.dynamixel.person import Person
+
+PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
+"""Other programs may keep the emulator waiting, and the test."""
+LATENCY_S = 0.3
+ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
+
+
+class PersonAtEmulator(Person):
+    """Also sees into the servos."""
+
+    def __init__(self, arm: DrivenArm, emulator: DynamixelEmulator) -> None:
+        super().__init__(arm)
+        self.emulator = emulator
+
+    def sends(self, target, duration_s: float = 1.0, name: str = "a") -> None:
+        self.says(name, ROBOT.joint_names, [(0.0, ROBOT.units.to_radians(self.goals())), (duration_s, target)])
+
+    def moves(self) -> None:
+        """Sends a long movement and returns while it is under way."""
+        self.sends(self.away(), 3.0)
+        self.hears_until(lambda: any(one.time_s > 0.5 for one in self.statuses))
+
+    def away(self):
+        target = ROBOT.base_pose.copy()
+        target[[0, 1]] += [0.5, 0.3]
+        return target
+
+    def memory(self, name: str) -> list[int]:
+        with self.emulator.lock:
+            return [servo.memory[name] for servo in self.emulator.bus.servos]
+
+    def goals(self) -> list[int]:
+        return self.memory("Goal Position")
+
+
+@pytest.fixture
+def emulator():
+    places = ROBOT.units.to_counts(ROBOT.base_pose)
+    servos = [
+        EmulatedServo(joint.model, joint.number, 1_000_000, float(place))
+        for joint, place in zip(servo_joints(ROBOT), places, strict=True)
+    ]
+    with DynamixelEmulator(servos) as emulator:
+        yield emulator
+
+
+def port(emulator, latency_s: float = LATENCY_S):
+    port = servo_port(ROBOT, emulator.port)
+    port.latency_s = latency_s
+    return port
+
+
+@pytest.fixture
+def person(emulator):
+    with DrivenArm(ROBOT, port(emulator), patience=PATIENCE) as arm:
+        yield PersonAtEmulator(arm, emulator)
+
+
+def test_it_moves_as_it_is_told(person):
+    person.arms_and_waits()
+    person.sends(person.away())
+    person.is_told("SUCCEEDED")
+    np.testing.assert_array_equal(person.goals(), ROBOT.units.to_counts(person.away()))
+    steps = np.abs(np.diff(person.angles, axis=0)).max(axis=0)
+    assert (steps < 0.1).all()  # it began where it stood and jumped nowhere
+    person.hears_until(lambda: person.motors is not None)
+    assert [motor.id for motor in person.motors.motors] == [11, 12, 13, 14, 15]
+    assert all(motor.heard and motor.voltage_v == pytest.approx(12.0, abs=0.01) for motor in person.motors.motors)
+
+
+def test_nothing_moves_before_it_is_armed(person):
+    person.waits_for("DISARMED")
+    person.sends(person.away())
+    assert person.is_told("REFUSED").code == "not_armed"
+    assert person.memory("Torque Enable") == [0] * 5
+
+
+def test_what_is_wrong_with_the_servos_keeps_it_disarmed(person):
+    with person.emulator.lock:
+        person.emulator.bus.servos[1].memory["Operating Mode"] = 4
+        person.emulator.bus.servos[3].memory["Hardware Error Status"] = 0x20
+    person.waits_for("DISARMED")
+    person.arms()
+    person.hears_until(lambda: person.safety.faults)
+    assert person.codes() == [("servo_settings", "joint2"), ("hardware_error", "joint4")]
+    assert person.memory("Torque Enable") == [0] * 5
+
+
+def test_torque_that_was_on_at_the_start_does_not_make_it_jump(person):
+    with person.emulator.lock:
+        servo = person.emulator.bus.servos[2]
+        servo.memory["Goal Position"] = servo.memory["Present Position"]
+        servo.memory["Torque Enable"] = 1
+    before = person.memory("Present Position")
+    person.arms_and_waits()
+    assert person.goals() == before
+
+
+def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
+    person.arms_and_waits()
+    person.moves()
+    person.arm.on_stop(StopRequest(source="page"), time.monotonic_ns())
+    person.waits_for("HOLD")
+    assert person.is_told("STOPPED").reason == "stopped from the page by a person"
+    rested = person.goals()
+    assert rested != list(ROBOT.units.to_counts(person.away()))
+    person.sends(person.away(), name="b")
+    assert person.is_told("REFUSED").code == "not_armed"
+    assert person.goals() == rested
+    assert person.memory("Torque Enable") == [1] * 5
+    person.arms()
+    person.waits_for("ARMED")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "code"), [("Torque Enable", 0, "torque_lost"), ("Hardware Error Status", 0x04, "hardware_error")]
+)
+def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, name, value, code):
+    person.arms_and_waits()
+    person.moves()
+    with person.emulator.lock:
+        person.emulator.bus.servos[1].memory[name] = value
+    person.waits_for("HOLD")
+    assert (code, "joint2") in person.codes()
+    assert sum(person.memory("Torque Enable")) >= 4
+
+
+def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    with DynamixelEmulator(emulator.bus.servos, link) as linked:
+        port = servo_port(ROBOT, str(link))
+        port.latency_s = LATENCY_S
+        with DrivenArm(ROBOT, port, patience=Patience(silent_s=0.5, watchdog_s=2.54)) as arm:
+            person = PersonAtEmulator(arm, linked)
+            person.arms_and_waits()
+            person.moves()
+            linked.unplug()
+            person.waits_for("DISCONNECTED")
+            assert "cable" in arm.trouble or "plug in" in arm.trouble
+            linked.plug_in()
+            person.waits_for("DISARMED")
+            assert arm.trouble == ""
+            person.arms()
+            person.waits_for("ARMED")
+
+
+@pytest.mark.parametrize(("torque_off", "torque"), [(False, [1] * 5), (True, [0] * 5)])
+def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque):
+    with DrivenArm(ROBOT, port(emulator), torque_off, PATIENCE) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        person.moves()
+    assert person.memory("Torque Enable") == torque
+    assert person.memory("Bus Watchdog") == [0] * 5
+
+
+def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(emulator):
+    with DrivenArm(ROBOT, port(emulator, 0.05), True, PATIENCE) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        with emulator.lock:
+            emulator.bus.servos[0].memory["ID"] = 99
+    assert person.memory("Torque Enable") == [1, 0, 0, 0, 0]
+
+
+def test_a_missing_port_is_told_with_the_remedy():
+    with pytest.raises(InputError, match="by-id"), DrivenArm(ROBOT, servo_port(ROBOT, "/dev/ttyUSB77")):
+        pass
+
+
+def test_a_robot_without_a_servo_bus_is_refused():
+    with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
+        servo_port(RobotDescription.load("robot_description/hoap3"), "/dev/null")

@@ -1,0 +1,205 @@
+"""The servos of an arm: what keeps them from holding, that nothing moves when they begin to, and what is noticed."""
+
+import re
+
+import numpy as np
+import pytest
+
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_arm import Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
+from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
+from paramove.robots.dynamixel.wire_faults import WireFaults
+
+BAUD_RATE = 1_000_000
+PATIENT_S, PERIOD_S, WATCHDOG_UNITS = 0.3, 1.0, 127
+"""Other programs may keep the emulator waiting, and the test."""
+JOINTS = (ServoJoint("pan", 1, XL430_W250), ServoJoint("lift", 2, XL430_W250), ServoJoint("wrist", 3, XL330_M288))
+PLACES = (1000.0, 2000.0, 3000.0)
+
+
+@pytest.fixture
+def emulator():
+    servos = [
+        EmulatedServo(joint.model, joint.number, BAUD_RATE, place) for joint, place in zip(JOINTS, PLACES, strict=True)
+    ]
+    with DynamixelEmulator(servos) as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def port(emulator):
+    with ServoPort(emulator.port, BAUD_RATE, latency_s=PATIENT_S) as port:
+        yield port
+
+
+@pytest.fixture
+def arm(port):
+    return ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=2.54))
+
+
+def memory(emulator, name: str) -> list[int]:
+    with emulator.lock:
+        return [servo.memory[name] for servo in emulator.bus.servos]
+
+
+def change(emulator, place: int, name: str, value: int) -> None:
+    with emulator.lock:
+        emulator.bus.servos[place].memory[name] = value
+
+
+def test_a_sound_arm_holds_where_it_stands_and_watches_the_bus(arm, emulator):
+    assert arm.check() == ()
+    assert arm.take_hold() == ()
+    assert memory(emulator, "Torque Enable") == [1, 1, 1]
+    assert memory(emulator, "Goal Position") == [1000, 2000, 3000]
+    assert memory(emulator, "Bus Watchdog") == [WATCHDOG_UNITS] * 3
+    assert arm.let_go(torque_off=False) == ()
+    assert (memory(emulator, "Torque Enable"), memory(emulator, "Bus Watchdog")) == ([1, 1, 1], [0, 0, 0])
+    assert arm.let_go(torque_off=True) == ()
+    assert memory(emulator, "Torque Enable") == [0, 0, 0]
+
+
+def test_torque_that_was_on_before_does_not_make_it_jump(arm, emulator):
+    with emulator.lock:
+        servo = emulator.bus.servos[1]
+        servo.memory["Torque Enable"], servo.memory["Goal Position"] = 1, 2000
+        servo.memory["Bus Watchdog"] = 0xFF  # of a program that died
+    assert arm.take_hold() == ()
+    assert memory(emulator, "Goal Position") == [1000, 2000, 3000]
+
+
+def test_goals_reach_the_servos_and_positions_come_back(arm, emulator):
+    arm.take_hold()
+    arm.command(np.array([1010, 1990, 3000], dtype=np.int16))
+    reading = arm.measured()  # whose answers come after the goals, to which none answers
+    assert memory(emulator, "Goal Position") == [1010, 1990, 3000]
+    assert abs(reading.counts - [1000, 2000, 3000]).max() <= 10
+    assert (reading.ages_s < PATIENT_S).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "code", "sentence"),
+    [
+        ("ID", 9, "servo_missing", r"servo 2 \(lift\) does not answer.*`paramove arm scan`"),
+        ("Model Number", 1200, "servo_model", r"servo 2 \(lift\) is of model 1200, expected 1060 \(xl430_w250\)"),
+        ("Firmware Version", 38, "servo_firmware", r"firmware 38, at least 42"),
+        ("Operating Mode", 1, "servo_settings", r"Operating Mode 1, expected 3: `paramove arm verify --write`"),
+        ("Homing Offset", 55, "servo_settings", r"Homing Offset 55, expected 0"),
+        (
+            "Hardware Error Status",
+            0x24,
+            "hardware_error",
+            r"overheating and overload \(register 70 is 0x24\).*reboot 2",
+        ),
+    ],
+)
+def test_what_keeps_an_arm_from_being_armed(arm, emulator, port, name, value, code, sentence):
+    change(emulator, 1, name, value)
+    port.latency_s = 0.05 if name == "ID" else PATIENT_S
+    (fault,) = arm.check()
+    assert (fault.code, fault.joint) == (code, "lift")
+    assert re.search(sentence, fault.sentence)
+
+
+def test_all_that_is_wrong_is_told_together(arm, emulator):
+    with emulator.lock:
+        emulator.bus.servos[0].voltage = 5.2
+        emulator.bus.servos[1].memory["Drive Mode"] = 1
+        emulator.bus.servos[2].temperature = 71.0
+    assert [(fault.code, fault.joint) for fault in arm.check()] == [
+        ("servo_voltage", "pan"),
+        ("servo_settings", "lift"),
+        ("servo_hot", "wrist"),
+    ]
+
+
+def test_a_bus_that_is_too_slow_is_told_with_the_remedy(port):
+    (fault,) = ServoArm(JOINTS, ServoChain(port), period_s=1e-4).check()
+    assert fault.code == "bus_slow"
+    assert "latency timer" in fault.sentence
+
+
+def test_a_servo_that_cannot_hold_leaves_the_others_as_they_were(arm, emulator):
+    with emulator.lock:
+        emulator.bus.servos[0].memory["Torque Enable"] = 1
+        emulator.bus.servos[2].memory["Max Position Limit"] = 2900
+    (fault,) = arm.take_hold()
+    assert (fault.code, fault.joint) == ("servo_refused", "wrist")
+    assert "beyond its limits" in fault.sentence
+    assert memory(emulator, "Torque Enable") == [1, 0, 0]
+    assert not arm.holds
+
+
+def test_a_joint_that_falls_silent_is_named_and_keeps_its_last_position(arm, emulator, port):
+    arm.measured()
+    change(emulator, 2, "ID", 9)
+    port.latency_s = 0.03
+    reading = arm.measured()
+    assert reading.counts[2] == 3000
+    fault = arm.fault_of_answers(reading)
+    assert (fault.code, fault.joint) == ("joint_silent", "wrist")
+
+
+def test_nothing_is_made_up_for_a_joint_that_was_never_heard(arm, emulator, port):
+    change(emulator, 2, "ID", 9)
+    port.latency_s = 0.03
+    assert arm.measured() is None
+
+
+def test_a_servo_that_reboots_while_it_holds_has_lost_its_torque(arm, emulator):
+    arm.take_hold()
+    assert arm.look_after() is None
+    change(emulator, 0, "Torque Enable", 0)
+    fault = arm.look_after()
+    assert (fault.code, fault.joint) == ("torque_lost", "pan")
+
+
+def test_an_overload_is_told_in_words_while_it_moves(arm, emulator):
+    arm.take_hold()
+    change(emulator, 1, "Hardware Error Status", 0x20)
+    fault = arm.look_after()
+    assert (fault.code, fault.joint) == ("hardware_error", "lift")
+    assert "overload" in fault.sentence
+
+
+def test_low_voltage_is_warned_of_and_too_low_a_one_is_a_fault(arm, emulator):
+    assert arm.look_after_supply() is None
+    assert arm.warnings() == ()
+    with emulator.lock:
+        emulator.bus.servos[0].voltage = 6.4
+    assert arm.look_after_supply() is None
+    assert arm.warnings() == ("pan has 6.4 V, its limit is 6.0 V: charge or check the supply",)
+    with emulator.lock:
+        emulator.bus.servos[0].voltage = 5.5
+    assert arm.look_after_supply().code == "servo_voltage"
+
+
+@pytest.mark.parametrize(("share", "latency_s", "noisy"), [(0.01, 0.1, False), (0.3, 0.002, True)])
+def test_one_damaged_answer_in_a_hundred_is_no_matter_and_many_are_a_fault(
+    arm, emulator, port, share, latency_s, noisy
+):
+    arm.measured()
+    port.latency_s = latency_s
+    emulator.faults = WireFaults(damaged=share, seed=5)
+    faults = [arm.fault_of_answers(arm.measured()) for _ in range(90)]
+    codes = {fault.code for fault in faults if fault is not None} - {"joint_silent"}
+    assert codes == ({"bus_noise"} if noisy else set())
+
+
+def test_the_last_word_goes_to_every_servo_even_if_one_does_not_answer(arm, emulator, port):
+    arm.take_hold()
+    change(emulator, 0, "ID", 9)
+    port.latency_s = 0.03
+    failed = arm.let_go(torque_off=True)
+    assert len(failed) == 2
+    assert all("servo 1 did not answer" in one for one in failed)
+    assert memory(emulator, "Torque Enable") == [1, 0, 0]
+
+
+def test_a_pulled_plug_is_told(arm, emulator):
+    emulator.unplug()
+    with pytest.raises(PortLostError, match="cable"):
+        arm.measured()
