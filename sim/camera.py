@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from ctypes.util import find_library
 from importlib import import_module
 
 import cv2
@@ -11,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.diagnosis.graphics import graphics_backend
 from sim import looks, scene
 from sim.looks import Camera
 
@@ -72,14 +71,6 @@ class Eye:
         self._gl.make_current()
         self._context.free()
         self._gl.free()
-
-
-def graphics_backend() -> str:
-    """`egl` or `osmesa`: what MUJOCO_GL says, else EGL where its library is, else software."""
-    asked = os.environ.get("MUJOCO_GL", "").lower()
-    if asked in ("egl", "osmesa"):
-        return asked
-    return "egl" if find_library("EGL") or not find_library("OSMesa") else "osmesa"
 
 
 class Sensor:

@@ -50,6 +50,7 @@ def offered(line, cwd=ROOT, **variables):
         ("paramove topic ec", {"echo"}),
         ("paramove topic echo camera/im", {"camera/image"}),
         ("paramove graph --format ", {"text", "mermaid", "svg"}),
+        ("paramove doctor --only c", {"cameras"}),
         ("paramove launch no_such --set x", set()),
     ],
 )
@@ -59,7 +60,7 @@ def test_names_are_offered(line, expected):
 
 def test_every_command_is_offered():
     there = {name for name in offered("paramove ") if not name.startswith("-")}
-    assert {"launch", "graph", "topic", "node", "evaluate", "warm"} <= there <= set(COMMANDS)
+    assert {"launch", "graph", "topic", "node", "evaluate", "warm", "doctor"} <= there <= set(COMMANDS)
 
 
 def test_options_of_the_typed_command_are_offered():

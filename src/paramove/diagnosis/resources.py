@@ -1,0 +1,133 @@
+"""Whether folders can be written and are short enough for sockets, and whether disk and open files suffice."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from paramove.bus.settings import default_folder
+from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
+from paramove.supervision.application import NoWorkspaceError, find_workspace
+from paramove.supervision.domain import LONGEST_FOLDER, DomainError, check_name
+from paramove.supervision.environment import DEFAULT_DOMAIN, examined
+from paramove.supervision.limits import OPEN_FILES
+
+LITTLE_BYTES, FEW_BYTES = 200_000_000, 2_000_000_000
+"""Free on a disk: less than the first is a problem, as runs are recorded; less than the second is told. Chosen."""
+
+
+def resources_findings(machine: Machine) -> Iterator[Finding]:
+    """Of folders, disks, limits, and variables of the environment."""
+    try:
+        workspace: Path | None = find_workspace(machine.folder)
+    except NoWorkspaceError:
+        workspace = None
+    folders = {"cache": user_cache_path("paramove"), "temporary": Path(tempfile.gettempdir())}
+    folders["runs"] = (workspace or machine.folder) / "runs"
+    for name, folder in folders.items():
+        yield folder_finding(name, folder)
+    yield sockets_finding()
+    yield from disk_findings(folders)
+    yield open_files_finding(resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+    if workspace is not None:
+        yield from environment_findings(workspace)
+
+
+def folder_finding(name: str, folder: Path) -> Finding:
+    """Whether something can be written into a folder, or it can be made."""
+    subject, facts = f"{name} folder", {"folder": str(folder)}
+    there = _nearest(folder)
+    if there.is_dir() and os.access(there, os.W_OK | os.X_OK):
+        return Finding(subject, Level.OK, f"{folder} can be written", facts=facts)
+    if not there.is_dir():
+        return Finding(subject, Level.PROBLEM, f"{there} is no folder", (f"mv {there} {there}.old",), facts=facts)
+    sentence = f"{there} cannot be written by this user"
+    found = there.stat()
+    if found.st_uid == os.geteuid():
+        mode = stat.S_IMODE(found.st_mode) | stat.S_IRWXU
+        command = f"chmod u+rwx {there}"
+        fix = Fix(f"run {command}", partial(there.chmod, mode))
+        return Finding(subject, Level.PROBLEM, sentence, (command,), fix, facts)
+    return Finding(subject, Level.PROBLEM, sentence, (as_root(f"chown -R $USER {there}"),), facts=facts)
+
+
+def sockets_finding() -> Finding:
+    """Whether the sockets of a run can lie where the environment says."""
+    subject, name = "sockets folder", os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
+    own = ("mkdir -p -m 700 /tmp/r-$USER && export XDG_RUNTIME_DIR=/tmp/r-$USER",)
+    try:
+        check_name(name)
+    except DomainError as error:
+        return Finding(subject, Level.PROBLEM, str(error), ("unset PARAMOVE_DOMAIN",))
+    folder = default_folder(name)
+    facts = {"folder": str(folder)}
+    size = len(os.fsencode(folder))
+    if size > LONGEST_FOLDER:
+        sentence = f"{folder} is too long for sockets: {size} bytes found, {LONGEST_FOLDER} allowed"
+        return Finding(subject, Level.PROBLEM, sentence, own, facts=facts)
+    above = folder.parent
+    if above.is_symlink() or (above.exists() and above.stat().st_uid != os.geteuid()):
+        return Finding(subject, Level.PROBLEM, f"{above} is no folder of this user", own, facts=facts)
+    found = folder_finding("sockets", folder)
+    if found.level is Level.OK:
+        return Finding(subject, Level.OK, f"{folder} can be written, and is short enough", facts=facts)
+    return Finding(subject, found.level, found.sentence, (*found.remedy, *own), found.fix, facts)
+
+
+def disk_findings(folders: Mapping[str, Path]) -> Iterator[Finding]:
+    """Free bytes of each disk on which one of the folders lies."""
+    seen = set[int]()
+    for name, folder in folders.items():
+        there = _nearest(folder)
+        if (number := there.stat().st_dev) not in seen:
+            seen.add(number)
+            yield disk_finding(name, there, shutil.disk_usage(there).free)
+
+
+def disk_finding(name: str, folder: Path, free_bytes: int) -> Finding:
+    """Whether a run has room on the disk of a folder."""
+    sentence = f"{free_bytes / 1e9:.1f} GB free on the disk of {folder} ({name})"
+    facts = {"folder": str(folder), "free_bytes": free_bytes}
+    if free_bytes >= FEW_BYTES:
+        return Finding("disk", Level.OK, sentence, facts=facts)
+    remedy = (
+        f"du -xh --max-depth=2 {folder} | sort -h | tail",
+        "remove what is not needed, such as old folders in runs/",
+    )
+    level = Level.PROBLEM if free_bytes < LITTLE_BYTES else Level.WARNING
+    return Finding("disk", level, f"only {sentence}", remedy, facts=facts)
+
+
+def open_files_finding(hard_limit: int) -> Finding:
+    """Whether a run may have enough files open; below the hard limit `paramove launch` raises its own."""
+    if hard_limit == resource.RLIM_INFINITY or hard_limit >= OPEN_FILES:
+        shown = "any number" if hard_limit == resource.RLIM_INFINITY else str(hard_limit)
+        return Finding("open files", Level.OK, f"a process may have {shown} open", facts={"hard_limit": hard_limit})
+    sentence = f"a process may have {hard_limit} files open, a run needs {OPEN_FILES}"
+    line = f"echo '*  -  nofile  {4 * OPEN_FILES}' | {as_root('tee')} /etc/security/limits.d/paramove.conf"
+    return Finding("open files", Level.PROBLEM, sentence, (line, "log out and in again"))
+
+
+def environment_findings(workspace: Path) -> Iterator[Finding]:
+    """What of the environment is ignored or in the way of a run in this workspace."""
+    try:
+        notes = examined(os.environ, workspace).notes
+    except DomainError:  # told with the sockets
+        return
+    for note in notes:
+        yield Finding("environment", Level.WARNING, note)
+    if not notes:
+        yield Finding("environment", Level.OK, "no variable is in the way")
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder, or the nearest above it that exists."""
+    return next((one for one in (folder, *folder.parents) if one.exists()), Path("/"))

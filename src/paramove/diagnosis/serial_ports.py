@@ -1,0 +1,94 @@
+"""Which serial ports there are, whether they can be used, and how soon their adapters hand over what came in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from paramove.diagnosis.devices import access_remedy, holders, may_use
+from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
+from paramove.robots.dynamixel.servo_port import ServoPort
+
+SOON_MS = 1
+RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+
+
+def port_links(machine: Machine) -> list[Path]:
+    """Serial ports by the name of their adapter, and those that have no such name by their own."""
+    links = sorted(machine.by_id.iterdir()) if machine.by_id.is_dir() else []
+    named = {link.resolve() for link in links}
+    others = [path for kind in ("ttyUSB*", "ttyACM*") for path in sorted(machine.devices.glob(kind))]
+    return [*links, *(path for path in others if path.resolve() not in named)]
+
+
+def usable_ports(machine: Machine) -> list[Path]:
+    """Those that are there, that this user may use, and that no other program has open."""
+    return [port for port in port_links(machine) if port.exists() and may_use(port) and not holders(port)]
+
+
+def serial_findings(machine: Machine) -> Iterator[Finding]:
+    """One or two for each port."""
+    links = port_links(machine)
+    if not links:
+        sentence = f"none found in {machine.by_id}: plug in the adapter of the arm; the simulation needs none"
+        yield Finding("serial ports", Level.WARNING, sentence)
+    for link in links:
+        yield port_finding(link)
+        timer = machine.sysfs / "bus" / "usb-serial" / "devices" / link.resolve().name / "latency_timer"
+        if timer.is_file():
+            yield latency_finding(link, timer)
+
+
+def port_finding(link: Path) -> Finding:
+    """Whether the port may be used, and is not used by another program."""
+    device = link.resolve()
+    facts: dict[str, object] = {"port": str(link), "device": str(device)}
+    if not device.exists():
+        sentence = f"{link.name} leads to {device}, which is not there"
+        return Finding(
+            "serial port", Level.PROBLEM, sentence, ("unplug the adapter and plug it in again",), None, facts
+        )
+    if not may_use(link):
+        sentence = f"{link.name}: this user may not use {device}"
+        pattern = device.name.rstrip("0123456789") + "*"
+        return Finding("serial port", Level.PROBLEM, sentence, access_remedy(device, "dialout", pattern), None, facts)
+    if held := holders(link):
+        facts["pid"] = held[0].pid
+        sentence = f"{link.name}: {device} is in use by {', '.join(map(str, held))}"
+        return Finding("serial port", Level.PROBLEM, sentence, (f"kill {held[0].pid}",), None, facts)
+    return Finding("serial port", Level.OK, f"{link.name}: {device} is free", facts=facts)
+
+
+def latency_finding(link: Path, timer: Path) -> Finding:
+    """Whether the adapter hands over what came in within 1 ms; by default one of FTDI takes 16 ms.
+
+    Args:
+        link: The port.
+        timer: File in which the driver tells the time, ms, and is told another.
+    """
+    latency_ms = int(timer.read_text(encoding="utf-8"))
+    facts = {"port": str(link), "latency_ms": latency_ms}
+    if latency_ms <= SOON_MS:
+        return Finding("usb latency", Level.OK, f"{link.name} hands over within {latency_ms} ms", facts=facts)
+    sentence = (
+        f"{link.name} keeps what came in for up to {latency_ms} ms, so that each question to a servo takes as long"
+    )
+    remedy = (
+        f"echo {SOON_MS} | {as_root('tee')} {timer}",
+        f"for good: echo '{RULE}' | {as_root('tee')} /etc/udev/rules.d/99-paramove-latency.rules && "
+        f"{as_root('udevadm control --reload-rules')} && {as_root('udevadm trigger --action=add')}",
+    )
+    fix = Fix(f"set it to {SOON_MS} ms until it is unplugged", partial(_hasten, link, timer)) if may_use(link) else None
+    return Finding("usb latency", Level.WARNING, sentence, remedy, fix, facts)
+
+
+def _hasten(link: Path, timer: Path) -> None:
+    """By the driver's file, which usually only root may write; else by a flag of the port, which its user may set."""
+    if os.access(timer, os.W_OK):
+        timer.write_text(f"{SOON_MS}\n", encoding="utf-8")
+        return
+    with ServoPort(str(link)) as port:
+        if not port.low_latency:
+            raise OSError(f"the driver of {link.name} has no mode of low latency")

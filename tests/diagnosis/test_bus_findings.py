@@ -1,0 +1,191 @@
+"""Servos behind a pseudo-terminal, with most that can be wrong with them; what mends it is run too."""
+
+import os
+import shlex
+import subprocess
+import threading
+import time
+
+import pytest
+
+from paramove.diagnosis.bus_findings import bus_findings, servo_findings
+from paramove.diagnosis.bus_scan import FoundServo, scan
+from paramove.diagnosis.finding import Level
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.packets import Instruction, PacketReader
+from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250, XM430_W350
+from paramove.robots.dynamixel.servo_port import ServoPort
+
+RATES = (57_600, 1_000_000)
+FAST = RATES[1]
+PATIENT_S = 0.5
+"""Other programs may keep the emulator waiting."""
+
+
+def wrong_servos():
+    """1 twice, 2 with too high a voltage, 3 at another rate, 4 with errors, 5 too hot."""
+    twins = [EmulatedServo(XL430_W250, 1, FAST), EmulatedServo(XL430_W250, 1, FAST)]
+    high, slow, stopped, hot = (
+        EmulatedServo(XL330_M288, 2, FAST),
+        EmulatedServo(XM430_W350, 3, RATES[0]),
+        EmulatedServo(XL430_W250, 4, FAST),
+        EmulatedServo(XL430_W250, 5, FAST),
+    )
+    high.voltage = 9.0
+    stopped.memory["Hardware Error Status"] = 0x24
+    hot.temperature = 75.0
+    return [*twins, high, slow, stopped, hot]
+
+
+class Overheard:
+    """Instructions that came over a bus."""
+
+    def __init__(self, bus):
+        self.instructions, self._receive, self._reader = set(), bus.receive, PacketReader()
+
+    def __call__(self, data, baud_rate, now_s):
+        self.instructions |= {packet.instruction for packet in self._reader.feed(data)}
+        return self._receive(data, baud_rate, now_s)
+
+
+@pytest.fixture(scope="module")
+def wrong(tmp_path_factory):
+    """The emulator, its port, what was found, and the instructions that it took to find it."""
+    link = tmp_path_factory.mktemp("by-id") / "usb-adapter"
+    with DynamixelEmulator(wrong_servos(), link) as emulator:
+        emulator.bus.receive = overheard = Overheard(emulator.bus)
+        found = bus_findings(link, RATES, PATIENT_S)
+        yield emulator, link, found, frozenset(overheard.instructions)
+
+
+@pytest.fixture(scope="module")
+def findings(wrong):
+    return wrong[2]
+
+
+def about(findings, subject, level):
+    return [one for one in findings if one.subject == subject and one.level is level]
+
+
+def test_servos_are_only_asked(wrong):
+    assert wrong[3] == {Instruction.PING, Instruction.READ}
+
+
+def test_every_servo_is_listed_with_what_it_tells(findings):
+    (two,) = about(findings, "servo 2", Level.OK)
+    assert two.sentence == "xl330_m288, firmware 45, 1000000 bit/s, 9.0 V, 30 °C"
+    assert two.facts["voltage"] == 9.0
+    listed = [one.facts["id"] for one in findings if "id" in one.facts]
+    assert sorted(listed) == [1, 2, 3, 4, 5]
+
+
+def test_a_double_id_is_told(findings):
+    (one,) = about(findings, "servo 1", Level.PROBLEM)
+    assert one.sentence == "2 servos have the ID 1: they talk at once"
+    assert "write1ByteTxRx(p, 1, 7, NEW_ID)" in one.remedy[-1]
+
+
+def test_a_voltage_outside_of_the_limits_is_told(findings):
+    (two,) = about(findings, "servo 2", Level.PROBLEM)
+    assert two.sentence == "measures 9.0 V, its limits are 3.5 to 7.0 V"
+    assert "5 V" in two.remedy[0]
+
+
+def test_errors_are_told_in_words(findings):
+    (four,) = about(findings, "servo 4", Level.PROBLEM)
+    assert four.sentence == "has stopped: overheated; overloaded (Hardware Error Status 0x24)"
+
+
+def test_heat_is_told(findings):
+    (five,) = about(findings, "servo 5", Level.PROBLEM)
+    assert five.sentence == "is 75 °C hot, its limit is 72 °C"
+
+
+def test_different_rates_are_told(findings):
+    (bus,) = about(findings, "bus", Level.PROBLEM)
+    assert "(3 at 57600 bit/s; 1, 2, 4, 5 at 1000000 bit/s)" in bus.sentence
+
+
+def run(line):
+    subprocess.run(shlex.split(line), check=True, capture_output=True, timeout=60)
+
+
+def comes_true(condition):
+    """The emulator may act after the program that asked it has ended."""
+    end_s = time.monotonic() + 20.0
+    while not condition() and time.monotonic() < end_s:
+        threading.Event().wait(0.01)
+    return condition()
+
+
+def test_the_command_for_another_rate_mends_it(wrong, findings):
+    (bus,) = about(findings, "bus", Level.PROBLEM)
+    run(bus.remedy[-1])
+    assert comes_true(lambda: wrong[0].bus.servos[3].baud_rate == FAST)
+
+
+def test_the_command_for_a_restart_mends_it(wrong, findings):
+    (four,) = about(findings, "servo 4", Level.PROBLEM)
+    run(four.remedy[-1])
+    assert comes_true(lambda: wrong[0].bus.servos[4].memory["Hardware Error Status"] == 0)
+
+
+def test_a_bus_without_servos_is_told_with_what_to_look_at(tmp_path):
+    with DynamixelEmulator([], tmp_path / "usb") as emulator:
+        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
+        assert (finding.level, "no servo answers" in finding.sentence) == (Level.WARNING, True)
+        assert "supply" in finding.remedy[0]
+        assert emulator.plugged_in
+
+
+def test_garbled_answers_are_told(tmp_path):
+    with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
+        emulator.faults.damaged = 1.0
+        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
+    assert finding.level is Level.PROBLEM
+    assert "garbled" in finding.sentence
+
+
+def test_an_echo_is_no_answer(tmp_path):
+    with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
+        emulator.faults.echo = True
+        found = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
+    assert [(one.subject, one.level) for one in found] == [("bus", Level.OK), ("servo 7", Level.OK)]
+
+
+def test_a_port_that_cannot_be_opened_is_told(tmp_path):
+    (finding,) = bus_findings(tmp_path / "usb", [FAST])
+    assert finding.level is Level.PROBLEM
+    assert "no serial port" in finding.sentence
+
+
+def test_a_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
+    def refuse(*_):
+        raise ValueError("Failed to set custom baud rate")
+
+    ours, theirs = os.openpty()
+    with ServoPort(os.ttyname(theirs)) as port:
+        monkeypatch.setattr(port, "setBaudRate", refuse)
+        assert [(rate.baud_rate, rate.possible) for rate in scan(port, [4_500_000])] == [(4_500_000, False)]
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("servo", "sentence"),
+    [
+        (FoundServo(1, "xl430_w250", 45, FAST, failed=1, values={"Baud Rate": 3}), "1 of 3 reads failed"),
+        (FoundServo(1, "xl430_w250", 45, FAST, failed=3), "Status Return Level"),
+        (FoundServo(1, "model 9", 45, FAST), "has no table"),
+        (FoundServo(1, "x", 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
+        (FoundServo(1, "x", 45, FAST, values={"Hardware Error Status": 0x80}), "without a name"),
+    ],
+)
+def test_what_else_can_be_wrong(tmp_path, servo, sentence):
+    assert sentence in servo_findings(tmp_path / "usb", servo)[1].sentence
+
+
+def test_registers_of_a_model_without_table_are_left_to_other_programs(tmp_path):
+    twice = FoundServo(1, "xl320", 45, FAST, at_once=2)
+    assert "Wizard" in servo_findings(tmp_path / "usb", twice)[1].remedy[-1]

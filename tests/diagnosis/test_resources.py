@@ -1,0 +1,109 @@
+"""Folders, sockets, disks and limits."""
+
+import os
+import resource
+
+import pytest
+
+from paramove.diagnosis.finding import Level, Machine
+from paramove.diagnosis.resources import (
+    FEW_BYTES,
+    LITTLE_BYTES,
+    disk_finding,
+    environment_findings,
+    folder_finding,
+    open_files_finding,
+    resources_findings,
+    sockets_finding,
+)
+from paramove.supervision.limits import OPEN_FILES
+from tests.diagnosis.unprivileged import NOBODY, as_nobody, needs_root
+from tests.docs.markdown import ROOT
+
+
+def test_a_folder_that_can_be_made_is_well(tmp_path):
+    assert folder_finding("cache", tmp_path / "a" / "b").level is Level.OK
+    assert not (tmp_path / "a").exists()
+
+
+def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
+    (tmp_path / "cache").touch()
+    finding = folder_finding("cache", tmp_path / "cache" / "models")
+    assert (finding.level, "is no folder" in finding.sentence) == (Level.PROBLEM, True)
+
+
+@needs_root
+def test_a_folder_of_somebody_else_is_for_root_to_give(open_folder):
+    code = "print(json.dumps(told(folder_finding('runs', Path(sys.argv[1])))))"
+    finding = as_nobody(code, open_folder)
+    assert (finding["level"], finding["fix"]) == ("problem", False)
+    assert finding["remedy"] == [f"sudo chown -R $USER {open_folder}"]
+
+
+@needs_root
+def test_an_own_folder_is_mended(open_folder):
+    os.chown(open_folder, NOBODY, NOBODY)
+    open_folder.chmod(0o500)
+    code = "before = folder_finding('runs', Path(sys.argv[1])); before.fix.do()\n"
+    code += "print(json.dumps([told(before), told(folder_finding('runs', Path(sys.argv[1])))]))"
+    before, after = as_nobody(code, open_folder)
+    assert before["remedy"] == [f"chmod u+rwx {open_folder}"]
+    assert (before["level"], after["level"]) == ("problem", "ok")
+
+
+def test_a_runtime_folder_that_is_too_long_for_sockets_is_told(tmp_path, monkeypatch):
+    long = tmp_path / ("x" * 80)
+    long.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
+    finding = sockets_finding()
+    assert finding.level is Level.PROBLEM
+    assert "too long" in finding.sentence
+    assert "export XDG_RUNTIME_DIR=/tmp/" in finding.remedy[0]
+
+
+def test_a_runtime_folder_that_is_a_link_is_told(tmp_path, monkeypatch, short_folder):
+    (short_folder / "paramove").symlink_to(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
+    assert "no folder of this user" in sockets_finding().sentence
+
+
+def test_a_name_that_no_domain_has_is_told(monkeypatch):
+    monkeypatch.setenv("PARAMOVE_DOMAIN", "Two Words")
+    finding = sockets_finding()
+    assert (finding.level, finding.remedy) == (Level.PROBLEM, ("unset PARAMOVE_DOMAIN",))
+
+
+def test_a_short_runtime_folder_is_well(monkeypatch, short_folder):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
+    monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
+    assert sockets_finding().facts["folder"] == str(short_folder / "paramove" / "default")
+    assert sockets_finding().level is Level.OK
+
+
+@pytest.mark.parametrize(
+    ("free", "level"),
+    [(FEW_BYTES, Level.OK), (FEW_BYTES - 1, Level.WARNING), (LITTLE_BYTES - 1, Level.PROBLEM)],
+)
+def test_little_room_on_a_disk_is_told(tmp_path, free, level):
+    finding = disk_finding("runs", tmp_path, free)
+    assert finding.level is level
+    assert bool(finding.remedy) == (level is not Level.OK)
+
+
+@pytest.mark.parametrize(
+    ("limit", "level"),
+    [(resource.RLIM_INFINITY, Level.OK), (OPEN_FILES, Level.OK), (OPEN_FILES - 1, Level.PROBLEM)],
+)
+def test_too_few_open_files_are_told(limit, level):
+    assert open_files_finding(limit).level is level
+
+
+def test_a_variable_in_the_way_is_told(monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "/no/such/folder")
+    assert any("XDG_RUNTIME_DIR" in one.sentence for one in environment_findings(ROOT) if one.level is Level.WARNING)
+
+
+def test_outside_of_a_workspace_runs_lie_where_one_is(tmp_path):
+    found = {one.subject: one for one in resources_findings(Machine(folder=tmp_path))}
+    assert found["runs folder"].facts["folder"] == str(tmp_path / "runs")
+    assert "environment" not in found

@@ -1,0 +1,34 @@
+"""Code run by a process of its own as an ordinary user, for what root may always do."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+NOBODY = 65534
+DROP = """
+import dataclasses, json, os, sys
+from pathlib import Path
+from paramove.diagnosis.examination import examined
+from paramove.diagnosis.finding import Machine, Part
+from paramove.diagnosis.resources import folder_finding
+from paramove.robots.dynamixel.servo_port import ServoPort
+os.setgroups([])
+os.setgid(65534)
+os.setuid(65534)
+def told(finding):
+    return {"level": finding.level, "sentence": finding.sentence, "remedy": finding.remedy, "fix": bool(finding.fix)}
+"""
+"""Imports come first, as the ordinary user may not be allowed to read where the modules lie."""
+
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can become an ordinary user")
+
+
+def as_nobody(code, *arguments):
+    """What the code prints as JSON."""
+    command = [sys.executable, "-c", DROP + code, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
