@@ -36,8 +36,8 @@ def test_no_camera_is_a_warning(tmp_path):
 def test_a_camera_that_may_not_be_used_is_told_with_the_command(machine):
     (machine.devices / "video0").chmod(0)
     code = "machine = Machine(devices=Path(sys.argv[1]), sysfs=Path(sys.argv[2]))\n"
-    code += "print(json.dumps([told(one) for one in examined(Part.CAMERAS, machine)]))"
-    first = as_nobody(code, machine.devices, machine.sysfs)[0]
+    code += "print(json.dumps([told(one) for one in camera_findings(machine)]))"
+    first = as_nobody(camera_findings, code, machine.devices, machine.sysfs)[0]
     assert first["level"] == "problem"
     assert "Webcam C270: this user may not" in first["sentence"]
     assert "sudo usermod -aG video $USER" in first["remedy"]

@@ -2,15 +2,13 @@
 
 import os
 import stat
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from paramove.diagnosis.devices import access_remedy, holders, may_use
+from tests.diagnosis.conftest import HOLD
 
-HOLD = "import sys; port = open(sys.argv[1], 'r+b', buffering=0); print('held', flush=True); sys.stdin.read()"
 SERVE = "import os, sys; ours, theirs = os.openpty(); print(os.ttyname(theirs), flush=True); sys.stdin.read()"
 
 
@@ -21,22 +19,6 @@ def terminal():
     yield Path(os.ttyname(theirs))
     os.close(ours)
     os.close(theirs)
-
-
-@pytest.fixture
-def started():
-    """Starts programs; returns what each says first."""
-    running = []
-
-    def start(code, *arguments):
-        pipe = subprocess.PIPE
-        program = subprocess.Popen([sys.executable, "-c", code, *arguments], stdin=pipe, stdout=pipe, text=True)
-        running.append(program)
-        return program, program.stdout.readline().strip()
-
-    yield start
-    for program in running:
-        program.communicate()
 
 
 def test_the_program_that_has_a_device_open_is_named(terminal, started, tmp_path):

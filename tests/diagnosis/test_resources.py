@@ -35,7 +35,7 @@ def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
 @needs_root
 def test_a_folder_of_somebody_else_is_for_root_to_give(open_folder):
     code = "print(json.dumps(told(folder_finding('runs', Path(sys.argv[1])))))"
-    finding = as_nobody(code, open_folder)
+    finding = as_nobody(folder_finding, code, open_folder)
     assert (finding["level"], finding["fix"]) == ("problem", False)
     assert finding["remedy"] == [f"sudo chown -R $USER {open_folder}"]
 
@@ -46,7 +46,7 @@ def test_an_own_folder_is_mended(open_folder):
     open_folder.chmod(0o500)
     code = "before = folder_finding('runs', Path(sys.argv[1])); before.fix.do()\n"
     code += "print(json.dumps([told(before), told(folder_finding('runs', Path(sys.argv[1])))]))"
-    before, after = as_nobody(code, open_folder)
+    before, after = as_nobody(folder_finding, code, open_folder)
     assert before["remedy"] == [f"chmod u+rwx {open_folder}"]
     assert (before["level"], after["level"]) == ("problem", "ok")
 

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from paramove.diagnosis.bus_findings import servos_findings
 from paramove.diagnosis.finding import Level, Machine
 from paramove.diagnosis.serial_ports import port_links, serial_findings, usable_ports
+from tests.diagnosis.conftest import HOLD
 from tests.diagnosis.unprivileged import as_nobody, needs_root
 
 LINK = "usb-FTDI_USB__-__Serial_Converter_FT1-if00-port0"
 LOOK = "machine = Machine(by_id=Path(sys.argv[1]), devices=Path(sys.argv[1]))\n"
-LOOK += "print(json.dumps([told(one) for one in examined(Part.SERIAL, machine)]))"
+LOOK += "print(json.dumps([told(one) for one in serial_findings(machine)]))"
 
 
 @pytest.fixture
@@ -57,9 +59,19 @@ def test_the_latency_is_mended(machine):
 def test_a_driver_without_low_latency_is_told_to_who_may_not_write_its_file(machine, port):
     port.chmod(0o666)
     code = LOOK.replace("Path(sys.argv[1]), dev", "Path(sys.argv[1]), sysfs=Path(sys.argv[2]), dev")
-    code = code.partition("print")[0] + "fix = examined(Part.SERIAL, machine)[1].fix\n"
+    code = code.partition("print")[0] + "fix = list(serial_findings(machine))[1].fix\n"
     code += "try:\n    fix.do()\nexcept OSError as error:\n    print(json.dumps(str(error)))"
-    assert "no mode of low latency" in as_nobody(code, machine.by_id, machine.sysfs)
+    assert "no mode of low latency" in as_nobody(serial_findings, code, machine.by_id, machine.sysfs)
+
+
+def test_a_port_that_another_program_has_open_is_not_asked(machine, port, started):
+    program, _ = started(HOLD, str(port))
+    held = next(iter(serial_findings(machine)))
+    assert (held.level, held.remedy) == (Level.PROBLEM, (f"kill {program.pid}",))
+    assert f"{port} is in use by pid {program.pid} (python" in held.sentence
+    assert usable_ports(machine) == []
+    (finding,) = servos_findings(machine)
+    assert (finding.level, "none were asked" in finding.sentence) == (Level.WARNING, True)
 
 
 def test_a_port_without_such_a_name_is_listed_too(machine, port):
@@ -84,7 +96,7 @@ def test_a_port_of_another_group_needs_the_group(machine, port):
     group = next(one for one in grp.getgrall() if one.gr_gid)
     os.chown(port, 0, group.gr_gid)
     port.chmod(0o660)
-    first = as_nobody(LOOK, machine.by_id)[0]
+    first = as_nobody(serial_findings, LOOK, machine.by_id)[0]
     assert first["level"] == "problem"
     assert "this user may not use" in first["sentence"]
     assert first["remedy"] == [f"sudo usermod -aG {group.gr_name} $USER", "log out and in again"]
@@ -93,6 +105,6 @@ def test_a_port_of_another_group_needs_the_group(machine, port):
 @needs_root
 def test_a_port_without_rights_needs_a_rule(machine, port):
     port.chmod(0)
-    first = as_nobody(LOOK, machine.by_id)[0]
+    first = as_nobody(serial_findings, LOOK, machine.by_id)[0]
     assert 'MODE="0660", GROUP="dialout"' in first["remedy"][0]
     assert "sudo usermod -aG dialout $USER" in first["remedy"]

@@ -20,8 +20,9 @@ from paramove.supervision.domain import LONGEST_FOLDER, DomainError, check_name
 from paramove.supervision.environment import DEFAULT_DOMAIN, examined
 from paramove.supervision.limits import OPEN_FILES
 
-LITTLE_BYTES, FEW_BYTES = 200_000_000, 2_000_000_000
-"""Free on a disk: less than the first is a problem, as runs are recorded; less than the second is told. Chosen."""
+LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
+"""Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second
+is told."""
 
 
 def resources_findings(machine: Machine) -> Iterator[Finding]:
