@@ -1,4 +1,4 @@
-"""Folders outside of pytest's, which ordinary users may not enter and whose names are too long for sockets; programs."""
+"""Programs, and folders outside of pytest's, which only root may enter and whose names are too long for sockets."""
 
 import subprocess
 import sys

@@ -131,20 +131,12 @@ def test_the_command_for_a_restart_mends_it(wrong, findings):
     assert comes_true(lambda: wrong[0].bus.servos[4].memory["Hardware Error Status"] == 0)
 
 
-def test_a_bus_without_servos_is_told_with_what_to_look_at(tmp_path):
-    with DynamixelEmulator([], tmp_path / "usb") as emulator:
-        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
-        assert (finding.level, "no servo answers" in finding.sentence) == (Level.WARNING, True)
-        assert "supply" in finding.remedy[0]
-        assert emulator.plugged_in
-
-
-def test_garbled_answers_are_told(tmp_path):
+def test_damaged_answers_are_told(tmp_path):
     with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
         emulator.faults.damaged = 1.0
         (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
     assert finding.level is Level.PROBLEM
-    assert "garbled" in finding.sentence
+    assert "damaged" in finding.sentence
 
 
 def test_an_echo_is_no_answer(tmp_path):
@@ -152,6 +144,21 @@ def test_an_echo_is_no_answer(tmp_path):
         emulator.faults.echo = True
         found = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
     assert [(one.subject, one.level) for one in found] == [("bus", Level.OK), ("servo 7", Level.OK)]
+
+
+def test_a_bus_without_servos_but_with_an_echo_is_told_with_what_to_look_at(tmp_path):
+    with DynamixelEmulator([], tmp_path / "usb") as emulator:
+        emulator.faults.echo = True
+        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
+    assert (finding.level, "no servo answers" in finding.sentence) == (Level.WARNING, True)
+    assert "supply" in finding.remedy[0]
+
+
+def test_another_device_is_told(tmp_path):
+    with DynamixelEmulator([], tmp_path / "usb") as emulator:
+        emulator.bus.receive = lambda *_: [(0.0, b"$GPGGA,120000.0,,,,,0,0,,,M,,M,,*47\r\n")]
+        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
+    assert (finding.level, "another device" in finding.sentence) == (Level.WARNING, True)
 
 
 def test_a_port_that_cannot_be_opened_is_told(tmp_path):

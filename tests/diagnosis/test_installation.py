@@ -5,8 +5,14 @@ from importlib.metadata import distributions
 
 import pytest
 
-from paramove.diagnosis.finding import Level
-from paramove.diagnosis.installation import opencv_finding, packages_finding, platform_finding, python_finding
+from paramove.diagnosis.finding import Level, Machine
+from paramove.diagnosis.installation import (
+    installation_findings,
+    opencv_finding,
+    packages_finding,
+    platform_finding,
+    python_finding,
+)
 
 REQUIRED = ["numba>=0.63", "Opencv_Contrib.Python-headless>=4.12,<5", 'hypothesis>=6; extra == "dev"']
 OPENCV = "opencv-contrib-python-headless"
@@ -57,6 +63,15 @@ def test_packages_outside_of_their_ranges_and_missing_ones_are_named_with_the_co
     assert "numba is missing, numba>=0.63 is needed" in finding.sentence
     assert "is 5.0.0.93" in finding.sentence
     assert finding.remedy[0].endswith("-m pip install 'numba>=0.63' 'Opencv_Contrib.Python-headless<5,>=4.12'")
+
+
+def test_what_an_interrupted_pip_left_is_passed_over_and_paramove_must_be_there(installed, tmp_path, monkeypatch):
+    (tmp_path / "half-1.0.dist-info").mkdir()
+    found = installed(numba="0.68.1")
+    monkeypatch.setattr("paramove.diagnosis.installation.distributions", lambda: found)
+    (finding,) = installation_findings(Machine())
+    assert (finding.level, finding.sentence) == (Level.PROBLEM, "paramove itself is not installed")
+    assert len(found) == 2
 
 
 def test_two_packages_that_hold_cv2_are_told_and_mended(installed, monkeypatch):

@@ -2,6 +2,7 @@
 
 import grp
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -67,18 +68,21 @@ def test_a_driver_without_low_latency_is_told_to_who_may_not_write_its_file(mach
 def test_a_port_that_another_program_has_open_is_not_asked(machine, port, started):
     program, _ = started(HOLD, str(port))
     held = next(iter(serial_findings(machine)))
-    assert (held.level, held.remedy) == (Level.PROBLEM, (f"kill {program.pid}",))
+    assert (held.level, held.remedy) == (Level.PROBLEM, (f"end it in its terminal, or: kill {program.pid}",))
     assert f"{port} is in use by pid {program.pid} (python" in held.sentence
     assert usable_ports(machine) == []
     (finding,) = servos_findings(machine)
     assert (finding.level, "none were asked" in finding.sentence) == (Level.WARNING, True)
 
 
-def test_a_port_without_such_a_name_is_listed_too(machine, port):
+def test_ports_without_such_a_name_are_listed_unless_a_folder_is_given(machine, port):
+    (machine.devices / "serial").mkdir()
+    (machine.devices / "serial" / "by-id").symlink_to(machine.by_id)
     (machine.devices / "ttyUSB0").symlink_to(port)
-    assert port_links(machine) == [machine.by_id / LINK]
     (machine.devices / "ttyACM3").touch()
-    assert port_links(machine) == [machine.by_id / LINK, machine.devices / "ttyACM3"]
+    assert port_links(machine) == [machine.by_id / LINK]
+    named = machine.devices / "serial" / "by-id" / LINK
+    assert port_links(replace(machine, by_id=None)) == [named, machine.devices / "ttyACM3"]
 
 
 def test_a_link_that_leads_nowhere_is_told(machine):

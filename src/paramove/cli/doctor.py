@@ -29,11 +29,14 @@ SUBJECT_WIDTH = 17
 def doctor(
     only: Annotated[list[Part] | None, typer.Option(help="look at this part only; may be repeated")] = None,
     by_id: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            "--by-id", metavar="FOLDER", envvar="PARAMOVE_BY_ID", help="with links to the serial ports of adapters"
+            "--by-id",
+            metavar="FOLDER",
+            envvar="PARAMOVE_BY_ID",
+            help="look at the serial ports alone to which links in it lead; default: those of all USB adapters",
         ),
-    ] = Path("/dev/serial/by-id"),
+    ] = None,
     baud: Annotated[
         list[int] | None,
         typer.Option(min=1, metavar="BIT/S", help="at which servos are asked; default: the usual rates"),

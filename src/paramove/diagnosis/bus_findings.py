@@ -86,13 +86,20 @@ def servo_findings(port: Path, servo: FoundServo) -> list[Finding]:
 
 def _overview(port: Path, scanned: Sequence[ScannedRate], servos: Sequence[FoundServo]) -> Finding:
     facts = {"port": str(port), "servos": len(servos)}
-    garbled = [rate.baud_rate for rate in scanned if rate.garbled]
+    damaged = [rate.baud_rate for rate in scanned if rate.damaged]
+    foreign = [rate.baud_rate for rate in scanned if rate.foreign]
     asked = ", ".join(str(rate.baud_rate) for rate in scanned if rate.possible)
-    if garbled:
-        shown = ", ".join(map(str, garbled))
-        sentence = f"{port.name}: answers at {shown} bit/s are garbled: several servos have the same ID, or a bad cable"
+    if damaged:
+        shown = ", ".join(map(str, damaged))
+        sentence = f"{port.name}: answers at {shown} bit/s are damaged: several servos have the same ID, or a bad cable"
         remedy = ("unplug the last servo of the chain and look again, until the answers are clean",)
         return Finding("bus", Level.PROBLEM, sentence, remedy, facts=facts)
+    if foreign and not servos:
+        shown = ", ".join(map(str, foreign))
+        sentence = (
+            f"{port.name}: what comes in at {shown} bit/s is no answer of a servo: another device, or a bad cable"
+        )
+        return Finding("bus", Level.WARNING, sentence, NOBODY, facts=facts)
     if not servos:
         return Finding("bus", Level.WARNING, f"{port.name}: no servo answers at {asked} bit/s", NOBODY, facts=facts)
     plural = "s" * (len(servos) > 1)

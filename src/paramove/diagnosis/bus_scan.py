@@ -54,16 +54,17 @@ class FoundServo:
 
 @dataclass
 class Heard:
-    """Answers to one question, and how many bytes came in."""
+    """What came in after one question.
+
+    Attributes:
+        answers: From servos.
+        damaged: Whether there were packets whose checksum is wrong, as when two servos talk at once.
+        foreign: Whether bytes came in, but no packet at all.
+    """
 
     answers: list[Packet] = field(default_factory=list)
-    n_bytes: int = 0
     damaged: bool = False
-
-    @property
-    def garbled(self) -> bool:
-        """Whether something came in that is no answer, as when two servos talk at once."""
-        return self.damaged or (self.n_bytes > 0 and not self.answers)
+    foreign: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,14 @@ class ScannedRate:
     Attributes:
         baud_rate: bit/s.
         possible: Whether the adapter can be set to it.
-        garbled: Whether bytes came in that are no answers.
+        damaged, foreign: As in `Heard`, when all were asked.
         servos: By rising ID.
     """
 
     baud_rate: int
     possible: bool = True
-    garbled: bool = False
+    damaged: bool = False
+    foreign: bool = False
     servos: tuple[FoundServo, ...] = ()
 
 
@@ -106,7 +108,7 @@ def scan(port: ServoPort, baud_rates: Sequence[int], patience_s: float = 0.1) ->
         for number in sorted(first):
             at_once = sum(one.id == number for one in heard.answers)
             servos.append(_examined(port, first[number], at_once, patience_s))
-        yield ScannedRate(baud_rate, True, heard.garbled, tuple(servos))
+        yield ScannedRate(baud_rate, True, heard.damaged, heard.foreign, tuple(servos))
 
 
 def _examined(port: ServoPort, ping: Packet, at_once: int, patience_s: float) -> FoundServo:
@@ -120,7 +122,7 @@ def _examined(port: ServoPort, ping: Packet, at_once: int, patience_s: float) ->
         heard = _asked(port, question, (size + 11) * BITS_PER_BYTE / port.baud_rate + patience_s, QUIET_S)
         whole = [one.parameters[1:] for one in heard.answers if one.id == ping.id and len(one.parameters) == size + 1]
         at_once = max(at_once, len(whole))
-        failed += not whole or heard.garbled
+        failed += not whole or heard.damaged
         for name, (address, width) in places.items() if whole else ():
             values[name] = int.from_bytes(whole[0][address : address + width], "little")
     return FoundServo(ping.id, _model(model_number), firmware, port.baud_rate, at_once, failed, values)
@@ -128,20 +130,22 @@ def _examined(port: ServoPort, ping: Packet, at_once: int, patience_s: float) ->
 
 def _asked(port: ServoPort, question: Packet, window_s: float, quiet_s: float | None = None) -> Heard:
     """All that comes in within a time, s, or until nothing has come for another since the first answer."""
-    heard, reader = Heard(), PacketReader()
+    heard, reader, n_bytes, n_packets = Heard(), PacketReader(), 0, 0
     port.clearPort()
     port.writePort(encoded(question))
     port.setPacketTimeoutMillis(1e3 * window_s)
     while not port.isPacketTimeout():
         data = port.readPort(4096)
-        heard.n_bytes += len(data)
+        n_bytes += len(data)
         for packet in reader.feed(data):
+            n_packets += 1
             if not isinstance(packet, Packet):
                 heard.damaged = True
             elif packet.instruction == Instruction.STATUS:  # else it is the question, from an adapter with an echo
                 heard.answers.append(packet)
         if data and heard.answers and quiet_s is not None:
             port.setPacketTimeoutMillis(1e3 * quiet_s)
+    heard.foreign = n_bytes > 0 and n_packets == 0
     return heard
 
 

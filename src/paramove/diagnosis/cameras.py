@@ -28,7 +28,7 @@ def camera_finding(device: Path, name: str) -> Finding:
         return Finding("camera", Level.PROBLEM, sentence, access_remedy(device, "video", "video*"), facts=facts)
     if held := holders(device):
         who = ", ".join(map(str, held))
-        remedy = (f"kill {held[0].pid}",)
+        remedy = (f"end it in its terminal, or: kill {held[0].pid}",)
         return Finding("camera", Level.WARNING, f"{name}: {device} is in use by {who}", remedy, facts=facts)
     return Finding("camera", Level.OK, f"{name}: {device}", facts=facts)
 

@@ -68,14 +68,15 @@ class Machine:
     Attributes:
         folder: The clone, or any folder in one.
         devices, sysfs: Of the system.
-        by_id: Links to serial ports by the name of their adapter.
+        by_id: Links to the serial ports that are looked at. None: those that the system makes, by the names of
+            adapters, and ports of USB that have no such link.
         baud_rates: At which servos are asked, bit/s; empty: the usual ones.
     """
 
     folder: Path = field(default_factory=Path.cwd)
     devices: Path = Path("/dev")
     sysfs: Path = Path("/sys")
-    by_id: Path = Path("/dev/serial/by-id")
+    by_id: Path | None = None
     baud_rates: tuple[int, ...] = ()
 
 

@@ -24,12 +24,20 @@ PATIENCE_S = 60.0
 
 def installation_findings(_: Machine) -> Iterator[Finding]:
     """Of the interpreter that runs this."""
-    installed = list(distributions())
-    ours = next(one for one in installed if one.name == OURS)
+    installed = [one for one in distributions() if _is_whole(one)]
+    ours = next((one for one in installed if one.name == OURS), None)
+    if ours is None:
+        yield Finding("packages", Level.PROBLEM, "paramove itself is not installed", ("make setup",))
+        return
     yield python_finding(ours.metadata["Requires-Python"] or "", platform.python_version())
     yield platform_finding(platform.system(), platform.machine())
     yield packages_finding(ours.requires or (), installed)
     yield opencv_finding(installed)
+
+
+def _is_whole(package: Distribution) -> bool:
+    """Not what an interrupted pip left behind."""
+    return "\nName: " in "\n" + (package.read_text("METADATA") or package.read_text("PKG-INFO") or "")
 
 
 def python_finding(allowed: str, version: str) -> Finding:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shlex
 import shutil
 import stat
 import tempfile
@@ -49,15 +50,23 @@ def folder_finding(name: str, folder: Path) -> Finding:
     if there.is_dir() and os.access(there, os.W_OK | os.X_OK):
         return Finding(subject, Level.OK, f"{folder} can be written", facts=facts)
     if not there.is_dir():
-        return Finding(subject, Level.PROBLEM, f"{there} is no folder", (f"mv {there} {there}.old",), facts=facts)
+        return Finding(
+            subject,
+            Level.PROBLEM,
+            f"{there} is no folder",
+            (shlex.join(["mv", str(there), f"{there}.old"]),),
+            facts=facts,
+        )
     sentence = f"{there} cannot be written by this user"
     found = there.stat()
     if found.st_uid == os.geteuid():
         mode = stat.S_IMODE(found.st_mode) | stat.S_IRWXU
-        command = f"chmod u+rwx {there}"
+        command = shlex.join(["chmod", "u+rwx", str(there)])
         fix = Fix(f"run {command}", partial(there.chmod, mode))
         return Finding(subject, Level.PROBLEM, sentence, (command,), fix, facts)
-    return Finding(subject, Level.PROBLEM, sentence, (as_root(f"chown -R $USER {there}"),), facts=facts)
+    return Finding(
+        subject, Level.PROBLEM, sentence, (as_root(f"chown -R $USER {shlex.quote(str(there))}"),), facts=facts
+    )
 
 
 def sockets_finding() -> Finding:

@@ -16,11 +16,18 @@ RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency
 
 
 def port_links(machine: Machine) -> list[Path]:
-    """Serial ports by the name of their adapter, and those that have no such name by their own."""
-    links = sorted(machine.by_id.iterdir()) if machine.by_id.is_dir() else []
+    """By the name of their adapter, those that have no such name by their own."""
+    folder = _folder(machine)
+    links = sorted(folder.iterdir()) if folder.is_dir() else []
+    if machine.by_id is not None:
+        return links
     named = {link.resolve() for link in links}
     others = [path for kind in ("ttyUSB*", "ttyACM*") for path in sorted(machine.devices.glob(kind))]
     return [*links, *(path for path in others if path.resolve() not in named)]
+
+
+def _folder(machine: Machine) -> Path:
+    return machine.by_id or machine.devices / "serial" / "by-id"
 
 
 def usable_ports(machine: Machine) -> list[Path]:
@@ -32,7 +39,7 @@ def serial_findings(machine: Machine) -> Iterator[Finding]:
     """One or two for each port."""
     links = port_links(machine)
     if not links:
-        sentence = f"none found in {machine.by_id}: plug in the adapter of the arm; the simulation needs none"
+        sentence = f"none found in {_folder(machine)}: plug in the adapter of the arm; the simulation needs none"
         yield Finding("serial ports", Level.WARNING, sentence)
     for link in links:
         yield port_finding(link)
@@ -57,7 +64,9 @@ def port_finding(link: Path) -> Finding:
     if held := holders(link):
         facts["pid"] = held[0].pid
         sentence = f"{link.name}: {device} is in use by {', '.join(map(str, held))}"
-        return Finding("serial port", Level.PROBLEM, sentence, (f"kill {held[0].pid}",), None, facts)
+        return Finding(
+            "serial port", Level.PROBLEM, sentence, (f"end it in its terminal, or: kill {held[0].pid}",), None, facts
+        )
     return Finding("serial port", Level.OK, f"{link.name}: {device} is free", facts=facts)
 
 
