@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import servo_joints, servo_port
+from paramove.robots.dynamixel.driven_arm import joint_servos, servo_port
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 
@@ -36,7 +36,7 @@ def port(request, robot):
     places = robot.units.to_counts(robot.base_pose)
     servos = [
         EmulatedServo(joint.model, joint.number, robot.bus.baud_rate, float(place))
-        for joint, place in zip(servo_joints(robot), places, strict=True)
+        for joint, place in zip(joint_servos(robot), places, strict=True)
     ]
     with DynamixelEmulator(servos) as emulator:
         port = servo_port(robot, emulator.port)

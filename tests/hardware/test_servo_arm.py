@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_joints
+from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from tests.robots.dynamixel.person import Person
@@ -15,13 +15,13 @@ A_LITTLE = np.deg2rad(3.0)
 @pytest.fixture
 def arm(robot, port):
     with port:
-        yield ServoArm(servo_joints(robot), ServoChain(port), 1e-6 * robot.stream.period_us, PATIENCE)
+        yield ServoArm(joint_servos(robot), ServoChain(port), 1e-6 * robot.stream.period_us, PATIENCE)
 
 
 def test_every_servo_of_the_description_answers_as_the_model_that_it_is(robot, port):
     with port:
         found = {one.number: one.model_number for one in ServoChain(port).ping_all()}
-    assert {joint.number: joint.model.number for joint in servo_joints(robot)}.items() <= found.items()
+    assert {joint.number: joint.model.number for joint in joint_servos(robot)}.items() <= found.items()
 
 
 def test_nothing_keeps_it_from_being_armed(arm):

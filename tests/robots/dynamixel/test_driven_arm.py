@@ -8,7 +8,7 @@ import pytest
 from paramove.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_joints, servo_port
+from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos, servo_port
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
@@ -53,7 +53,7 @@ def emulator():
     places = ROBOT.units.to_counts(ROBOT.base_pose)
     servos = [
         EmulatedServo(joint.model, joint.number, 1_000_000, float(place))
-        for joint, place in zip(servo_joints(ROBOT), places, strict=True)
+        for joint, place in zip(joint_servos(ROBOT), places, strict=True)
     ]
     with DynamixelEmulator(servos) as emulator:
         yield emulator

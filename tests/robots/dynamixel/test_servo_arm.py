@@ -7,8 +7,9 @@ import pytest
 
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_arm import Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 from paramove.robots.dynamixel.wire_faults import WireFaults
@@ -16,7 +17,7 @@ from paramove.robots.dynamixel.wire_faults import WireFaults
 BAUD_RATE = 1_000_000
 PATIENT_S, PERIOD_S, WATCHDOG_UNITS = 0.3, 1.0, 127
 """Other programs may keep the emulator waiting, and the test."""
-JOINTS = (ServoJoint("pan", 1, XL430_W250), ServoJoint("lift", 2, XL430_W250), ServoJoint("wrist", 3, XL330_M288))
+JOINTS = (JointServo("pan", 1, XL430_W250), JointServo("lift", 2, XL430_W250), JointServo("wrist", 3, XL330_M288))
 PLACES = (1000.0, 2000.0, 3000.0)
 
 
@@ -92,7 +93,7 @@ def test_goals_reach_the_servos_and_positions_come_back(arm, emulator):
             "Hardware Error Status",
             0x24,
             "hardware_error",
-            r"overheating and overload \(register 70 is 0x24\).*reboot 2",
+            r"overheated and overloaded \(register 70 is 0x24\).*reboot 2",
         ),
     ],
 )
@@ -162,7 +163,7 @@ def test_an_overload_is_told_in_words_while_it_moves(arm, emulator):
     change(emulator, 1, "Hardware Error Status", 0x20)
     fault = arm.look_after()
     assert (fault.code, fault.joint) == ("hardware_error", "lift")
-    assert "overload" in fault.sentence
+    assert "overloaded" in fault.sentence
 
 
 def test_low_voltage_is_warned_of_and_too_low_a_one_is_a_fault(arm, emulator):

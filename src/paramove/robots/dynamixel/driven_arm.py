@@ -18,7 +18,8 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.servo_arm import Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_loop import ServoLoop
 from paramove.robots.dynamixel.servo_models import model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
@@ -57,7 +58,7 @@ class DrivenArm:
         self._driver = ArmDriver(description, settings, self_collision(description))
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(
-            self._driver, description, servo_joints(description), port, torque_off, patience, self._wake
+            self._driver, description, joint_servos(description), port, torque_off, patience, self._wake
         )
         self._slow_ns = self._motors_ns = 0
         self._state: State | None = None
@@ -135,19 +136,19 @@ def self_collision(description: RobotDescription) -> SelfCollision:
     return SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
 
 
-def servo_joints(description: RobotDescription) -> tuple[ServoJoint, ...]:
+def joint_servos(description: RobotDescription) -> tuple[JointServo, ...]:
     """The servos of a described arm, in the order of its joint vector."""
     rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
-    return tuple(ServoJoint(name, number, model_named(motor)) for name, number, motor in rows)
+    return tuple(JointServo(name, number, model_named(motor)) for name, number, motor in rows)
 
 
 def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:
     """What the servos of an arm said of themselves, and how long ago they were heard."""
     message = MotorStatus(warnings=arm.warnings())
     message.captured.FromNanoseconds(now_ns)
-    for joint in arm.joints:
-        health = arm.health[joint.name]
-        motor = message.motors.add(joint=joint.name, id=joint.number, model=joint.model.name)
+    for servo in arm.servos:
+        health = arm.health[servo.joint]
+        motor = message.motors.add(joint=servo.joint, id=servo.number, model=servo.model.name)
         if health.answers is not None:
             motor.heard, motor.age_s = True, 1e-9 * (now_ns - health.answers.at_ns)
         motor.torque = bool(health.torque)

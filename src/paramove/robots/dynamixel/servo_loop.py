@@ -15,8 +15,9 @@ from typing import Self
 
 from paramove.input_error import InputError
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm, ServoJoint
+from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 from paramove.robots.hoap3.driver import ArmDriver, DriverSays
 from paramove.robots.hoap3.stream import StreamReader
@@ -36,7 +37,7 @@ class ServoLoop:
     Args:
         driver: Trajectories through the gate.
         description: Of the arm.
-        joints: Its servos, in the order of the robot's joint vector.
+        servos: Its servos, in the order of the robot's joint vector.
         port: Closed; it is opened here, and again after it was lost.
         torque_off: Whether the arm goes limp when it is disarmed and when the loop ends; by default it holds.
         patience: With silence.
@@ -50,7 +51,7 @@ class ServoLoop:
         self,
         driver: ArmDriver,
         description: RobotDescription,
-        joints: tuple[ServoJoint, ...],
+        servos: tuple[JointServo, ...],
         port: ServoPort,
         torque_off: bool = False,
         patience: Patience | None = None,
@@ -64,11 +65,11 @@ class ServoLoop:
         self._description = description
         self._period_s = 1e-6 * description.stream.period_us
         self._port = port
-        self._joints = joints
+        self._servos = servos
         self._torque_off = torque_off
         self._patience = patience
         self._said = said
-        self._arm = ServoArm(joints, ServoChain(port), self._period_s, patience)
+        self._arm = ServoArm(servos, ServoChain(port), self._period_s, patience)
         self._reader: StreamReader | None = None
         self._says: list[DriverSays] = []
         self._step = 0
@@ -180,7 +181,7 @@ class ServoLoop:
             self._reopen_s = time.monotonic() + REOPEN_S
             return
         self.lost = ""
-        self._arm = ServoArm(self._joints, ServoChain(self._port), self._period_s, self._patience)
+        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._patience)
 
     def _let_go(self) -> None:
         for failed in self._arm.let_go(self._torque_off):

@@ -1,0 +1,264 @@
+"""How fast a servo arm is stopped by whatever ends its movement, and which loop rates its bus holds.
+
+    python benchmarks/arm.py [--json FILE] [--trials N] [--robot FOLDER]
+
+The driver's own loop moves an arm of emulated servos behind a pseudo-terminal whose answers take as long as their bytes
+do. Times are of the wall clock, so other programs lengthen them; the processes share this machine's processors.
+
+    command loss    the driver has nothing more to say; until the first row of the stop ramp is played
+    driver killed   SIGKILL; until the servos rest by their bus watchdog
+    stop            a person's word reaches the driver; until the first row of the stop ramp is played
+    unplugged       until the gate is disconnected
+    loop            periods of the loop, measured at the servos' end
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramove.msgs.hoap3_wire_pb2 import Hoap3State
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
+from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos, servo_port
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.safety.gate_io import State
+
+ROOT = Path(__file__).resolve().parent.parent
+GOALS_MS = {"command loss": 100.0, "driver killed": 120.0, "stop": 20.0, "unplugged": 50.0}
+MOVEMENT_S = 4.0
+UNDER_WAY_S = 1.0
+PATIENT_S = 10.0
+LOOP_S = 10.0
+BUSY = Patience(silent_s=0.25)
+"""For what does not measure silence: other programs may take the processors for a while."""
+
+
+class Rig:
+    """An armed arm on an emulated bus, and movements to and fro."""
+
+    def __init__(self, arm: DrivenArm, emulator: DynamixelEmulator, description: RobotDescription) -> None:
+        self.arm, self.emulator, self.description = arm, emulator, description
+        self._number = 0
+        self._there = False
+
+    @property
+    def loop(self) -> Any:
+        """Of the arm; what is measured cannot be seen from outside."""
+        return self.arm._loop
+
+    def arms(self) -> None:
+        """Returns when the gate is armed."""
+        wait(lambda: self.loop.driver.state in (State.DISARMED, State.HOLD))
+        self.arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
+        wait(lambda: self.loop.driver.state is State.ARMED)
+
+    def moves(self) -> None:
+        """Begins a movement and returns while it is under way."""
+        with self.emulator.lock:
+            start = self.description.units.to_radians([s.memory["Goal Position"] for s in self.emulator.bus.servos])
+        self._there = not self._there
+        target = self.description.base_pose.copy()
+        target[0] += 1.2 if self._there else -1.2
+        self._number += 1
+        message = JointTrajectory(id=f"movement {self._number}", joints=list(self.description.joint_names))
+        for time_s, angles in ((0.0, start), (MOVEMENT_S, target)):
+            message.points.add(time_s=time_s, position_rad=list(angles))
+        self.arm.on_trajectory(message, time.monotonic_ns())
+        time.sleep(UNDER_WAY_S)
+
+    def ramp_begins_ms(self, begun_s: float) -> float:
+        """From then until a row of the stop ramp is the newest one played."""
+        wait(lambda: self.loop._reader is not None and self.loop._reader.playing != Hoap3State.PLAYING_FRAMES)
+        return 1e3 * (time.monotonic() - begun_s)
+
+
+@contextmanager
+def rig(description: RobotDescription, patience: Patience = BUSY) -> Any:
+    """A rig at the description's baud rate; ends with the arm at rest."""
+    with (
+        DynamixelEmulator(emulated(description)) as emulator,
+        DrivenArm(description, servo_port(description, emulator.port), patience=patience) as arm,
+    ):
+        yield Rig(arm, emulator, description)
+
+
+def emulated(description: RobotDescription) -> list[EmulatedServo]:
+    """The arm's servos in its base pose."""
+    places = description.units.to_counts(description.base_pose)
+    baud_rate = description.bus.baud_rate
+    pairs = zip(joint_servos(description), places, strict=True)
+    return [EmulatedServo(joint.model, joint.number, baud_rate, float(place)) for joint, place in pairs]
+
+
+def wait(what: Callable[[], bool]) -> None:
+    """Looks every half millisecond."""
+    until_s = time.monotonic() + PATIENT_S
+    while not what():
+        if time.monotonic() > until_s:
+            raise SystemExit("waited in vain: is the machine too busy?")
+        time.sleep(0.0005)
+
+
+def stop_ms(description: RobotDescription, trials: int) -> list[float]:
+    """A person's stop, again and again."""
+    found = []
+    with rig(description) as here:
+        for _ in range(trials):
+            here.arms()
+            here.moves()
+            begun_s = time.monotonic()
+            here.arm.on_stop(StopRequest(source="benchmark"), time.monotonic_ns())
+            found.append(here.ramp_begins_ms(begun_s))
+            wait(lambda: here.loop.driver.state is State.HOLD)
+    return found
+
+
+def command_loss_ms(description: RobotDescription, trials: int) -> list[float]:
+    """The driver's logic says nothing any more, as if it hung; the loop plays what it has."""
+    found = []
+    with rig(description) as here:
+        for _ in range(trials):
+            here.arms()
+            here.moves()
+            ticks = here.loop._tick
+            with here.loop.lock:
+                begun_s = time.monotonic()
+                here.loop._tick = lambda now_ns: None
+            found.append(here.ramp_begins_ms(begun_s))
+            with here.loop.lock:
+                here.loop._tick = ticks
+            wait(lambda: here.loop.driver.state is State.HOLD)
+    return found
+
+
+def unplugged_ms(description: RobotDescription, trials: int) -> list[float]:
+    """The plug is pulled; until the gate says that nobody is there."""
+    found = []
+    with rig(description, Patience()) as here:
+        for _ in range(trials):
+            here.arms()
+            here.moves()
+            begun_s = time.monotonic()
+            threading.Thread(target=here.emulator.unplug).start()
+            wait(lambda: here.loop.driver.state is State.DISCONNECTED)
+            found.append(1e3 * (time.monotonic() - begun_s))
+            here.emulator.plug_in()
+            here.loop._port.name = here.emulator.port
+            wait(lambda: here.loop.driver.state in (State.DISARMED, State.HOLD))
+    return found
+
+
+def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
+    """A process that drives the arm is killed; until all servos rest."""
+    found = []
+    for _ in range(trials):
+        with DynamixelEmulator(emulated(description)) as emulator:
+            command = [sys.executable, __file__, "--robot", str(folder), "--drive", emulator.port]
+            with subprocess.Popen(command, stdout=subprocess.PIPE) as driver:
+                assert driver.stdout is not None
+                driver.stdout.readline()
+                driver.send_signal(signal.SIGKILL)
+                begun_s = time.monotonic()
+                wait(lambda emulator=emulator: all(servo.velocity == 0.0 for servo in emulator.bus.servos))
+                found.append(1e3 * (time.monotonic() - begun_s))
+    return found
+
+
+def drive(description: RobotDescription, port: str) -> None:
+    """What is killed: moves the arm, and says so."""
+    with DrivenArm(description, servo_port(description, port), patience=BUSY) as arm:
+        wait(lambda: arm._loop.driver.state is State.DISARMED)
+        arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
+        wait(lambda: arm._loop.driver.state is State.ARMED)
+        message = JointTrajectory(id="movement", joints=list(description.joint_names))
+        target = description.base_pose.copy()
+        target[0] += 1.2
+        for time_s, angles in ((0.0, description.base_pose), (MOVEMENT_S, target)):
+            message.points.add(time_s=time_s, position_rad=list(angles))
+        arm.on_trajectory(message, time.monotonic_ns())
+        time.sleep(UNDER_WAY_S)
+        sys.stdout.write("moving\n")
+        sys.stdout.flush()
+        time.sleep(PATIENT_S)
+
+
+def periods_ms(description: RobotDescription, baud_rate: int, rate_hz: int) -> np.ndarray:
+    """Between goals as they arrive, while the arm moves."""
+    bus = description.bus.model_copy(update={"baud_rate": baud_rate})
+    stream = description.stream.model_copy(update={"period_us": 1_000_000 // rate_hz})
+    arrivals: list[float] = []
+    with rig(replace(description, bus=bus, stream=stream)) as here:
+        here.arms()
+        command = here.loop.arm.command
+        here.loop.arm.command = lambda counts: (command(counts), arrivals.append(time.monotonic()))
+        until_s = time.monotonic() + LOOP_S
+        while time.monotonic() < until_s:
+            here.moves()
+            time.sleep(MOVEMENT_S)
+    return 1e3 * np.diff(arrivals)
+
+
+def main() -> None:
+    """Measures, prints a table and writes the numbers if asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--robot", type=Path, default=ROOT / "robot_description" / "open_manipulator_x")
+    parser.add_argument("--drive", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    description = RobotDescription.load(arguments.robot)
+    if arguments.drive:
+        drive(description, arguments.drive)
+        return
+    load, trials = os.getloadavg()[0], arguments.trials
+    say(f"{description.name}, {len(os.sched_getaffinity(0))} processors, load {load:.1f} before")
+    found: dict[str, Any] = {}
+    for name, measured in (
+        ("stop", stop_ms(description, trials)),
+        ("command loss", command_loss_ms(description, trials)),
+        ("unplugged", unplugged_ms(description, trials)),
+        ("driver killed", killed_ms(description, arguments.robot, max(3, trials // 4))),
+    ):
+        median, p99 = np.percentile(measured, [50, 99])
+        found[name] = {"median_ms": median, "p99_ms": p99, "worst_ms": max(measured), "trials": len(measured)}
+        goal = GOALS_MS[name]
+        say(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
+    for baud_rate, rate_hz in ((1_000_000, 100), (4_000_000, 200)):
+        periods = periods_ms(description, baud_rate, rate_hz)
+        median, p99 = np.percentile(periods, [50, 99])
+        late = float((periods > 1.5e3 / rate_hz).mean())
+        held = 1e3 / periods.mean()
+        found[f"loop {rate_hz} Hz"] = {"rate_hz": held, "median_ms": median, "p99_ms": p99, "late_share": late}
+        say(
+            f"loop {rate_hz} Hz at {baud_rate // 1_000_000} Mbit/s: {held:.1f} Hz, period median {median:.2f} ms, "
+            f"99 % {p99:.2f}, half a period late {late:.1%}"
+        )
+    if arguments.json:
+        arguments.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+def say(line: str) -> None:
+    """To the terminal at once."""
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Servo arm driver: plays trajectories on an arm of Dynamixel servos through the safety gate, and says how it fares.
+
+Hears   arm/trajectory          JointTrajectory        events
+        operator/arm            ArmRequest             events, latched
+        operator/stop           StopRequest            events, latched
+Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
+        arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
+        arm/trajectory_status   TrajectoryStatus       events
+        arm/safety              SafetyState            15 Hz, latched
+        arm/motors              MotorStatus            1 Hz
+"""
+
+from pathlib import Path
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+
+HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.OPERATOR_STOP)
+JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
+SAYS = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
+
+
+class Config(NodeConfig):
+    """`robot`: its description. `port`: seen from the run's folder. `torque_off`: limp when disarmed and at the end."""
+
+    robot: Path
+    port: Path
+    torque_off: bool = False
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until the bus closes; the arm then comes to rest."""
+    description = RobotDescription.load(config.robot)
+    port = servo_port(description, str(bus.run_folder / config.port))
+    with DrivenArm(description, port, config.torque_off) as arm:
+        bus.when_readable(arm.readable, lambda: say(bus, arm))
+        hear = {
+            topics.ARM_TRAJECTORY: arm.on_trajectory,
+            topics.OPERATOR_ARM: arm.on_arm_request,
+            topics.OPERATOR_STOP: arm.on_stop,
+        }
+        for event in bus.events(*HEARS, tick=True):
+            if not isinstance(event, Tick):
+                hear[event.topic](event.message, event.captured_ns)
+            bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.sentence)
+
+
+def say(bus: Bus, arm: DrivenArm) -> None:
+    """Everything that the arm's loop has to say."""
+    for topic, message, captured_ns in arm.said():
+        bus.publish(topic, message, captured_ns)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)

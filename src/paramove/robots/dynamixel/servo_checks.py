@@ -1,0 +1,142 @@
+"""What keeps the servos of an arm from being armed, and what is wrong with one that moves, as faults for the gate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramove.robots.dynamixel.hardware_error import hardware_errors
+from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError
+from paramove.robots.dynamixel.servo_models import ServoModel
+from paramove.safety.gate_io import Fault
+
+POSITION_MODE, GRIP_MODE = 3, 5
+OLDEST_FIRMWARE = 42
+"""Bus Watchdog (98) is known from this version on (e-Manual, "Bus Watchdog")."""
+ROUND_TRIPS = 20
+ENDS = ("Min", "Max")
+
+
+@dataclass(frozen=True)
+class JointServo:
+    """One joint's servo.
+
+    Attributes:
+        joint: Name of the joint.
+        number: ID of the servo.
+        model: Of the servo.
+        homing_offset: That the servo must have, pulses.
+        grip_current: Of a gripper that holds with a limited current, in the servo's units; None: position mode.
+    """
+
+    joint: str
+    number: int
+    model: ServoModel
+    homing_offset: int = 0
+    grip_current: int | None = None
+
+    @property
+    def mode(self) -> int:
+        """Operating Mode (11) that it must have."""
+        return POSITION_MODE if self.grip_current is None else GRIP_MODE
+
+    def __str__(self) -> str:
+        return f"servo {self.number} ({self.joint})"
+
+
+def arming_faults(servos: Sequence[JointServo], chain: ServoChain) -> tuple[Fault, ...]:
+    """Everything about the servos themselves that keeps them from being armed. Raises PortLostError."""
+    return tuple(fault for servo in servos for fault in _faults_of(servo, chain))
+
+
+def bus_fault(read_all: Callable[[], object], period_s: float) -> Fault | None:
+    """Whether all servos can be read once in every period of the loop."""
+    times_s = []
+    for _ in range(ROUND_TRIPS):
+        begun_s = time.monotonic()
+        read_all()
+        times_s.append(time.monotonic() - begun_s)
+    median_s = float(np.median(times_s))
+    if median_s <= period_s:
+        return None
+    sentence = (
+        f"reading the servos takes {1e3 * median_s:.1f} ms, allowed {1e3 * period_s:.1f} ms: raise the baud rate, or "
+        "set the adapter's latency timer to 1 ms (`paramove doctor` tells how)"
+    )
+    return Fault("bus_slow", "", sentence)
+
+
+def hardware_fault(servo: JointServo, error: int) -> Fault:
+    """Of Hardware Error Status (70)."""
+    known = hardware_errors(error)
+    sentence = (
+        f"{servo} has a hardware error: {' and '.join(one.words for one in known)} (register 70 is 0x{error:02x}); "
+        f"{'; '.join(one.remedy for one in known)}; then `paramove arm reboot {servo.number}`"
+    )
+    return Fault("hardware_error", servo.joint, sentence)
+
+
+def voltage_fault(servo: JointServo, voltage: float, low: float, high: float) -> Fault | None:
+    """Of Present Input Voltage (144), V, and its limits."""
+    if low <= voltage <= high:
+        return None
+    sentence = f"{servo} has {voltage:.1f} V, allowed {low:.1f} to {high:.1f} V: check the power supply and its cable"
+    return Fault("servo_voltage", servo.joint, sentence)
+
+
+def torque_fault(servo: JointServo) -> Fault:
+    """Of Torque Enable (64) that is 0 though the servo should hold."""
+    sentence = (
+        f"{servo} has lost its torque: it was switched off, lost power or was rebooted; the arm must be armed again"
+    )
+    return Fault("torque_lost", servo.joint, sentence)
+
+
+def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
+    pinged = chain.ping(servo.number) or chain.ping(servo.number)
+    if pinged is None:
+        sentence = f"{servo} does not answer: check cable, power and ID; `paramove arm scan` looks for it"
+        return [Fault("servo_missing", servo.joint, sentence)]
+    if pinged.model_number != servo.model.number:
+        sentence = (
+            f"{servo} is of model {pinged.model_number}, expected {servo.model.number} ({servo.model.name}): is it "
+            "another arm, or are two IDs exchanged?"
+        )
+        return [Fault("servo_model", servo.joint, sentence)]
+    if pinged.firmware < OLDEST_FIRMWARE:
+        sentence = (
+            f"{servo} has firmware {pinged.firmware}, at least {OLDEST_FIRMWARE} is needed: update it with Dynamixel "
+            "Wizard"
+        )
+        return [Fault("servo_firmware", servo.joint, sentence)]
+    try:
+        return [*_faults_of_settings(servo, chain), *_faults_of_state(servo, chain)]
+    except ServoError as error:
+        return [Fault("servo_missing", servo.joint, str(error))]
+
+
+def _faults_of_settings(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
+    wanted = {"Operating Mode": servo.mode, "Drive Mode": 0, "Homing Offset": servo.homing_offset}
+    for name, value in wanted.items():
+        found = chain.read(servo.number, servo.model.registers[name])
+        if found != value:
+            sentence = f"{servo} has {name} {found}, expected {value}: `paramove arm verify --write` sets it"
+            yield Fault("servo_settings", servo.joint, sentence)
+
+
+def _faults_of_state(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
+    def read(name: str) -> int:
+        return chain.read(servo.number, servo.model.registers[name])
+
+    if error := read("Hardware Error Status"):
+        yield hardware_fault(servo, error)
+    low, high = (0.1 * read(f"{end} Voltage Limit") for end in ENDS)
+    if fault := voltage_fault(servo, 0.1 * read("Present Input Voltage"), low, high):
+        yield fault
+    temperature, limit = read("Present Temperature"), read("Temperature Limit")
+    if temperature >= limit:
+        sentence = f"{servo} has {temperature} degrees Celsius, allowed {limit}: let it cool down"
+        yield Fault("servo_hot", servo.joint, sentence)
