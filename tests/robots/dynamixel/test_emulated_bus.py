@@ -56,13 +56,28 @@ def test_sync_read_leaves_out_who_is_missing():
     assert [packet.id for packet in PacketReader().feed(answer)] == [2]
 
 
-def test_servos_with_one_id_both_answer():
-    bus = EmulatedBus([EmulatedServo(XL430_W250, 4), EmulatedServo(XL330_M288, 4)])
-    answers = list(PacketReader().feed(said(bus, Packet(4, Instruction.PING))))
-    assert [packet.parameters[1:3] for packet in answers] == [
-        (1060).to_bytes(2, "little"),
-        (1200).to_bytes(2, "little"),
-    ]
+@pytest.mark.parametrize("models", [(XL430_W250, XL330_M288), (XL430_W250, XL430_W250)])
+@pytest.mark.parametrize(
+    "packet",
+    [
+        Packet(4, Instruction.PING),
+        Packet(4, Instruction.READ, PRESENT),
+        Packet(BROADCAST, Instruction.PING),
+        Packet(BROADCAST, Instruction.SYNC_READ, PRESENT + bytes([4])),
+        Packet(BROADCAST, Instruction.FAST_SYNC_READ, PRESENT + bytes([4])),
+    ],
+)
+def test_servos_with_one_id_speak_at_once_and_nothing_can_be_read(models, packet):
+    bus = EmulatedBus([EmulatedServo(model, 4) for model in models])
+    answers = bus.receive(encoded(packet), BAUD, 1.0)
+    assert len(answers) == 1
+    assert not [found for found in PacketReader().feed(answers[0][1]) if isinstance(found, Packet)]
+
+
+def test_beside_two_servos_with_one_id_others_are_heard():
+    bus = EmulatedBus([EmulatedServo(XL430_W250, number) for number in (3, 4, 4, 5)])
+    answer = said(bus, Packet(BROADCAST, Instruction.SYNC_READ, PRESENT + bytes([3, 4, 5])))
+    assert [found.id for found in PacketReader().feed(answer) if isinstance(found, Packet)] == [3, 5]
 
 
 def test_a_secondary_id_is_obeyed_without_an_answer():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
+from paramove.robots.dynamixel.emulated_loops import STEP_S
+from paramove.robots.dynamixel.emulated_mechanics import Mechanics
 from paramove.robots.dynamixel.emulated_servo import Answer, EmulatedServo
 from paramove.robots.dynamixel.packets import (
     BROADCAST,
@@ -20,19 +22,31 @@ from paramove.robots.dynamixel.packets import (
 FOR_SEVERAL = {Instruction.SYNC_READ, Instruction.SYNC_WRITE, Instruction.BULK_READ, Instruction.BULK_WRITE}
 FOR_SEVERAL |= {Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ}
 
+Said = tuple[float, bytes]
+"""How long after the question an answer begins, s, and its bytes."""
+
 
 class EmulatedBus:
     """Servos that hear the same bytes.
 
     Args:
         servos: In the order of the chain.
+        mechanics: What they move, in the same order; without, each carries nothing.
+
+    Attributes:
+        servos: Those on the bus; others may be added, which move nothing.
     """
 
-    def __init__(self, servos: Sequence[EmulatedServo]) -> None:
-        self.servos = tuple(servos)
+    def __init__(self, servos: Sequence[EmulatedServo], mechanics: Mechanics | None = None) -> None:
+        self.servos = list(servos)
+        self.mechanics = mechanics
+        self._chain = tuple(servos) if mechanics is not None else ()
         self._reader = PacketReader()
-        self._heard_s = 0.0
+        self._now_s = self._heard_s = 0.0
         self._baud_rate = 0
+        if mechanics is not None:
+            for servo, (shaft, _) in zip(self._chain, mechanics.shafts(), strict=True):
+                servo.stand(shaft)
 
     def receive(self, data: bytes, baud_rate: int, now_s: float) -> list[tuple[float, bytes]]:
         """What the servos say to these bytes: for each answer, how long after now_s it begins, s, and its bytes.
@@ -43,66 +57,85 @@ class EmulatedBus:
             self._reader.forget()
         self._baud_rate, self._heard_s = baud_rate, now_s
         said: list[tuple[float, bytes]] = []
+        self.run_to(now_s)
         for packet in self._reader.feed(data):
             hearing = [servo for servo in self.servos if servo.listens and servo.baud_rate == baud_rate]
             for servo in hearing:
                 servo.hear(now_s)
-            for delay_s, answer in self._answers(packet, hearing):
-                said.append((delay_s, answer))
+            said += self._answers(packet, hearing)
         return said
 
     def run_to(self, now_s: float) -> None:
-        """All servos move until this time, s."""
+        """All servos, and what they move, go on until this time, s."""
+        while self.mechanics is not None and self._now_s + STEP_S <= now_s:
+            self._now_s += STEP_S
+            efforts = [servo.effort() for servo in self._chain]
+            self.mechanics.step(efforts, [servo.blocked for servo in self._chain])
+            for servo, (shaft, velocity) in zip(self._chain, self.mechanics.shafts(), strict=True):
+                servo.moved(shaft, velocity)
         for servo in self.servos:
-            servo.run_to(now_s)
+            if servo in self._chain:
+                servo.present()
+            else:
+                servo.run_to(now_s)
 
-    def _answers(self, packet: Packet | DamagedPacket, servos: list[EmulatedServo]) -> Iterator[tuple[float, bytes]]:
+    def _answers(self, packet: Packet | DamagedPacket, servos: list[EmulatedServo]) -> Iterator[Said]:
         if isinstance(packet, DamagedPacket):
-            for servo in servos:
-                if servo.id == packet.id and servo.answers(Instruction.WRITE):
-                    yield _status(servo, Answer(StatusError.CHECKSUM))
+            yield from _together(
+                _status(servo, Answer(StatusError.CHECKSUM))
+                for servo in servos
+                if servo.id == packet.id and servo.answers(Instruction.WRITE)
+            )
         elif packet.instruction in FOR_SEVERAL:
             yield from self._for_several(packet, servos)
         elif packet.id == BROADCAST:
-            for servo in sorted(servos, key=lambda one: one.id):
-                resets_all = packet.instruction == Instruction.FACTORY_RESET and packet.parameters[:1] == b"\xff"
-                if packet.instruction == Instruction.READ or resets_all:
-                    continue
-                answer = servo.do(packet.instruction, packet.parameters)
-                if packet.instruction == Instruction.PING:
-                    yield _status(servo, answer)
+            yield from self._for_all(packet, servos)
         else:
-            for servo in servos:
-                if servo.id == packet.id and packet.instruction != Instruction.STATUS:
-                    # Who is told another ID, delay or level answers with the old ones.
-                    answers, delay_s, number = servo.answers(packet.instruction), servo.return_delay_s, servo.id
-                    answer = servo.do(packet.instruction, packet.parameters)
-                    if answers:
-                        yield delay_s, _encoded(number, answer)
-                elif servo.memory["Secondary(Shadow) ID"] == packet.id:
-                    servo.do(packet.instruction, packet.parameters)
+            yield from _together(self._for_one(packet, servos))
 
-    def _for_several(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[tuple[float, bytes]]:
+    def _for_all(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
+        """Only a ping is answered, by each servo when those of lower ids have had their time."""
+        resets_all = packet.instruction == Instruction.FACTORY_RESET and packet.parameters[:1] == b"\xff"
+        if packet.instruction == Instruction.READ or resets_all:
+            return
+        told = [(servo.id, _status(servo, servo.do(packet.instruction, packet.parameters))) for servo in servos]
+        if packet.instruction == Instruction.PING:
+            for number in sorted({number for number, _ in told}):
+                yield from _together(answer for one, answer in told if one == number)
+
+    def _for_one(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
+        for servo in servos:
+            if servo.id == packet.id and packet.instruction != Instruction.STATUS:
+                # Who is told another ID, delay or level answers with the old ones.
+                answers, delay_s, number = servo.answers(packet.instruction), servo.return_delay_s, servo.id
+                answer = servo.do(packet.instruction, packet.parameters)
+                if answers:
+                    yield delay_s, _encoded(number, answer)
+            elif servo.memory["Secondary(Shadow) ID"] == packet.id:
+                servo.do(packet.instruction, packet.parameters)
+
+    def _for_several(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
         """Instructions that name servos in their parameters: each acts, and those that read answer in that order."""
-        by_id = {servo.id: servo for servo in servos}
         fast = packet.instruction in (Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ)
-        parts: list[tuple[EmulatedServo, Answer]] = []
+        parts: list[list[tuple[EmulatedServo, Answer]]] = []
         for number, address, data in _tasks(packet):
-            servo = by_id.get(number)
-            if servo is None:
-                if fast:
-                    break  # those after a missing one wait for it in vain
-                continue
+            named = [servo for servo in servos if servo.id == number]
+            if not named and fast:
+                break  # those after a missing one wait for it in vain
             if isinstance(data, bytes):
-                servo.do(Instruction.WRITE, address.to_bytes(2, "little") + data)
-            elif servo.answers(packet.instruction):
-                asked = address.to_bytes(2, "little") + data.to_bytes(2, "little")
-                parts.append((servo, servo.do(Instruction.READ, asked)))
+                for servo in named:
+                    servo.do(Instruction.WRITE, address.to_bytes(2, "little") + data)
+                continue
+            asked = address.to_bytes(2, "little") + data.to_bytes(2, "little")
+            answering = [servo for servo in named if servo.answers(packet.instruction)]
+            if answering:
+                parts.append([(servo, servo.do(Instruction.READ, asked)) for servo in answering])
         if fast and parts:
             sizes = [data for _, _, data in _tasks(packet) if isinstance(data, int)]
-            yield parts[0][0].return_delay_s, _joined(parts, 1 + sum(size + 4 for size in sizes))
+            yield parts[0][0][0].return_delay_s, _joined(parts, 1 + sum(size + 4 for size in sizes))
         elif not fast:
-            yield from (_status(servo, answer) for servo, answer in parts)
+            for answers in parts:
+                yield from _together(_status(servo, answer) for servo, answer in answers)
 
 
 def _tasks(packet: Packet) -> Iterator[tuple[int, int, int | bytes]]:
@@ -138,14 +171,34 @@ def _status(servo: EmulatedServo, answer: Answer) -> tuple[float, bytes]:
     return servo.return_delay_s, _encoded(servo.id, answer)
 
 
-def _joined(parts: list[tuple[EmulatedServo, Answer]], length: int) -> bytes:
+def _together(answers: Iterable[Said]) -> Iterator[Said]:
+    """Answers of servos with one id, which speak at once: what is on the wire then."""
+    told = list(answers)
+    if told:
+        yield told[0][0], collided([data for _, data in told])
+
+
+def collided(spoken: Sequence[bytes]) -> bytes:
+    """Bytes on the wire when all speak at once: a low level of one hides a high one of others.
+
+    Their clocks are not the same: each speaker is taken to be a bit later than the one before.
+    """
+    wire = bytearray(spoken[0])
+    for data in spoken[1:]:
+        late = int.from_bytes(data, "little") << 1
+        wire += b"\xff" * (len(data) - len(wire))
+        for i, byte in enumerate(late.to_bytes(len(data) + 1, "little")[: len(data)]):
+            wire[i] &= byte
+    return bytes(wire)
+
+
+def _joined(parts: list[list[tuple[EmulatedServo, Answer]]], length: int) -> bytes:
     """The one packet of a fast read: error, id, data and checksum of each servo; each checksum is of all before it.
 
     `length` is that with all servos: where one is missing, the packet ends early.
     """
-    content = [bytes([answer.error, servo.id]) + answer.data for servo, answer in parts]
     data = HEADER + bytes([0, BROADCAST]) + length.to_bytes(2, "little") + bytes([Instruction.STATUS])
-    for one in content:
-        data += one
-        data += checksum(data).to_bytes(2, "little")
+    for answers in parts:
+        spoken = [bytes([answer.error, servo.id]) + answer.data for servo, answer in answers]
+        data += collided([one + checksum(data + one).to_bytes(2, "little") for one in spoken])
     return data

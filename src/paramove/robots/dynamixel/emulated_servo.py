@@ -1,32 +1,46 @@
-"""One Dynamixel servo: answers to instructions, and moves."""
+"""One Dynamixel servo: answers to instructions, moves, and switches itself off when something is wrong."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntFlag
 
+from paramove.robots.dynamixel.emulated_loops import ACCELERATION_UNIT, STEP_S, VELOCITY_UNIT, Loops
+from paramove.robots.dynamixel.emulated_motor import LIMP, RAD_PER_PULSE, Effort, Motor
 from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
-from paramove.robots.dynamixel.servo_memory import EXTENDED_MODES, POSITION_MODE, RefusedError, ServoMemory
+from paramove.robots.dynamixel.servo_memory import (
+    CURRENT_MODE,
+    GOALS,
+    PWM_MODE,
+    TRIPPED,
+    RefusedError,
+    ServoMemory,
+)
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, PULSES_PER_TURN, RAM_BEGINS, ServoModel
 
-VELOCITY_MODE = 1
-VELOCITY_UNIT = 0.229 * PULSES_PER_TURN / 60.0
-"""Pulses per second of one unit of velocity, 0.229 rev/min (e-Manual, "Goal Velocity")."""
-ACCELERATION_UNIT = 214.577 * PULSES_PER_TURN / 3600.0
-"""Pulses per second squared of one unit of acceleration, 214.577 rev/min^2 (e-Manual, "Profile Acceleration")."""
-REV_PER_MINUTE = PULSES_PER_TURN / 60.0
-UNLOADED_ACCELERATION = 40_000.0
-"""Pulses per second squared, of a servo that carries nothing and has no profile; assumed."""
+__all__ = ["ACCELERATION_UNIT", "STEP_S", "VELOCITY_UNIT", "Answer", "EmulatedServo", "HardwareError"]
+
 WATCHDOG_UNIT_S = 0.020
-TRIPPED = 0xFF
-"""Of Bus Watchdog (98), which reads -1."""
 REBOOT_S = 0.3
 """So long a servo that reboots hears nothing; assumed."""
-STEP_S = 0.001
 CLEAR_MULTI_TURN = bytes([0x01, 0x44, 0x58, 0x4C, 0x22])
 RESET_ALL, KEEP_ID, KEEP_ID_AND_BAUD = 0xFF, 0x01, 0x02
 KEPT = {RESET_ALL: (), KEEP_ID: ("ID",), KEEP_ID_AND_BAUD: ("ID", "Baud Rate")}
-ROOM_TEMPERATURE = 30.0
+REVERSE, TORQUE_ON_BY_GOAL = 0x01, 0x08
+"""Bits of Drive Mode (10)."""
+OVERLOAD_SHARE, OVERLOAD_S = 0.7, 2.0
+"""A servo is overloaded with this part of the stall torque for so long: assumed, the manual says "persistent load"."""
+
+
+class HardwareError(IntFlag):
+    """Bits of Hardware Error Status (70) and of Shutdown (63) (e-Manual, "Shutdown")."""
+
+    VOLTAGE = 0x01
+    OVERHEATING = 0x04
+    ENCODER = 0x08
+    SHOCK = 0x10
+    OVERLOAD = 0x20
 
 
 @dataclass(frozen=True)
@@ -38,7 +52,7 @@ class Answer:
 
 
 class EmulatedServo:
-    """A servo that carries nothing.
+    """A servo. By itself it carries nothing and follows its course exactly; a bus with mechanics moves it by torques.
 
     Args:
         model: Its kind.
@@ -48,8 +62,11 @@ class EmulatedServo:
 
     Attributes:
         model, memory: Its kind, and its control table.
-        position, velocity: Pulses, without the homing offset, and pulses per second.
-        voltage, temperature: V and degrees Celsius that it measures.
+        position, velocity: Pulses, without the homing offset, and pulses per second, as Drive Mode turns them.
+        voltage: V that it gets.
+        torque: N m at the shaft in the last step, in its own direction.
+        blocked: Whether something holds its shaft.
+        powered: Whether its cable is plugged in.
     """
 
     def __init__(self, model: ServoModel, number: int = 1, baud_rate: int = 57600, position: float = 2048.0) -> None:
@@ -57,10 +74,16 @@ class EmulatedServo:
         self.memory = ServoMemory(model)
         self.memory["ID"], self.memory["Baud Rate"] = number, BAUD_RATES.index(baud_rate)
         self.position, self.velocity = position, 0.0
-        self.voltage, self.temperature = model.voltage, ROOM_TEMPERATURE
+        self.motor = Motor(model)
+        self.loops = Loops(self.memory, self.motor)
+        self.voltage, self.torque = model.voltage, 0.0
+        self.blocked, self.powered = False, True
+        self._shaft = position
+        self._overloaded_s = 0.0
         self._registered: tuple[int, bytes] | None = None
         self._now_s = self._heard_s = 0.0
         self._deaf_until_s = -math.inf
+        self._effort = LIMP
         self._settle()
 
     @property
@@ -80,8 +103,27 @@ class EmulatedServo:
 
     @property
     def listens(self) -> bool:
-        """Whether it hears anything: not while it reboots."""
-        return self._now_s >= self._deaf_until_s
+        """Whether it hears anything: not while it reboots or has no power."""
+        return self.powered and self._now_s >= self._deaf_until_s
+
+    @property
+    def temperature(self) -> float:
+        """Degrees Celsius that it measures."""
+        return self.motor.temperature
+
+    @temperature.setter
+    def temperature(self, value: float) -> None:
+        self.motor.temperature = value
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether its motor does anything."""
+        return bool(self.powered and self.memory["Torque Enable"])
+
+    @property
+    def is_shut_down(self) -> bool:
+        """Whether an error that Shutdown (63) names has switched torque off, until a reboot."""
+        return bool(self.memory["Hardware Error Status"] & self.memory["Shutdown"])
 
     def answers(self, instruction: int) -> bool:
         """Whether Status Return Level (68) lets it answer; to a ping it always does."""
@@ -91,8 +133,7 @@ class EmulatedServo:
         return self.memory["Status Return Level"] >= needed
 
     def hear(self, now_s: float) -> None:
-        """A packet is on the bus, for whomever."""
-        self.run_to(now_s)
+        """A packet is on the bus, for whomever; the servo has moved until then."""
         self._heard_s = now_s
 
     def do(self, instruction: int, parameters: bytes = b"") -> Answer:
@@ -139,21 +180,40 @@ class EmulatedServo:
         return b""
 
     def _write(self, address: int, data: bytes) -> None:
-        before = {name: self.memory[name] for name in ("Torque Enable", "Operating Mode", "Bus Watchdog")}
-        self.memory.write(address, data)
-        if self.memory["Operating Mode"] != before["Operating Mode"]:
+        before = {name: self.memory[name] for name in ("Torque Enable", "Operating Mode", "Bus Watchdog", "Drive Mode")}
+        if self.is_shut_down and any(
+            register.name == "Torque Enable" and value for register, value in self.memory.check(address, data)
+        ):
+            raise RefusedError(StatusError.RESULT_FAIL)  # which number it is, the manual does not tell
+        written = self.memory.write(address, data)
+        memory = self.memory
+        if (memory["Drive Mode"] ^ before["Drive Mode"]) & REVERSE:
+            self.position, self.velocity = -self.position, -self.velocity
             self._settle()
-        if self.memory["Torque Enable"] > before["Torque Enable"]:
-            self.velocity = 0.0
-        if self.memory["Bus Watchdog"] != before["Bus Watchdog"]:
+        if memory["Operating Mode"] != before["Operating Mode"]:
+            self._settle()
+        goal = GOALS[memory["Operating Mode"]]
+        if goal in written and memory["Drive Mode"] & TORQUE_ON_BY_GOAL and not self.is_shut_down:
+            memory["Torque Enable"] = 1
+        if memory["Torque Enable"] > before["Torque Enable"]:
+            self.loops.begin(self.position)
+        if memory["Bus Watchdog"] != before["Bus Watchdog"]:
             self._heard_s = self._now_s
+        if goal in written or "Torque Enable" in written:
+            self.loops.plan()
 
     def reboot(self) -> None:
         """RAM is as after switching on: torque off, goals where the servo stands, within one turn."""
         self.memory.reset(RAM_BEGINS)
-        self._registered, self.velocity = None, 0.0
+        self._registered, self._overloaded_s, self.torque = None, 0.0, 0.0
         self._deaf_until_s = self._now_s + REBOOT_S
         self._settle()
+
+    def fail(self, error: HardwareError) -> None:
+        """The servo notices this error: it tells of it until a reboot, and goes limp if Shutdown (63) names it."""
+        self.memory["Hardware Error Status"] |= int(error)
+        if self.is_shut_down:
+            self.memory["Torque Enable"] = 0
 
     def _factory_reset(self, parameters: bytes) -> None:
         if len(parameters) != 1 or parameters[0] not in KEPT:
@@ -167,64 +227,105 @@ class EmulatedServo:
     def _clear(self, parameters: bytes) -> None:
         if parameters != CLEAR_MULTI_TURN:
             raise RefusedError(StatusError.DATA_RANGE)
-        if self.velocity != 0.0:
+        if round(self.velocity / VELOCITY_UNIT) != 0:
             raise RefusedError(StatusError.RESULT_FAIL)
         self._settle()
 
     def _settle(self) -> None:
         """Presents the position within one turn, as after switching on, and makes it the goal."""
+        memory = self.memory
         self.position %= PULSES_PER_TURN
+        self.loops.begin(self.position)
         self._present()
-        self.memory["Goal Position"] = self.memory["Present Position"]
-        self.memory["Goal PWM"] = self.memory["PWM Limit"]
-        if "Goal Current" in self.memory:
-            self.memory["Goal Current"] = self.memory["Current Limit"]
+        memory["Goal Position"] = memory["Present Position"]
+        memory["Goal PWM"] = 0 if memory["Operating Mode"] == PWM_MODE else memory["PWM Limit"]
+        if "Goal Current" in memory:
+            memory["Goal Current"] = 0 if memory["Operating Mode"] == CURRENT_MODE else memory["Current Limit"]
 
     def run_to(self, now_s: float) -> None:
-        """Move until this time, s; an earlier one than the last is passed over."""
+        """Move until this time, s, carrying nothing; an earlier one than the last is passed over."""
         while self._now_s + STEP_S <= now_s:
-            self._now_s += STEP_S
-            self._watch()
-            self._move()
+            self._tick()
+            course = self.loops.course
+            if self.blocked:
+                course.begin(self.position)
+            else:
+                self.loops.unloaded()
+            if self.memory["Bus Watchdog"] == TRIPPED and course.velocity:
+                self._hold()
+            self.position, self.velocity = course.position, course.velocity
+        self.present()
+
+    def effort(self) -> Effort:
+        """Begins a step: what the servo does at its shaft, in the direction of the encoder; `moved` ends it."""
+        self._tick()
+        if not self.has_torque or not self.listens:
+            self.loops.begin(self.position, self.velocity)
+            self.loops.pwm, self._effort = 0.0, LIMP
+        else:
+            self._effort = self.loops.effort(self.position, self.velocity, self.voltage)
+        return Effort(self._direction * self._effort.torque, self._effort.damping)
+
+    def moved(self, shaft: float, velocity: float) -> None:
+        """Its shaft is there, pulses from the zero of the encoder, and turns so fast, pulses per second."""
+        self.position += self._direction * (shaft - self._shaft)
+        self.velocity, self._shaft = self._direction * velocity, shaft
+        self.torque = self._effort.at(self.velocity * RAD_PER_PULSE)
+        self.motor.warm(self.torque, STEP_S)
+        loaded = abs(self.torque) > OVERLOAD_SHARE * self.model.stall_torque
+        self._overloaded_s = max(0.0, self._overloaded_s + (STEP_S if loaded else -STEP_S))
+
+    def stand(self, shaft: float) -> None:
+        """Before any movement: the shaft is there, pulses from the zero of the encoder."""
+        self._shaft, self.position = shaft, self._direction * shaft
+        self._settle()
+
+    @property
+    def _direction(self) -> int:
+        return -1 if self.memory["Drive Mode"] & REVERSE else 1
+
+    def _tick(self) -> None:
+        """The time goes on; the servo looks after itself and after whom it obeys."""
+        self._now_s += STEP_S
+        if not self.powered:
+            return
+        memory = self.memory
+        allowed = memory["Bus Watchdog"]
+        silent_s = self._now_s - self._heard_s
+        if 0 < allowed < TRIPPED and memory["Torque Enable"] and silent_s > allowed * WATCHDOG_UNIT_S:
+            memory["Bus Watchdog"] = TRIPPED
+            self.loops.begin(self.position, self.velocity)
+            self._hold()
+        if not memory["Min Voltage Limit"] <= round(10.0 * self.voltage) <= memory["Max Voltage Limit"]:
+            self.fail(HardwareError.VOLTAGE)
+        if self.temperature > memory["Temperature Limit"]:
+            self.fail(HardwareError.OVERHEATING)
+        if self._overloaded_s > OVERLOAD_S:
+            self.fail(HardwareError.OVERLOAD)
+
+    def _hold(self) -> None:
+        """The bus watchdog has tripped: the goal is where the servo is, so that clearing it moves nothing; assumed."""
+        self.memory["Goal Position"] = round(self.position) + self.memory["Homing Offset"]
+        self.memory["Goal Velocity"] = 0
+
+    def present(self) -> None:
+        """Writes what it measures to its table."""
         self.memory["Realtime Tick"] = int(self._now_s * 1000.0) % 32768
         self._present()
 
-    def _watch(self) -> None:
-        """Bus Watchdog (98): without a packet for so long, a servo with torque stops, and refuses goals."""
-        allowed = self.memory["Bus Watchdog"]
-        silent_s = self._now_s - self._heard_s
-        if 0 < allowed < TRIPPED and self.memory["Torque Enable"] and silent_s > allowed * WATCHDOG_UNIT_S:
-            self.memory["Bus Watchdog"] = TRIPPED
-
-    def _move(self) -> None:
-        wanted = self._wanted_velocity()
-        most = self.memory["Profile Acceleration"] * ACCELERATION_UNIT or UNLOADED_ACCELERATION
-        change = wanted - self.velocity
-        self.velocity += math.copysign(min(abs(change), most * STEP_S), change)
-        self.position += self.velocity * STEP_S
-
-    def _wanted_velocity(self) -> float:
-        """Pulses per second. Without torque a servo that carries nothing stays where it is."""
-        memory, top = self.memory, self.model.top_speed * REV_PER_MINUTE
-        if not memory["Torque Enable"] or memory["Bus Watchdog"] == TRIPPED:
-            return 0.0
-        if memory["Operating Mode"] == VELOCITY_MODE:
-            return max(-top, min(top, memory["Goal Velocity"] * VELOCITY_UNIT))
-        if memory["Operating Mode"] in (POSITION_MODE, *EXTENDED_MODES):
-            away = memory["Goal Position"] - memory["Homing Offset"] - self.position
-            most = min(top, memory["Profile Velocity"] * VELOCITY_UNIT or top)
-            braking = memory["Profile Acceleration"] * ACCELERATION_UNIT or UNLOADED_ACCELERATION
-            # The greatest speed from which, after one more step with it, the servo can still brake in time.
-            stopping = braking * (math.sqrt(STEP_S**2 + 2.0 * abs(away) / braking) - STEP_S)
-            return math.copysign(min(most, stopping), away)
-        return 0.0  # current and PWM move what is carried, and this servo carries nothing
-
     def _present(self) -> None:
-        memory = self.memory
+        memory, model, course = self.memory, self.model, self.loops.course
         memory["Present Position"] = round(self.position) + memory["Homing Offset"]
         memory["Present Velocity"] = round(self.velocity / VELOCITY_UNIT)
+        memory["Position Trajectory"] = round(course.position) + memory["Homing Offset"]
+        memory["Velocity Trajectory"] = round(course.velocity / VELOCITY_UNIT)
         memory["Moving"] = int(abs(self.velocity) > memory["Moving Threshold"] * VELOCITY_UNIT)
-        memory["Present Input Voltage"] = round(10.0 * self.voltage)
+        memory["Present PWM"] = round(self.loops.pwm)
+        if model.current_unit is None:
+            memory["Present Load"] = round(1000.0 * self.torque / model.stall_torque)
+        else:
+            memory["Present Current"] = round(self.motor.amperes(self.torque) / model.current_unit)
+        memory["Present Input Voltage"] = max(0, round(10.0 * self.voltage))
         memory["Present Temperature"] = round(self.temperature)
 
 

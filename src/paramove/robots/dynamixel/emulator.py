@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Self
 
 from paramove.robots.dynamixel.emulated_bus import EmulatedBus
+from paramove.robots.dynamixel.emulated_mechanics import Mechanics
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.wire_faults import WireFaults
 
@@ -33,14 +34,17 @@ class DynamixelEmulator:
     Args:
         servos: In the order of the chain.
         link: A symbolic link to make to the port, so that its name does not change from run to run.
+        mechanics: What the servos move, in the same order; without, each carries nothing.
 
     Attributes:
         faults: What goes wrong on the wire; may be replaced at any time.
         port: Name of the terminal; another one after `plug_in`.
     """
 
-    def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
-        self.bus = EmulatedBus(servos)
+    def __init__(
+        self, servos: Sequence[EmulatedServo], link: Path | None = None, mechanics: Mechanics | None = None
+    ) -> None:
+        self.bus = EmulatedBus(servos, mechanics)
         self.faults = WireFaults()
         self.lock = threading.Lock()
         """Held while the servos hear and move; hold it to look at them."""

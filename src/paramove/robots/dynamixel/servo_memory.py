@@ -7,7 +7,15 @@ from paramove.robots.dynamixel.servo_models import FIRST_INDIRECT, RAM_BEGINS, R
 
 MULTI_TURN = 1_048_575
 """Greatest goal position in the extended modes, pulses, either way (e-Manual, "Goal Position")."""
-POSITION_MODE, EXTENDED_MODES = 3, (4, 5)
+CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODES, PWM_MODE = 0, 1, 3, (4, 5), 16
+CURRENT_BASED_POSITION_MODE = 5
+GOALS = {
+    CURRENT_MODE: "Goal Current", VELOCITY_MODE: "Goal Velocity", POSITION_MODE: "Goal Position", 4: "Goal Position",
+    5: "Goal Position", PWM_MODE: "Goal PWM",
+}  # fmt: skip
+"""By the value of Operating Mode (11)."""
+TRIPPED = 0xFF
+"""Of Bus Watchdog (98), which reads -1."""
 
 
 class RefusedError(Exception):
@@ -73,11 +81,15 @@ class ServoMemory:
                 raise RefusedError(StatusError.ACCESS)
         return [self._checked(register, written) for register in self._touched(written)]
 
-    def write(self, address: int, data: bytes) -> None:
-        """Bytes that were checked. What they do is up to the servo."""
+    def write(self, address: int, data: bytes) -> set[str]:
+        """Bytes that were checked. What they do is up to the servo, which is told the registers that they are of."""
+        written: set[str] = set()
         for place, byte in zip(range(address, address + len(data)), data, strict=True):
             target = place if self._is_indirect_address(place) else self._meant(place)
             self._bytes[target] = byte
+            if target in self._at:
+                written.add(self._at[target].name)
+        return written
 
     def _touched(self, written: dict[int, int]) -> list[Register]:
         found: dict[str, Register] = {}
@@ -105,7 +117,7 @@ class ServoMemory:
             raise RefusedError(StatusError.DATA_RANGE)
         if register.name == "Bus Watchdog":
             return register, value
-        if register.name.startswith("Goal") and self["Bus Watchdog"] == 0xFF:  # tripped: goals are read only
+        if register.name.startswith("Goal") and self["Bus Watchdog"] == TRIPPED:  # tripped: goals are read only
             raise RefusedError(StatusError.DATA_RANGE)
         low, high = self._limits(register.name)
         if (low is not None and value < low) or (high is not None and value > high):

@@ -1,7 +1,8 @@
 """Control tables of the servo models: where each number stands, what it begins with, and what may be written.
 
 Addresses and sizes are those of the tables that come with dynamixel-sdk. Initial values, ranges and speeds are from the
-ROBOTIS e-Manual, pages "XM430-W350", "XL430-W250" and "XL330-M288-T" (the speed of XL430 from "2XL430-W250").
+ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250", "XL330-M288-T" and "XL330-M077-T"; speeds, torques and
+currents are those of their tables "Specifications" at the recommended voltage.
 """
 
 from __future__ import annotations
@@ -71,6 +72,8 @@ class ServoModel:
         modes: Values that Operating Mode (11) may take.
         top_speed: Without load at the recommended voltage, rev/min.
         voltage: Recommended, V.
+        stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
+        current_unit: Amperes of one unit of current; None for a model that tells load, 0.1 % of the stall torque each.
         firmware: Version that an emulated servo tells; bus watchdog and clear need 42 or above.
     """
 
@@ -79,6 +82,9 @@ class ServoModel:
     modes: frozenset[int]
     top_speed: float
     voltage: float
+    stall_torque: float
+    stall_amperes: float
+    current_unit: float | None
     indirect: tuple[IndirectBlock, ...]
     registers: Mapping[str, Register] = field(repr=False)
     firmware: int = 45
@@ -152,25 +158,41 @@ def _registers(number: int, **others: tuple[int, Range]) -> dict[str, Register]:
     return found
 
 
-XM430_W350 = ServoModel("xm430_w350", 1020, ALL_MODES, 46.0, 12.0, X_BLOCKS, _registers(1020))
+XM430_W350 = ServoModel(
+    "xm430_w350", 1020, ALL_MODES, 46.0, 12.0, 4.1, 2.3, 0.00269, X_BLOCKS, _registers(1020)
+)  # fmt: skip
+XM430_W210 = ServoModel(
+    "xm430_w210", 1030, ALL_MODES, 77.0, 12.0, 3.0, 2.3, 0.00269, X_BLOCKS,
+    _registers(1030, Velocity_Limit=(330, (0, 1023))),
+)  # fmt: skip
 XL430_W250 = ServoModel(
-    "xl430_w250", 1060, ALL_MODES - {0, 5}, 57.0, 11.1, X_BLOCKS,
+    "xl430_w250", 1060, ALL_MODES - {0, 5}, 57.0, 11.1, 1.4, 1.3, None, X_BLOCKS,
     _registers(
         1060, Temperature_Limit=(72, (0, 100)), Max_Voltage_Limit=(140, (60, 140)), Min_Voltage_Limit=(60, (60, 140)),
         Velocity_Limit=(265, (0, 1023)), Velocity_I_Gain=(1000, GAIN), Position_D_Gain=(4000, GAIN),
         Position_P_Gain=(640, GAIN),
     ),
 )  # fmt: skip
+XL330: dict[str, tuple[int, Range]] = {
+    "Baud Rate": (1, (0, 6)), "Drive Mode": (0, (0, 5)), "Temperature Limit": (70, (0, 100)),
+    "Max Voltage Limit": (70, (31, 70)), "Min Voltage Limit": (35, (31, 70)), "Current Limit": (1750, (0, 1750)),
+    "Shutdown": (53, (0, 255)), "Position P Gain": (400, GAIN),
+}  # fmt: skip
+XL330_BLOCKS = (IndirectBlock(168, 208, 20),)
 XL330_M288 = ServoModel(
-    "xl330_m288", 1200, ALL_MODES, 103.0, 5.0, (IndirectBlock(168, 208, 20),),
+    "xl330_m288", 1200, ALL_MODES, 103.0, 5.0, 0.52, 1.47, 0.001, XL330_BLOCKS,
     _registers(
-        1200, Baud_Rate=(1, (0, 6)), Drive_Mode=(0, (0, 5)), Temperature_Limit=(70, (0, 100)),
-        Max_Voltage_Limit=(70, (31, 70)), Min_Voltage_Limit=(35, (31, 70)), Current_Limit=(1750, (0, 1750)),
-        Velocity_Limit=(445, (0, 2047)), Shutdown=(53, (0, 255)), Velocity_I_Gain=(1600, GAIN),
-        Velocity_P_Gain=(180, GAIN), Position_P_Gain=(400, GAIN),
+        1200, **XL330, Velocity_Limit=(445, (0, 2047)), Velocity_I_Gain=(1600, GAIN), Velocity_P_Gain=(180, GAIN),
     ),
 )  # fmt: skip
-MODELS = {model.name: model for model in (XM430_W350, XL430_W250, XL330_M288)}
+XL330_M077 = ServoModel(
+    "xl330_m077", 1190, ALL_MODES, 383.0, 5.0, 0.215, 1.47, 0.001, XL330_BLOCKS,
+    _registers(
+        1190, **XL330, Velocity_Limit=(1620, (0, 2047)), Velocity_I_Gain=(400, GAIN), Velocity_P_Gain=(40, GAIN),
+        Position_I_Gain=(400, GAIN),
+    ),
+)  # fmt: skip
+MODELS = {model.name: model for model in (XM430_W350, XM430_W210, XL430_W250, XL330_M288, XL330_M077)}
 
 BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000)
 """By the value of Baud Rate (8)."""
