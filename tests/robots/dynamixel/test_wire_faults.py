@@ -56,12 +56,20 @@ def test_a_late_answer_comes_later():
     assert heard(WireFaults(late=1.0, late_s=0.2), 1)[0][0][0] == pytest.approx(0.2005)
 
 
+def test_an_adapter_that_keeps_bytes_back_does_so_once_for_all_answers():
+    answers = [(0.0005, encoded(ANSWER))] * 3
+    told = WireFaults(delay_s=0.016).told(QUESTION, answers)
+    assert [delay_s for delay_s, _ in told] == pytest.approx([0.0165, 0.0005, 0.0005])
+
+
 def test_an_echo_comes_before_the_answer():
     assert heard(WireFaults(echo=True), 1) == [[(0.0, QUESTION), (0.0005, encoded(ANSWER))]]
     assert isinstance(packets(heard(WireFaults(echo=True, damaged=1.0), 1))[0][0], Packet | DamagedPacket)
 
 
-@pytest.mark.parametrize("wrong", [{"lost": 1.5}, {"cut": -0.1}, {"late_s": float("nan")}, {"damaged": float("nan")}])
+@pytest.mark.parametrize(
+    "wrong", [{"lost": 1.5}, {"cut": -0.1}, {"late_s": float("nan")}, {"delay_s": -1.0}, {"damaged": float("nan")}]
+)
 def test_what_is_no_share_or_no_time_is_refused(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         WireFaults(**wrong)

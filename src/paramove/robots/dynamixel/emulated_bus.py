@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from paramove.robots.dynamixel.emulated_judge import WireJudge
 from paramove.robots.dynamixel.emulated_loops import STEP_S
 from paramove.robots.dynamixel.emulated_mechanics import Mechanics
 from paramove.robots.dynamixel.emulated_servo import Answer, EmulatedServo
@@ -34,19 +35,32 @@ class EmulatedBus:
         mechanics: What they move, in the same order; without, each carries nothing.
 
     Attributes:
-        servos: Those on the bus; others may be added, which move nothing.
+        servos: Those on the bus.
+        judge: Of all that arrives; may be replaced.
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], mechanics: Mechanics | None = None) -> None:
         self.servos = list(servos)
         self.mechanics = mechanics
         self._chain = tuple(servos) if mechanics is not None else ()
+        self.judge = WireJudge(self.servos)
         self._reader = PacketReader()
         self._now_s = self._heard_s = 0.0
         self._baud_rate = 0
         if mechanics is not None:
             for servo, (shaft, _) in zip(self._chain, mechanics.shafts(), strict=True):
                 servo.stand(shaft)
+
+    def begin(self, now_s: float) -> None:
+        """The time of all servos is this one, s, from now on."""
+        self._now_s = now_s
+        for servo in self.servos:
+            servo.begin(now_s)
+
+    def add(self, servo: EmulatedServo) -> None:
+        """One more, which moves nothing."""
+        servo.begin(self._now_s)
+        self.servos.append(servo)
 
     def receive(self, data: bytes, baud_rate: int, now_s: float) -> list[tuple[float, bytes]]:
         """What the servos say to these bytes: for each answer, how long after now_s it begins, s, and its bytes.
@@ -55,15 +69,20 @@ class EmulatedBus:
         """
         if baud_rate != self._baud_rate or (self._reader.waits and now_s - self._heard_s > 0.1):
             self._reader.forget()
+            self.judge.give_up(now_s)
         self._baud_rate, self._heard_s = baud_rate, now_s
         said: list[tuple[float, bytes]] = []
         self.run_to(now_s)
+        for piece in self.judge.pieces(data, now_s):
+            said += self._obey(piece, baud_rate, now_s)
+        return said
+
+    def _obey(self, data: bytes, baud_rate: int, now_s: float) -> Iterator[Said]:
         for packet in self._reader.feed(data):
             hearing = [servo for servo in self.servos if servo.listens and servo.baud_rate == baud_rate]
             for servo in hearing:
                 servo.hear(now_s)
-            said += self._answers(packet, hearing)
-        return said
+            yield from self._answers(packet, hearing)
 
     def run_to(self, now_s: float) -> None:
         """All servos, and what they move, go on until this time, s."""
@@ -73,6 +92,7 @@ class EmulatedBus:
             self.mechanics.step(efforts, [servo.blocked for servo in self._chain])
             for servo, (shaft, velocity) in zip(self._chain, self.mechanics.shafts(), strict=True):
                 servo.moved(shaft, velocity)
+        self._now_s = max(self._now_s, now_s) if self.mechanics is None else self._now_s
         for servo in self.servos:
             if servo in self._chain:
                 servo.present()

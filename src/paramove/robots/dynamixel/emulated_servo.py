@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import IntFlag
 
+from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_loops import ACCELERATION_UNIT, STEP_S, VELOCITY_UNIT, Loops
 from paramove.robots.dynamixel.emulated_motor import LIMP, RAD_PER_PULSE, Effort, Motor
 from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
@@ -215,6 +216,27 @@ class EmulatedServo:
         if self.is_shut_down:
             self.memory["Torque Enable"] = 0
 
+    def preset(self, name: str, value: int) -> None:
+        """Its table holds this value as if it had before power came on; the servo stands anew, within one turn.
+
+        Raises:
+            InputError: There is no such register, or the value does not fit into it.
+        """
+        register = self.memory.register(name)
+        bits = 8 * register.size - int(register.signed)
+        if not (-(1 << bits) if register.signed else 0) <= value < 1 << bits:
+            raise InputError(f"{name} has {register.size} bytes, which cannot hold {value}")
+        before = self._direction
+        self.memory[name] = value
+        self.position *= before * self._direction
+        self._settle()
+
+    def hold(self) -> None:
+        """Torque is on although nobody asked for it, and the goal is where the servo stands."""
+        self.loops.begin(self.position)
+        self.memory["Goal Position"] = round(self.position) + self.memory["Homing Offset"]
+        self.memory["Torque Enable"] = 1
+
     def _factory_reset(self, parameters: bytes) -> None:
         if len(parameters) != 1 or parameters[0] not in KEPT:
             raise RefusedError(StatusError.DATA_RANGE)
@@ -241,6 +263,10 @@ class EmulatedServo:
         memory["Goal PWM"] = 0 if memory["Operating Mode"] == PWM_MODE else memory["PWM Limit"]
         if "Goal Current" in memory:
             memory["Goal Current"] = 0 if memory["Operating Mode"] == CURRENT_MODE else memory["Current Limit"]
+
+    def begin(self, now_s: float) -> None:
+        """It is this time, s: nothing happened before."""
+        self._now_s = self._heard_s = now_s
 
     def run_to(self, now_s: float) -> None:
         """Move until this time, s, carrying nothing; an earlier one than the last is passed over."""

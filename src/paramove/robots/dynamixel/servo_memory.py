@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+
+from paramove.input_error import InputError
 from paramove.robots.dynamixel.packets import StatusError
 from paramove.robots.dynamixel.servo_models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
 
@@ -46,6 +49,13 @@ class ServoMemory:
                 at = block.addresses + 2 * i
                 self._bytes[at : at + 2] = (block.data + i).to_bytes(2, "little")
                 self._bytes[block.data + i] = 0
+
+    def register(self, name: str) -> Register:
+        """Raises InputError, with the nearest name, if the model has none of this name."""
+        if name not in self.model.registers:
+            near = difflib.get_close_matches(name, self.model.registers, n=1) or list(self.model.registers)
+            raise InputError(f"{self.model.name} has no register {name!r}; nearest is {near[0]!r}")
+        return self.model.registers[name]
 
     def __contains__(self, name: str) -> bool:
         return name in self.model.registers

@@ -27,6 +27,7 @@ class WireFaults:
         foreign: Names another servo, with a right checksum.
         late: Comes `late_s` later, which may be after the next question.
         late_s: s.
+        delay_s: By which every answer comes later, as by an adapter that keeps bytes back.
         echo: Whether the client hears itself, as with an adapter of two wires.
         seed: Of what happens to which answer.
     """
@@ -39,6 +40,7 @@ class WireFaults:
     foreign: float = 0.0
     late: float = 0.0
     late_s: float = 0.05
+    delay_s: float = 0.0
     echo: bool = False
     seed: int = 0
 
@@ -46,20 +48,22 @@ class WireFaults:
         """Raises InputError for a share that is none or a time that is negative."""
         for one in fields(self):
             value = getattr(self, one.name)
-            if one.name not in ("late_s", "echo", "seed") and not 0.0 <= value <= 1.0:
+            if one.name not in ("late_s", "delay_s", "echo", "seed") and not 0.0 <= value <= 1.0:
                 raise InputError(f"{one.name} is a share of 0 to 1, found {value}")
-        if not 0.0 <= self.late_s < np.inf:
-            raise InputError(f"late_s is finite and not negative, found {self.late_s}")
+        for name in ("late_s", "delay_s"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InputError(f"{name} is finite and not negative, found {getattr(self, name)}")
         self._rng = np.random.default_rng(self.seed)
 
     def told(self, question: bytes, answers: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
         """What the client gets instead of these answers: delays, s, and bytes."""
-        kept = [(0.0, question)] if self.echo else []
+        kept, held_back_s = ([(0.0, question)] if self.echo else []), self.delay_s
         for delay_s, answer in answers:
             if self._happens(self.lost):
                 continue
             late_s = self.late_s if self._happens(self.late) else 0.0
-            kept.append((delay_s + late_s, self._changed(answer)))
+            kept.append((delay_s + late_s + held_back_s, self._changed(answer)))
+            held_back_s = 0.0  # the others come right behind the first
         return kept
 
     def _changed(self, answer: bytes) -> bytes:
