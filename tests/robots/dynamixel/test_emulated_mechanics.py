@@ -5,8 +5,8 @@ import math
 import pytest
 
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.emulated_body import OVERLOAD_S, HardwareError
 from paramove.robots.dynamixel.emulated_mechanics import MujocoMechanics, ServoJoint
-from paramove.robots.dynamixel.emulated_servo import OVERLOAD_S, HardwareError
 from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
 from paramove.robots.dynamixel.servo_models import (
     MODELS,

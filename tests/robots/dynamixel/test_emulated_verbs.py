@@ -5,7 +5,8 @@ import json
 import pytest
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo, HardwareError
+from paramove.robots.dynamixel.emulated_body import HardwareError
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulated_verbs import VERBS, EmulatorVerbs
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.packets import ALERT, BROADCAST, Instruction, Packet, PacketReader, encoded

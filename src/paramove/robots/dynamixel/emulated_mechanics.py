@@ -78,6 +78,7 @@ class MujocoMechanics:
         self._own_damping: NDArray[np.float64] = self.model.dof_damping.copy()
         for name, angle in (posture or {}).items():
             self.data.qpos[self.model.jnt_qposadr[self._joint(name)]] = angle
+        self._place_followers()
         mujoco.mj_forward(self.model, self.data)
 
     def shafts(self) -> list[tuple[float, float]]:
@@ -104,6 +105,16 @@ class MujocoMechanics:
     def angles(self, names: Sequence[str]) -> list[float]:
         """Of these joints, rad or m."""
         return [float(self.data.qpos[self.model.jnt_qposadr[self._joint(name)]]) for name in names]
+
+    def _place_followers(self) -> None:
+        """Joints that others are coupled to, such as the fingers of a gripper, at the start."""
+        model = self.model
+        for one in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+            follower, leader = model.eq_obj1id[one], model.eq_obj2id[one]
+            if leader >= 0:
+                turned = self.data.qpos[model.jnt_qposadr[leader]] - model.qpos0[model.jnt_qposadr[leader]]
+                at = model.jnt_qposadr[follower]
+                self.data.qpos[at] = model.qpos0[at] + np.polyval(model.eq_data[one, 4::-1], turned)
 
     def _joint(self, name: str) -> int:
         number: int = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, name)

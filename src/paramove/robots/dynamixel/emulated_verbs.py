@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo, HardwareError
+from paramove.robots.dynamixel.emulated_body import HardwareError
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, model_named
 from paramove.robots.dynamixel.wire_faults import WireFaults

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_bus import EmulatedBus
 from paramove.robots.dynamixel.emulated_mechanics import Mechanics
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
@@ -53,6 +54,7 @@ class DynamixelEmulator:
         self._stopped, self._moved = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
         self._wanted = self.plugged_in = False
+        self._error: Exception | None = None
         self._open()
 
     def __enter__(self) -> Self:
@@ -66,6 +68,11 @@ class DynamixelEmulator:
         self._thread.join()
         if self.plugged_in:
             self._close()
+
+    def check(self) -> None:
+        """Raises RuntimeError if the thread that serves the port has ended by an error."""
+        if self._error is not None:
+            raise RuntimeError(f"the emulated servos have stopped: {self._error}") from self._error
 
     def unplug(self) -> None:
         """Takes the port away, as if its plug were pulled; the servos keep their power and go on."""
@@ -87,6 +94,8 @@ class DynamixelEmulator:
         tty.setraw(self._theirs)
         self.port = os.ttyname(self._theirs)
         if self._link is not None:
+            if self._link.exists() and not self._link.is_symlink():
+                raise InputError(f"{self._link} is there already and no link: name another place for the port")
             self._link.unlink(missing_ok=True)
             self._link.symlink_to(self.port)
         self._wanted = self.plugged_in = True
@@ -107,6 +116,12 @@ class DynamixelEmulator:
         return time.monotonic() - self._began_s
 
     def _serve(self) -> None:
+        try:
+            self._serve_until_stopped()
+        except (RuntimeError, OSError) as error:  # a world that broke, a terminal that the system took away
+            self._error = error
+
+    def _serve_until_stopped(self) -> None:
         while not self._stopped.is_set():
             if self._wanted != self.plugged_in:
                 self._open() if self._wanted else self._close()
