@@ -14,6 +14,8 @@ JUDGED_A_FAILURE = 3
 """An evaluation found that what it judges is not as it should be."""
 INPUT_MISSING = 66
 """A launch file, an overlay or a node's input does not exist; a restart does not help."""
+UNAVAILABLE = 69
+"""A device is not there or does not answer, or nobody answers who should."""
 TEMPORARY = 75
 """Something else holds what is needed, such as another run in the same domain."""
 PERMISSION = 77

@@ -1,0 +1,76 @@
+"""USB adapters of serial buses, told apart by their serial numbers: /dev/ttyUSB0 is another one after the next boot."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from paramove.input_error import InputError
+
+BY_ID = Path("/dev/serial/by-id")
+VARIABLE = "PARAMOVE_SERIAL_BY_ID"
+INTERFACE = re.compile(r"-if\d+(-port\d+)?$")
+NOTHING_FOUND = (
+    "plug in the adapter and switch on its power; `ls /dev/ttyUSB* /dev/ttyACM*` shows whether the system sees it, "
+    "`sudo usermod -aG dialout $USER` and a new login let you open it, and in a container the folder must be passed in"
+)
+
+
+@dataclass(frozen=True)
+class SerialAdapter:
+    """One adapter that is plugged in.
+
+    Attributes:
+        serial: Number that its maker gave it, such as FT6Z5NCH.
+        link: Name that stays the same from boot to boot.
+    """
+
+    serial: str
+    link: Path
+
+    @property
+    def device(self) -> str:
+        """Name that it has now, such as /dev/ttyUSB0."""
+        return str(self.link.resolve())
+
+
+def default_by_id() -> Path:
+    """Folder of the links: $PARAMOVE_SERIAL_BY_ID, else /dev/serial/by-id."""
+    return Path(os.environ.get(VARIABLE) or BY_ID)
+
+
+def serial_of(name: str) -> str:
+    """USB serial number within a link's name: FT6Z5NCH of usb-FTDI_USB__-__Serial_Converter_FT6Z5NCH-if00-port0."""
+    return INTERFACE.sub("", name).rpartition("_")[2]
+
+
+def serial_adapters(by_id: Path | None = None) -> list[SerialAdapter]:
+    """All that are plugged in, by serial number. A folder that is not there holds none."""
+    folder = by_id or default_by_id()
+    links = [path for path in folder.iterdir() if path.exists()] if folder.is_dir() else []
+    return sorted((SerialAdapter(serial_of(path.name), path) for path in links), key=lambda one: one.serial)
+
+
+def serial_adapter(serial: str = "", by_id: Path | None = None) -> SerialAdapter:
+    """The adapter with this number; without one the only adapter there is.
+
+    Raises:
+        InputError: There is none or more than one; names those found and the remedy.
+    """
+    folder = by_id or default_by_id()
+    found = serial_adapters(folder)
+    if not found:
+        raise InputError(f"no serial adapter in {folder}: {NOTHING_FOUND}", missing=True)
+    told = ", ".join(f"{one.serial} ({one.device})" for one in found)
+    wanted = [one for one in found if serial in ("", one.serial)]
+    if not wanted:
+        raise InputError(f"no serial adapter {serial!r} in {folder}, found {told}", missing=True)
+    twice = [number for number, count in Counter(one.serial for one in wanted).items() if count > 1]
+    if twice:
+        raise InputError(f"two adapters have the serial number {twice[0]!r}, found {told}: unplug one of them")
+    if len(wanted) > 1:
+        raise InputError(f"several serial adapters, found {told}: name one by its number with --serial")
+    return wanted[0]

@@ -1,0 +1,53 @@
+"""A person's stop from outside of a run: said until the safety gate has answered."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+
+import zmq
+
+from paramove.bus import topics
+from paramove.bus.publisher import Publisher
+from paramove.bus.subscriber import Subscriber
+from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
+from paramove.safety.gate_io import PERSON_STOP
+
+SAID_EVERY_S = 0.02
+
+
+def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None:
+    """Say a stop until the gate has latched it, or patience is at its end.
+
+    Args:
+        folder: Of the run's bus.
+        source: Where the person pressed, for the sentence that the gate latches.
+        patience_s: To wait for the gate's answer.
+
+    Returns:
+        The gate's answer, None if there was none.
+
+    Raises:
+        TopicTakenError: Another one says the stops of this run, such as the live page.
+        BusFolderError: The folder cannot be used.
+    """
+    end_s = time.monotonic() + patience_s
+    asked_ns = time.monotonic_ns()
+    request = StopRequest(source=source)
+    request.captured.FromNanoseconds(asked_ns)
+    with contextlib.ExitStack() as owned, zmq.Context() as context, contextlib.ExitStack() as sockets:
+        publisher = Publisher(context, folder, topics.OPERATOR_STOP, "estop")
+        owned.callback(publisher.ownership.release)  # after the context has ended, which removes the socket's file
+        sockets.callback(publisher.close)
+        gate = Subscriber(context, folder, topics.ARM_SAFETY)
+        sockets.callback(gate.close)
+        while time.monotonic() < end_s:
+            publisher.publish(request, asked_ns, time.monotonic_ns())
+            gate.revive()
+            gate.socket.poll(int(1e3 * SAID_EVERY_S), zmq.POLLIN)
+            while (heard := gate.receive()) is not None:
+                answer: SafetyState = heard.message
+                if any(fault.code == PERSON_STOP for fault in answer.faults):
+                    return answer
+    return None
