@@ -3,6 +3,7 @@
 Hears   arm/trajectory         JointTrajectory        events
         operator/arm           ArmRequest             events, latched
         operator/stop          StopRequest            events, latched
+        operator/estop         StopRequest            events, latched
         wire/hoap3/state       Hoap3State             15 Hz   joint units
 Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
         arm/joint_states       foxglove.JointStates   15 Hz   rad
@@ -17,7 +18,7 @@ from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.driver import ArmDriver
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.OPERATOR_STOP, topics.WIRE_HOAP3_STATE)
+HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS, topics.WIRE_HOAP3_STATE)
 SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
@@ -38,7 +39,7 @@ def run(bus: Bus, config: Config) -> None:
     bus.ready(driver.sentence)
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
-            if event.topic is not topics.OPERATOR_STOP:
+            if event.topic not in topics.STOPS:
                 hear[event.topic](event.message, event.captured_ns)
                 continue
             driver.on_stop(event.message)  # and at once a tick: a stop does not wait for the next period

@@ -197,6 +197,7 @@ def of_arm_driver() -> list[Event]:
         5: (topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True)),
         8: (topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)),
         50: (topics.OPERATOR_STOP, StopRequest(source="a person")),
+        51: (topics.OPERATOR_ESTOP, StopRequest(source="terminal")),
     }
     for number in range(1, 60):
         now_ns = number * PERIOD_NS

@@ -55,7 +55,12 @@ def test_data_flows_onwards(sim):
 
 
 def test_what_is_heard_and_unsaid_is_marked(sim):
-    assert {found.topic for found in sim.unsaid} == {"operator/stop", "action/estimate", "human/arm_pose"}
+    assert {found.topic for found in sim.unsaid} == {
+        "operator/stop",
+        "operator/estop",
+        "action/estimate",
+        "human/arm_pose",
+    }
     assert "operator/stop           <- nobody (!)" in as_text(sim)
     assert "Heard, but said by nobody:" in as_text(sim)
     assert "operator/stop: said by nobody" in as_mermaid(sim)
@@ -67,7 +72,7 @@ def test_text_fits_a_terminal_and_tells_every_topic(sim):
     assert max(map(len, text.splitlines())) <= 100
     for found in sim.edges:
         assert found.topic in text
-    assert "recorder  (nodes.recorder)\n  hears  20 of 25 topics" in text
+    assert "recorder  (nodes.recorder)\n  hears  21 of 26 topics" in text
 
 
 MERMAID = re.compile(

@@ -131,6 +131,8 @@ ARM_MOTORS = Topic("arm/motors", MotorStatus, 1, _QUEUE, recorded=True)
 ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
 OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
+OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
+"""From a terminal: a topic has one speaker, and that of `operator/stop` may be the live page."""
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -145,6 +147,9 @@ TOPICS: tuple[Topic, ...] = tuple(
     if isinstance(topic, Topic)
 )
 """Every topic but the status topics, which exist once per node: see `status`."""
+
+STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
+"""A person's stops: a driver hears all of them."""
 
 _STATUS_PREFIX = "status/"
 _NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")

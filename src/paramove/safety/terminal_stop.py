@@ -9,6 +9,7 @@ from pathlib import Path
 import zmq
 
 from paramove.bus import topics
+from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.publisher import Publisher
 from paramove.bus.subscriber import Subscriber
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
@@ -18,7 +19,7 @@ SAID_EVERY_S = 0.02
 
 
 def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None:
-    """Say a stop until the gate has latched it, or patience is at its end.
+    """Say a stop on all topics of stops that are free, until the gate has latched it or patience is at its end.
 
     Args:
         folder: Of the run's bus.
@@ -29,7 +30,7 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
         The gate's answer, None if there was none.
 
     Raises:
-        TopicTakenError: Another one says the stops of this run, such as the live page.
+        TopicTakenError: Others say all topics of stops, such as the live page and another terminal.
         BusFolderError: The folder cannot be used.
     """
     end_s = time.monotonic() + patience_s
@@ -37,13 +38,20 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
     request = StopRequest(source=source)
     request.captured.FromNanoseconds(asked_ns)
     with contextlib.ExitStack() as owned, zmq.Context() as context, contextlib.ExitStack() as sockets:
-        publisher = Publisher(context, folder, topics.OPERATOR_STOP, "estop")
-        owned.callback(publisher.ownership.release)  # after the context has ended, which removes the socket's file
-        sockets.callback(publisher.close)
+        publishers = []
+        for topic in topics.STOPS:
+            with contextlib.suppress(TopicTakenError):
+                publishers.append(Publisher(context, folder, topic, "estop"))
+        if not publishers:
+            raise TopicTakenError(f"other programs say {' and '.join(topic.name for topic in topics.STOPS)} already")
+        for publisher in publishers:
+            owned.callback(publisher.ownership.release)  # after the context has ended, which removes the socket's file
+            sockets.callback(publisher.close)
         gate = Subscriber(context, folder, topics.ARM_SAFETY)
         sockets.callback(gate.close)
         while time.monotonic() < end_s:
-            publisher.publish(request, asked_ns, time.monotonic_ns())
+            for publisher in publishers:
+                publisher.publish(request, asked_ns, time.monotonic_ns())
             gate.revive()
             gate.socket.poll(int(1e3 * SAID_EVERY_S), zmq.POLLIN)
             while (heard := gate.receive()) is not None:

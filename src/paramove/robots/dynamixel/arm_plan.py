@@ -3,6 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+
+from paramove.input_error import InputError
+from paramove.robots.description import Chain, RobotDescription
+from paramove.robots.dynamixel.servo_models import model_named
+
+YAW = "the hand swings to the left, seen from behind the arm"
+PITCH = "what it carries goes down in front"
+ROLL = "the hand turns clockwise, seen from behind the arm"
 
 
 @dataclass(frozen=True)
@@ -39,3 +48,38 @@ class ArmPlan:
     robot: str
     baud_rate: int
     servos: tuple[PlannedServo, ...]
+
+
+def load_plan(folder: Path) -> ArmPlan:
+    """Of the description in a folder; the posture for calibration is its zero pose.
+
+    Raises:
+        InputError: It is missing or wrong, or is not one of servos whose tables are known.
+    """
+    robot = RobotDescription.load(folder)
+    if robot.bus is None:
+        raise InputError(
+            f"{folder}: {robot.name} has no servos on a bus, expected `bus` and a `servo_id` of every joint"
+        )
+    words = {} if robot.chain is None else _directions(robot.chain)
+    servos = []
+    for place, joint in enumerate(robot.joint_names):
+        servo = PlannedServo(
+            joint=joint,
+            number=robot.servo_ids[place],
+            model=model_named(robot.motors[place]).name,
+            lower=float(robot.lower[place]),
+            upper=float(robot.upper[place]),
+            sign=1 if robot.units.counts_per_rad[place] > 0 else -1,
+            direction=words.get(joint, ""),
+        )
+        servos.append(servo)
+    return ArmPlan(robot.name, robot.bus.baud_rate, tuple(servos))
+
+
+def _directions(chain: Chain) -> dict[str, str]:
+    """Where each joint moves with a growing angle: a yaw, three pitches, perhaps a roll, and the gripper."""
+    words = dict(zip(chain.joints, (YAW, PITCH, PITCH, PITCH, ROLL), strict=False))
+    return words | {
+        chain.gripper: "the gripper opens" if chain.gripper_open > chain.gripper_closed else "the gripper closes"
+    }

@@ -1,0 +1,19 @@
+"""`paramove arm`: a servo arm's bus, its calibration, and its stop."""
+
+from __future__ import annotations
+
+import typer
+
+from paramove.cli.arm_bench import bench
+from paramove.cli.arm_calibrate import calibrate
+from paramove.cli.arm_estop import estop
+from paramove.cli.arm_reboot import reboot
+from paramove.cli.arm_scan import scan
+from paramove.cli.arm_setup import setup
+from paramove.cli.arm_verify import verify
+
+app = typer.Typer(
+    name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, reboot and stop an arm of servos."
+)
+for command in (scan, setup, calibrate, verify, reboot, bench, estop):
+    app.command()(command)

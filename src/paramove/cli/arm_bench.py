@@ -1,0 +1,63 @@
+"""`paramove arm bench`: how fast the bus is."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from paramove.cli.arm_options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
+from paramove.cli.bus_options import JsonOption
+from paramove.robots.dynamixel.bus_bench import BusBench, bench_bus, latency_timer_ms, slow_timer
+from paramove.supervision import exit_codes
+
+FINDING = 3
+
+
+def bench(
+    rounds: Annotated[int, typer.Option(min=10, help="how often all servos are read")] = 500,
+    rate: Annotated[int, typer.Option(min=0, metavar="HZ", help="that the bus must hold")] = 0,
+    serial: SerialOption = "",
+    baud_rate: BaudOption = 0,
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure reading all servos at once: times, errors by kind, and the rates that the bus can hold. Reads only.
+
+    Exit codes: 0 measured; 3 it cannot hold --rate, or the adapter's latency timer is slow; 69 no adapter or servo.
+    """
+    with open_arm(by_id, serial, data, baud_rate) as arm:
+        numbers = [servo.number for servo in arm.chain.ping_all()]
+        if not numbers:
+            where = f"no servo answers at {arm.chain.port.baud_rate}; `paramove arm scan` asks at other baud rates"
+            raise ended(where, exit_codes.UNAVAILABLE)
+        found = bench_bus(arm.chain, numbers, rounds)
+        device = arm.adapter.device
+        timer_ms = latency_timer_ms(device)
+    finding = "" if timer_ms is None else slow_timer(device, timer_ms)
+    if as_json:
+        values = {name: None if value != value else value for name, value in asdict(found).items()}
+        typer.echo(json.dumps(values | {"latency_timer_ms": timer_ms}, indent=2))
+    else:
+        _tell(found)
+    if finding:
+        typer.echo(finding, err=True)
+    if rate and rate > max(found.rates_hz, default=0):
+        finding = f"the bus cannot hold {rate} Hz: at most {max(found.rates_hz, default=0)} Hz of those tried"
+        typer.echo(finding, err=True)
+    if finding:
+        raise typer.Exit(FINDING)
+
+
+def _tell(found: BusBench) -> None:
+    typer.echo(f"{found.servos} servos at {found.baud_rate}: {found.complete} of {found.rounds} reads complete")
+    if not math.isnan(found.p50_ms):
+        times = f"p50 {found.p50_ms:.2f} ms, p99 {found.p99_ms:.2f} ms, longest {found.longest_ms:.2f} ms"
+        typer.echo(f"one read of all positions and velocities: {times}")
+    typer.echo(", ".join(f"{name} {count}" for name, count in found.errors.items()))
+    rates = ", ".join(f"{rate} Hz" for rate in found.rates_hz)
+    typer.echo(f"can hold: {rates or 'none of the usual rates'}")

@@ -1,0 +1,41 @@
+"""`paramove arm calibrate`: what the counts of an arm's servos mean, found by moving it by hand."""
+
+from __future__ import annotations
+
+import datetime
+from importlib.metadata import version
+
+import typer
+
+from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.terminal_person import QuitError, TerminalPerson
+from paramove.robots.dynamixel.arm_plan import load_plan
+from paramove.robots.dynamixel.calibration_procedure import ArmCalibrator
+from paramove.supervision import exit_codes
+
+
+def calibrate(
+    robot: RobotOption,
+    serial: SerialOption = "",
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+) -> None:
+    """Calibrate an arm: you move every joint through its travel, hold a posture, and show each joint's direction.
+
+    Torque goes off: hold the arm. At the end operating modes, limits and offsets are written to the servos, and a file
+    for this adapter to the data folder. A file that is there is replaced.
+
+    Exit codes: 0 calibrated; 1 ended before, and the old file stays; 69 no adapter, or a servo does not answer;
+    78 what was shown does not fit the description, with the cause.
+    """
+    with explained():
+        plan = load_plan(robot)
+    created = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    with open_arm(by_id, serial, data, plan.baud_rate) as arm:
+        calibrator = ArmCalibrator(arm.chain, plan, arm.adapter.serial, TerminalPerson())
+        try:
+            calibration = calibrator.run(created, f"paramove {version('paramove')}")
+        except QuitError:
+            raise ended("ended before the calibration was complete: nothing was saved", exit_codes.FAILURE) from None
+        calibration.save(arm.path)
+    typer.echo(f"{arm.path}: {len(calibration.joints)} joints; check it with `paramove arm verify`")

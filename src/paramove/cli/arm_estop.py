@@ -1,0 +1,38 @@
+"""`paramove arm estop`: stops the arm of what is running, from any terminal."""
+
+from __future__ import annotations
+
+import typer
+
+from paramove.bus.endpoint import BusFolderError, TopicTakenError
+from paramove.bus.settings import default_folder
+from paramove.cli.arm_options import ended
+from paramove.cli.bus_options import DomainOption
+from paramove.msgs.safety_state_pb2 import SafetyState
+from paramove.safety.gate_io import PERSON_STOP
+from paramove.safety.terminal_stop import stop_arm
+from paramove.supervision import exit_codes
+
+PATIENCE_S = 1.0
+REAL_ONE = "use the switch of the motors' power: that one is the real emergency stop"
+
+
+def estop(domain: DomainOption = None) -> None:
+    """Stop the arm of the running application: controlled, and latched until somebody arms it again.
+
+    No safety function: the switch of the motors' power is the real emergency stop.
+
+    Exit codes: 0 the safety gate has answered; 69 it has not within 1 s.
+    """
+    folder = default_folder(domain)
+    if not folder.is_dir():
+        raise ended(f"nothing is running in {folder}; {REAL_ONE}", exit_codes.UNAVAILABLE)
+    try:
+        answer = stop_arm(folder, "terminal", PATIENCE_S)
+    except (TopicTakenError, BusFolderError) as error:
+        raise ended(f"{error}; {REAL_ONE}", exit_codes.UNAVAILABLE) from error
+    if answer is None:
+        raise ended(f"no safety gate has answered within {PATIENCE_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
+    state = SafetyState.State.Name(answer.state).removeprefix("STATE_").lower()
+    sentence = next(fault.sentence for fault in answer.faults if fault.code == PERSON_STOP)
+    typer.echo(f"the safety gate has heard it: {state}, {sentence}")

@@ -1,0 +1,126 @@
+"""Options, the open port and the ends that the commands about a servo arm share."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.arm_calibration import VARIABLE as DATA_VARIABLE
+from paramove.robots.dynamixel.arm_calibration import ArmCalibration, calibration_path
+from paramove.robots.dynamixel.serial_adapters import VARIABLE as BY_ID_VARIABLE
+from paramove.robots.dynamixel.serial_adapters import SerialAdapter, serial_adapter
+from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError, ServoSilentError
+from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
+from paramove.supervision import exit_codes
+from paramove.supervision.processes import printable
+
+DEFAULT_BAUD_RATE = 1_000_000
+LATENCY_S = 0.1
+"""Nobody waits for a motion here, and an adapter or a busy machine may be slow."""
+
+ByIdOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--by-id",
+        metavar="FOLDER",
+        envvar=BY_ID_VARIABLE,
+        help="with links to the adapters [default: /dev/serial/by-id]",
+    ),
+]
+SerialOption = Annotated[
+    str, typer.Option("--serial", metavar="NUMBER", help="of the USB adapter; not needed if there is only one")
+]
+DataOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--data",
+        metavar="FOLDER",
+        envvar=DATA_VARIABLE,
+        help="that holds calibrations [default: the user's data folder]",
+    ),
+]
+BaudOption = Annotated[
+    int, typer.Option("--baud", min=0, metavar="RATE", help="bit/s [default: as calibrated, else 1000000]")
+]
+
+RobotOption = Annotated[
+    Path,
+    typer.Option("--robot", metavar="FOLDER", help="with the arm's description, such as robot_description/koch_v1_1"),
+]
+
+
+@dataclass(frozen=True)
+class OpenArm:
+    """An adapter with its servos, while its port is open."""
+
+    adapter: SerialAdapter
+    chain: ServoChain
+    path: Path
+
+    def calibration(self) -> ArmCalibration:
+        """Of this arm. Raises CalibrationError."""
+        return ArmCalibration.load(self.path, self.adapter.serial)
+
+
+@contextlib.contextmanager
+def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int = 0) -> Iterator[OpenArm]:
+    """The adapter's port, open at this baud rate or the calibrated one; ends the command, with the cause, on errors."""
+    with explained():
+        try:
+            adapter = serial_adapter(serial, by_id)
+        except InputError as error:
+            raise ended(str(error), exit_codes.UNAVAILABLE if error.missing else error.exit_code) from error
+        path = calibration_path(adapter.serial, data)
+        port = ServoPort(str(adapter.link), baud_rate or configured_baud_rate(path) or DEFAULT_BAUD_RATE, LATENCY_S)
+        try:
+            port.open()
+        except InputError as error:
+            raise ended(str(error), _code(error)) from error
+        with contextlib.closing(port):
+            yield OpenArm(adapter, ServoChain(port), path)
+
+
+@contextlib.contextmanager
+def explained() -> Iterator[None]:
+    """Ends the command with a sentence where a servo, the port or a file is not as it must be."""
+    try:
+        yield
+    except (ServoSilentError, PortLostError) as error:
+        raise ended(str(error), exit_codes.UNAVAILABLE) from error
+    except ServoError as error:
+        raise ended(str(error), exit_codes.FAILURE) from error
+    except InputError as error:
+        raise ended(str(error), error.exit_code) from error
+    except OSError as error:
+        raise ended(f"{error.filename}: {error.strerror}", exit_codes.PERMISSION) from error
+
+
+def ended(sentence: str, code: int) -> typer.Exit:
+    """Says why the command ends."""
+    typer.echo(printable(sentence), err=True)
+    return typer.Exit(code)
+
+
+def configured_baud_rate(path: Path) -> int:
+    """As calibrated, 0 without a calibration that can be read."""
+    try:
+        return ArmCalibration.read(path).bus.baud_rate
+    except InputError:
+        return 0
+
+
+def _code(error: InputError) -> int:
+    """Of a port that cannot be opened."""
+    found = getattr(error.__cause__, "errno", None)
+    if error.missing:
+        return exit_codes.UNAVAILABLE
+    if found in (errno.EAGAIN, errno.EBUSY):
+        return exit_codes.TEMPORARY
+    return exit_codes.PERMISSION if found == errno.EACCES else exit_codes.CONFIGURATION

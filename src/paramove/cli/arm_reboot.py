@@ -1,0 +1,46 @@
+"""`paramove arm reboot`: clears one servo's hardware error."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from paramove.cli.arm_options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
+from paramove.robots.dynamixel.servo_reboot import (
+    ServoLoadedError,
+    check_unloaded,
+    reboot_servo,
+    sentences,
+    servo_before_reboot,
+)
+from paramove.supervision import exit_codes
+
+
+def reboot(
+    number: Annotated[int, typer.Argument(metavar="ID", min=0, max=252)],
+    yes: Annotated[
+        bool, typer.Option("--yes", help="the arm is held: reboot even while the joint carries something")
+    ] = False,
+    serial: SerialOption = "",
+    baud_rate: BaudOption = 0,
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+) -> None:
+    """Reboot one servo: its hardware error is told and cleared, its torque goes off. The others hold as they do.
+
+    Exit codes: 0 rebooted and without error; 1 it still has a hardware error; 2 its joint carries something, so hold
+    the arm and say --yes; 69 it does not answer.
+    """
+    with open_arm(by_id, serial, data, baud_rate) as arm:
+        servo = servo_before_reboot(arm.chain, number)
+        typer.echo("\n".join(sentences(servo)))
+        try:
+            if not yes:
+                check_unloaded(arm.chain, servo)
+        except ServoLoadedError as error:
+            raise ended(str(error), exit_codes.USAGE) from error
+        after = reboot_servo(arm.chain, number)
+    if after.hardware_error:
+        raise ended(f"rebooted, but {sentences(after)[0]}", exit_codes.FAILURE)
+    typer.echo(f"servo {number} was rebooted: no hardware error, torque off")

@@ -1,0 +1,83 @@
+"""`paramove arm scan`: who is on the bus of each adapter."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import typer
+
+from paramove.cli.arm_options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
+from paramove.cli.bus_options import JsonOption, show
+from paramove.robots.dynamixel.bus_scan import USUAL_BAUD_RATES, BusScan, FoundServo, scan_bus
+from paramove.robots.dynamixel.hardware_error import in_words
+from paramove.robots.dynamixel.serial_adapters import serial_adapters
+from paramove.supervision import exit_codes
+
+FINDING = 3
+
+
+def scan(
+    baud_rates: Annotated[
+        list[int] | None,
+        typer.Option("--baud", min=1, metavar="RATE", help="bit/s; may be repeated [default: all usual]"),
+    ] = None,
+    serial: SerialOption = "",
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List the servos at every adapter: ID, model, firmware, baud rate, voltage, temperature, errors, torque.
+
+    Reads only. All usual baud rates are asked, which takes one or two seconds for each adapter.
+
+    Exit codes: 0 servos were found; 3 something about them must be put right; 69 no adapter, or no servo answers;
+    75 the adapter is in use; 77 not allowed to open it.
+    """
+    adapters = [one for one in serial_adapters(by_id) if serial in ("", one.serial)]
+    if not adapters:
+        with open_arm(by_id, serial, data):  # says why there is none
+            return
+    rates = tuple(baud_rates or USUAL_BAUD_RATES)
+    told, count = [], 0
+    findings: list[str] = []
+    for adapter in adapters:
+        with open_arm(by_id, adapter.serial, data) as arm:
+            found = scan_bus(arm.chain, rates)
+        sentences = found.findings(configured_baud_rate(arm.path))
+        count += len(found.servos)
+        findings += sentences
+        told.append({"serial": adapter.serial, "device": adapter.device, "servos": _rows(found), "findings": sentences})
+        if not as_json:
+            _tell(told[-1], rates)
+    if as_json:
+        typer.echo(json.dumps(told, indent=2))
+    if findings:
+        raise typer.Exit(FINDING)
+    if not count:
+        raise ended("no servo answers: check the power of the arm and its cables", exit_codes.UNAVAILABLE)
+
+
+def _tell(adapter: dict[str, Any], rates: tuple[int, ...]) -> None:
+    typer.echo(f"adapter {adapter['serial']} ({adapter['device']}), asked at {', '.join(map(str, rates))}")
+    show(adapter["servos"], as_json=False)
+    for sentence in adapter["findings"]:
+        typer.echo(sentence)
+
+
+def _rows(found: BusScan) -> list[dict[str, Any]]:
+    return [_row(servo) for servo in found.servos]
+
+
+def _row(servo: FoundServo) -> dict[str, Any]:
+    return {
+        "id": servo.number,
+        "model": servo.model,
+        "model_number": servo.model_number,
+        "firmware": servo.firmware,
+        "baud_rate": servo.baud_rate,
+        "voltage": None if servo.voltage is None else round(servo.voltage, 1),
+        "temperature": servo.temperature,
+        "hardware_error": None if servo.hardware_error is None else in_words(servo.hardware_error) or "none",
+        "torque": servo.torque,
+    }

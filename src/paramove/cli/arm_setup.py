@@ -1,0 +1,70 @@
+"""`paramove arm setup`: IDs and baud rate of a new arm's servos, one servo at a time."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.terminal_person import QuitError, TerminalPerson
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo, load_plan
+from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError
+from paramove.robots.dynamixel.servo_setup import only_servo, set_up
+from paramove.supervision import exit_codes
+
+
+def setup(
+    robot: RobotOption,
+    joints: Annotated[
+        list[str] | None, typer.Option("--joint", metavar="NAME", help="only this one; may be repeated")
+    ] = None,
+    serial: SerialOption = "",
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+) -> None:
+    """Give the servos of an arm their IDs and baud rate, one after the other: exactly one is connected at a time.
+
+    It is found at any ID and usual baud rate. ID, Return Delay Time 0 and baud rate are written with torque off and
+    read back.
+
+    Exit codes: 0 all are set up; 1 ended before; 69 no adapter; 78 no such joint or description.
+    """
+    with explained():
+        plan = load_plan(robot)
+        wanted = _wanted(plan, joints)
+    person = TerminalPerson()
+    with open_arm(by_id, serial, data, plan.baud_rate) as arm:
+        for servo in wanted:
+            try:
+                _set_up(arm.chain, plan, servo, person)
+            except QuitError:
+                left = " ".join(f"--joint {one.joint}" for one in wanted[wanted.index(servo) :])
+                raise ended(f"ended before {servo.joint}; go on with {left}", exit_codes.FAILURE) from None
+    typer.echo("connect all servos and run `paramove arm scan`, then `paramove arm calibrate`")
+
+
+def _wanted(plan: ArmPlan, joints: list[str] | None) -> list[PlannedServo]:
+    known = {servo.joint: servo for servo in plan.servos}
+    unknown = [name for name in joints or () if name not in known]
+    if unknown:
+        raise InputError(f"{plan.robot} has no joint {unknown[0]!r}, found {', '.join(known)}")
+    return [known[name] for name in joints] if joints else list(plan.servos)
+
+
+def _set_up(chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: TerminalPerson) -> None:
+    """Asks until the right servo is connected alone and has taken its settings."""
+    while True:
+        person.until_done(f"Connect the servo of {servo.joint} ({servo.model}) and no other.", list)
+        try:
+            found = only_servo(chain)
+            set_up(chain, found, servo.number, plan.baud_rate, servo.model)
+        except (InputError, ServoError) as error:
+            person.tell(str(error))
+            continue
+        person.tell(
+            f"{servo.joint}: ID {found.number} at {found.baud_rate} is now ID {servo.number} at {plan.baud_rate}, "
+            "answers at once; label it"
+        )
+        return

@@ -1,0 +1,77 @@
+"""`paramove arm verify`: calibration file, description and servos compared."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from paramove.cli.arm_options import (
+    BaudOption,
+    ByIdOption,
+    DataOption,
+    OpenArm,
+    SerialOption,
+    ended,
+    explained,
+    open_arm,
+)
+from paramove.cli.bus_options import JsonOption, show
+from paramove.robots.dynamixel.arm_calibration import sign_again
+from paramove.robots.dynamixel.arm_plan import load_plan
+from paramove.robots.dynamixel.servo_settings import adopted, compare, write_settings
+from paramove.supervision import exit_codes
+
+FINDING = 3
+
+
+def verify(
+    robot: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="description, which is then compared too")
+    ] = None,
+    write: Annotated[bool, typer.Option("--write", help="write the file's settings to the servos")] = False,
+    adopt: Annotated[
+        bool, typer.Option("--adopt", help="take the servos' firmware, modes and limits into the file")
+    ] = False,
+    sign: Annotated[bool, typer.Option("--sign", help="the file was edited on purpose: renew its sha256")] = False,
+    serial: SerialOption = "",
+    baud_rate: BaudOption = 0,
+    by_id: ByIdOption = None,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the calibration of the arm with its servos: models, firmware, modes, limits, offsets, delays.
+
+    Reads only, without --write, --adopt or --sign.
+
+    Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or a
+    servo stopped answering; 78 the file is damaged, edited and not signed, or of another arm.
+    """
+    if write and adopt:
+        raise ended("--write and --adopt are contrary: choose one", exit_codes.USAGE)
+    with explained():
+        plan = None if robot is None else load_plan(robot)
+    with open_arm(by_id, serial, data, baud_rate) as arm:
+        if sign:
+            sign_again(arm.path)
+        if write:
+            _write(arm)
+        if adopt:
+            adopted(arm.chain, arm.calibration()).save(arm.path)
+        rows = [asdict(one) for one in compare(arm.chain, arm.calibration(), plan)]
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+    else:
+        show(rows, as_json=False)
+        typer.echo(f"{arm.path}: {len(rows) or 'no'} difference{'s' * (len(rows) != 1)}")
+    if rows:
+        raise typer.Exit(FINDING)
+
+
+def _write(arm: OpenArm) -> None:
+    for name, joint in arm.calibration().joints.items():
+        for register, (before, after) in write_settings(arm.chain, joint).items():
+            typer.echo(f"{name}: {register} {before} is now {after}", err=True)

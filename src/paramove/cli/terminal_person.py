@@ -1,0 +1,102 @@
+"""The person at the terminal: keys where there is one, lines where another program speaks."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+import termios
+import tty
+from collections.abc import Callable, Iterator
+from typing import IO, Any
+
+import typer
+
+from paramove.supervision.processes import printable
+
+PERIOD_S = 0.02
+"""From look to look: a joint that is moved by hand turns by a few degrees."""
+UP_AND_CLEAR = "\x1b[1A\x1b[2K"
+DONE, QUIT = ("\n", "\r"), ("q", "\x03", "\x04")
+
+
+class QuitError(Exception):
+    """The person wants to end, or the input has ended."""
+
+
+class TerminalPerson:
+    """Asks on the standard output and reads the standard input, never the whole keyboard.
+
+    At a terminal Enter says that something is done, and q ends. Otherwise lines do: an empty one or "q"; any other has
+    the lines that are looked at printed, and the wait goes on.
+    """
+
+    def __init__(self, source: IO[Any] | None = None) -> None:
+        self._source = source or sys.stdin
+
+    def tell(self, sentence: str) -> None:
+        """Say something that needs no answer."""
+        typer.echo(printable(sentence))
+
+    def until_done(self, request: str, look: Callable[[], list[str]]) -> None:
+        """Ask, and look again and again until it is done. Raises QuitError."""
+        typer.echo(f"{printable(request)} Enter when it is done, q to end.")
+        if self._source.isatty():
+            self._keys(look)
+        else:
+            self._lines(look)
+
+    def _keys(self, look: Callable[[], list[str]]) -> None:
+        shown = 0
+        with _unbuffered(self._source.fileno()) as descriptor:
+            while True:
+                lines = look()
+                if sys.stdout.isatty():
+                    typer.echo(UP_AND_CLEAR * shown + "".join(f"  {printable(line)}\n" for line in lines), nl=False)
+                    shown = len(lines)
+                if select.select([descriptor], [], [], PERIOD_S)[0]:
+                    key = os.read(descriptor, 1).decode(errors="replace")
+                    if key in DONE:
+                        return
+                    if key in QUIT or not key:
+                        raise QuitError
+
+    def _lines(self, look: Callable[[], list[str]]) -> None:
+        while True:
+            lines = look()
+            word = self._line(look)
+            if word.strip() == "" and word:
+                return
+            if word.strip() in QUIT or not word:
+                raise QuitError
+            for line in lines:
+                typer.echo(f"  {printable(line)}")
+
+    def _line(self, look: Callable[[], list[str]]) -> str:
+        """The next line, looking while it is waited for."""
+        try:
+            descriptor = self._source.fileno()
+        except OSError:  # not a file of the system: it is all there
+            return str(self._source.readline())
+        line = b""
+        while not line.endswith(b"\n"):
+            if not select.select([descriptor], [], [], PERIOD_S)[0]:
+                look()
+                continue
+            byte = os.read(descriptor, 1)
+            if not byte:
+                break
+            line += byte
+        return line.decode(errors="replace")
+
+
+@contextlib.contextmanager
+def _unbuffered(descriptor: int) -> Iterator[int]:
+    """The terminal gives each key at once, and does not show it; as it was afterwards."""
+    before = termios.tcgetattr(descriptor)
+    tty.setcbreak(descriptor)
+    try:
+        yield descriptor
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
