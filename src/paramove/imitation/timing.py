@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -75,3 +77,62 @@ def resampled(times: FloatArray, values: FloatArray, period: float) -> tuple[Flo
     n = max(1, int(np.ceil(times[-1] / period - 1e-9)))
     at = np.linspace(0.0, times[-1], n + 1)
     return np.asarray(period * np.arange(n + 1)), np.asarray(CubicSpline(times, values, axis=0)(at))
+
+
+def smoothed(values: FloatArray, width: float) -> FloatArray:
+    """Near the values [K, ...], with the same ends, and bent as little as possible over about `width` of them."""
+    n = len(values)
+    bends = np.diff(np.eye(n), 2, axis=0)
+    inner = (np.eye(n) + width**4 * bends.T @ bends)[1:-1]
+    right = values[1:-1] - np.tensordot(inner[:, [0, -1]], values[[0, -1]], axes=1)
+    return np.concatenate([values[:1], np.linalg.solve(inner[:, 1:-1], right), values[-1:]])
+
+
+def ramped(u: FloatArray, share: float = 0.25) -> FloatArray:
+    """Even progress 0 to 1 for u in 0 to 1 that begins and ends at rest, without a jump of acceleration.
+
+    The speed rises over the first `share` and falls over the last, which are at most half each.
+    """
+    rising, falling = np.clip(u / share, 0.0, 1.0), np.clip((1.0 - u) / share, 0.0, 1.0)
+    even = np.clip(u - share, 0.0, 1.0 - 2.0 * share)
+    way = share * (_ramp(rising) + 0.5 - _ramp(falling)) + even
+    return np.asarray(way / (1.0 - share))
+
+
+def _ramp(x: FloatArray) -> FloatArray:
+    """Way of a speed 3 x² - 2 x³ that rises from 0 to 1; half of the time at full speed."""
+    return np.asarray(x**3 - 0.5 * x**4)
+
+
+def rest_to_rest(
+    knots: FloatArray,
+    duration: float,
+    period: float,
+    limits: tuple[FloatArray, FloatArray, FloatArray],
+    progress: Callable[[FloatArray], FloatArray] = minimum_jerk,
+) -> FloatArray:
+    """A curve through joint angles, sampled evenly from rest to rest, all of it slowed until the limits are kept.
+
+    Args:
+        knots: [K, J], rad, at even progress.
+        duration: s, at least.
+        period: Of the samples, s.
+        limits: Largest velocity, acceleration and jerk, [J] each, rad/s, rad/s², rad/s³.
+        progress: Along the knots, 0 to 1, for shares of the duration.
+
+    Returns:
+        [N, J], rad, from the first knot to the last.
+    """
+    curve = CubicSpline(np.linspace(0.0, 1.0, len(knots)), knots, axis=0)
+    velocity, acceleration, jerk = limits
+    n = max(2, int(np.ceil(duration / period)))
+    while True:
+        values = np.asarray(curve(progress(np.arange(n + 1) / n)))
+        resting = np.concatenate([values[:1]] * 3 + [values] + [values[-1:]] * 3)
+        rough = np.abs(np.diff(resting, 3, axis=0)).max(axis=0) / period**3
+        excess = max(
+            largest_excess(values, period, velocity, acceleration), float(np.cbrt(rough / jerk).max(initial=0.0))
+        )
+        if excess <= 1.0:
+            return values
+        n = int(np.ceil(1.01 * excess * n))

@@ -116,6 +116,19 @@ class PlanarArm:
             return np.asarray(good[0])
         return np.asarray(good[np.abs(good - np.asarray(near)).max(axis=-1).argmin()])
 
+    def all_joint_angles(self, positions: ArrayLike, pitches: ArrayLike) -> FloatArray:
+        """All that bring the end effector to positions with pitches, and roll 0; nan where none is within the limits.
+
+        Args:
+            positions: Shape [..., 3], frame of the base, m.
+            pitches: Shape [...], broadcast with the positions', rad.
+
+        Returns:
+            Shape [..., 4, J], rad: facing the position or with the back to it, the elbow above or below.
+        """
+        found = self._solutions(np.asarray(positions, dtype=np.float64), np.asarray(pitches), 0.0, None)
+        return np.where(self._within(found)[..., None], found, np.nan)
+
     def nearest_pitch(self, position: ArrayLike, pitch: float, roll: float = 0.0) -> float:
         """The reachable pitch nearest to the wanted one, to a millionth of a radian, from a search in half degrees.
 
