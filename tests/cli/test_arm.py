@@ -111,7 +111,7 @@ def hands(bench, stop_at=None):
             with bench.emulator.lock:
                 for servo, planned in zip(bench.emulator.bus.servos, PLAN.servos, strict=True):
                     if planned.joint in angles:
-                        servo.position = 2048.0 + COUNTS_PER_RAD * angles[planned.joint]
+                        servo.turned(2048.0 + COUNTS_PER_RAD * angles[planned.joint])
 
         return act
 

@@ -47,7 +47,7 @@ class SmallArm:
         with self.emulator.lock:
             for servo, (joint, zero) in zip(self.emulator.bus.servos, ZEROS.items(), strict=True):
                 if joint in angles:
-                    servo.position = float(zero + SIGNS[joint] * COUNTS_PER_RAD * angles[joint])
+                    servo.turned(float(zero + SIGNS[joint] * COUNTS_PER_RAD * angles[joint]))
 
     def memory(self, joint: str) -> dict[str, int]:
         """Numbers of a joint's servo."""

@@ -9,7 +9,6 @@ from paramove.robots.dynamixel.hardware_error import in_words
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250, XM430_W350
 from paramove.robots.dynamixel.servo_port import ServoPort
-from tests.robots.dynamixel.colliding_answers import CollidingAnswers
 
 LATENCY_S = 0.1
 PAIRED = ((XL330_M288, 1), (XL430_W250, 3), (XL330_M288, 3))
@@ -57,7 +56,7 @@ def test_two_servos_of_one_id_are_told():
     """Of the same model: to a ping both say the same, but they do not stand in the same place."""
     servos = [EmulatedServo(XL330_M288, number, 1_000_000) for number in (1, 2, 2)]
     servos[2].temperature, servos[2].voltage = 41.0, 4.6
-    found = scanned(servos, (1_000_000,), faults=CollidingAnswers())
+    found = scanned(servos, (1_000_000,))
     assert [one.number for one in found.servos] == [1]
     assert found.shared_ids == ((1_000_000, 2),)
     assert "ID 2 at 1000000 answers with damaged bytes: probably two servos have this ID" in found.findings()[0]
@@ -66,7 +65,7 @@ def test_two_servos_of_one_id_are_told():
 def test_two_models_of_one_id_are_told():
     """Already a ping is damaged, so IDs are asked one by one."""
     servos = [EmulatedServo(model, number, 1_000_000) for model, number in PAIRED]
-    found = scanned(servos, (1_000_000,), range(5), faults=CollidingAnswers())
+    found = scanned(servos, (1_000_000,), range(5))
     assert [one.number for one in found.servos] == [1]
     assert found.shared_ids == ((1_000_000, 3),)
 

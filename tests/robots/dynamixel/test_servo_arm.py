@@ -111,8 +111,10 @@ def test_all_that_is_wrong_is_told_together(arm, emulator):
         emulator.bus.servos[1].memory["Drive Mode"] = 1
         emulator.bus.servos[2].temperature = 71.0
     assert [(fault.code, fault.joint) for fault in arm.check()] == [
+        ("hardware_error", "pan"),
         ("servo_voltage", "pan"),
         ("servo_settings", "lift"),
+        ("hardware_error", "wrist"),
         ("servo_hot", "wrist"),
     ]
 

@@ -123,6 +123,6 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(chain, emulator
     servo = emulator.bus.servos[0]
     for place in range(1000, 1020):
         with emulator.lock:
-            servo.position = float(place)
+            servo.turned(float(place))
         found = positions(chain, 1)
         assert found in ({}, {1: place})

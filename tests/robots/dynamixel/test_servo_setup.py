@@ -9,7 +9,6 @@ from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, XL330_M288, XL430_W250
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.servo_setup import only_servo, set_up
-from tests.robots.dynamixel.colliding_answers import CollidingAnswers
 
 RATES = (2_000_000, 1_000_000)
 
@@ -48,7 +47,6 @@ def test_two_servos_are_refused(connected):
     with pytest.raises(InputError, match=r"exactly one servo .*found ID 1 \(xl330_m288\), ID 4 .*connect one alone"):
         only_servo(chain, RATES)
     chain, emulator = connected(EmulatedServo(XL330_M288, 1, 2_000_000), EmulatedServo(XL330_M288, 1, 2_000_000))
-    emulator.faults = CollidingAnswers()
     emulator.bus.servos[1].temperature = 45.0
     with pytest.raises(InputError, match="two with the same ID"):
         only_servo(chain, RATES)

@@ -105,15 +105,15 @@ def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, id
 
 def _heard(chain: ServoChain, ids: Sequence[int]) -> Iterator[tuple[int, FoundServo | None]]:
     """IDs at the port's baud rate with their servos, None where damaged answers come."""
-    damaged = chain.counts.damaged
+    noise = chain.counts.noise
     pinged = {one.number: one for one in chain.ping_all()}
-    asked = ids if chain.counts.damaged > damaged else sorted(pinged)
+    asked = ids if chain.counts.noise > noise else sorted(pinged)
     for number in asked:
-        damaged, stray = chain.counts.damaged, chain.counts.stray
+        noise, stray = chain.counts.noise, chain.counts.stray
         answer = pinged.get(number) or chain.ping(number)
         servo = looked_at(chain, answer) if answer else None
         failed = servo is None or servo.torque is None
-        if failed and (chain.counts.damaged > damaged or chain.counts.stray > stray):
+        if failed and (chain.counts.noise > noise or chain.counts.stray > stray):
             yield number, None
         elif servo is not None:
             yield number, servo

@@ -167,6 +167,12 @@ class ServoBody:
         self._shaft, self.position = shaft, self._direction * shaft
         self._settle()
 
+    def turned(self, position: float) -> None:
+        """Somebody has turned the shaft of a servo that carries nothing: it is there, pulses, and stands."""
+        self.position, self.velocity = position, 0.0
+        self.loops.begin(position)
+        self.present()
+
     @property
     def _direction(self) -> int:
         return -1 if self.memory["Drive Mode"] & REVERSE else 1

@@ -13,7 +13,15 @@ from dataclasses import dataclass
 
 from dynamixel_sdk import COMM_SUCCESS, Protocol2PacketHandler
 
-from paramove.robots.dynamixel.packets import ALERT, BROADCAST, DamagedPacket, Instruction, Packet, PacketReader
+from paramove.robots.dynamixel.packets import (
+    ALERT,
+    BROADCAST,
+    DamagedPacket,
+    Instruction,
+    Packet,
+    PacketReader,
+    encoded,
+)
 from paramove.robots.dynamixel.packets import StatusError as Status
 from paramove.robots.dynamixel.servo_models import Register
 from paramove.robots.dynamixel.servo_port import ServoPort
@@ -84,6 +92,7 @@ class WireCounts:
         asked: Answers that were expected.
         missing: Those that did not come in time.
         damaged: Packets with a wrong checksum.
+        noise: Bytes that belonged to no sound packet, those of damaged ones among them.
         stray: Answers of the wrong length, or together with one of a servo that was not asked or answered twice.
         echoed: Own packets that came back.
     """
@@ -91,6 +100,7 @@ class WireCounts:
     asked: int = 0
     missing: int = 0
     damaged: int = 0
+    noise: int = 0
     stray: int = 0
     echoed: int = 0
 
@@ -122,7 +132,7 @@ class ServoChain:
         Args:
             longest_s: To wait for them; 0: as long as 253 of them may take at most.
 
-        Two servos of one ID talk at the same time: then `counts.damaged` grows.
+        Two servos of one ID talk at the same time: then `counts.noise` grows.
         """
         packet = [0, 0, 0, 0, BROADCAST, 3, 0, Instruction.PING, 0, 0]
         self._send(lambda: self._sdk.txPacket(self.port, packet))
@@ -226,12 +236,16 @@ class ServoChain:
         """
         reader, found = PacketReader(), list[Packet]()
         waited_for = set(sizes)
+        noise = 0
         while waited_for or not sizes:
             data = self.port.readPort(MOST_BYTES)
+            noise += len(data)
             for packet in reader.feed(data):
                 if isinstance(packet, DamagedPacket):
                     self.counts.damaged += 1
-                elif packet.instruction != Instruction.STATUS:
+                    continue
+                noise -= len(encoded(packet))
+                if packet.instruction != Instruction.STATUS:
                     self.counts.echoed += 1
                 elif not sizes or _fits(packet, set(sizes.values())):
                     waited_for.discard(packet.id)
@@ -240,6 +254,7 @@ class ServoChain:
                     self.counts.stray += 1
             if not data and self.port.isPacketTimeout():
                 break
+        self.counts.noise += noise
         return found
 
     def _trusted(self, answers: list[Packet], sizes: dict[int, int]) -> dict[int, Packet]:
