@@ -1,4 +1,4 @@
-"""Poses in which a servo arm's hand is at a place: its pitch, clear of the table; and the nearest place if none."""
+"""Poses in which a servo arm's hand is at a place, clear of the table; and the nearest place where there is none."""
 
 from __future__ import annotations
 

@@ -52,6 +52,8 @@ class ServoArmReaching:
     Attributes:
         joints: Names, the gripper last.
         base_angles: Where motions end that go home.
+        lower, upper: What the angles keep to.
+        start_tolerance: How far from where it is commanded to be a motion of this robot may begin, rad.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class ServoArmReaching:
         rates = (description.operating_velocity, description.operating_acceleration, description.jerk)
         velocity, acceleration, jerk = (o.limit_share * limit[indices] for limit in rates)
         self._limits = (velocity, acceleration, jerk)
+        self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
         self._clearance = TableClearance(description, chain, o.table_z)
         self._poses = HandPoses(chain, self._clearance, self._gripper(o.work_opening))

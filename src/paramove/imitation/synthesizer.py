@@ -17,7 +17,8 @@ from paramove.imitation.arm_state import FELT_OPENING, ArmState
 from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
 from paramove.imitation.goals import FRAME, GoalRefusedError, centimetres, hull_of, point_of, standing_of
 from paramove.imitation.motion import PlannedMotion
-from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint, TrajectoryStatus
+from paramove.imitation.motion_message import motion_message
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 
 FloatArray = NDArray[np.float64]
@@ -290,7 +291,8 @@ class Synthesizer:
         running.motions += 1
         running.motion, running.acknowledged, running.time_s, running.stale = step, False, 0.0, 0
         running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
-        running.message = self._trajectory(f"{running.goal.id}/{running.motions}", step)
+        joints = (*self._arm.joints, self._arm.fingers)
+        running.message = motion_message(f"{running.goal.id}/{running.motions}", joints, step, self._now_ns)
         running.sent_ns = self._now_ns
         self._trajectories.append(running.message)
 
@@ -299,15 +301,6 @@ class Synthesizer:
         self._running = None
         state = RelocationStatus.STATE_SUCCEEDED if outcome.done else RelocationStatus.STATE_FAILED
         self._say(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
-
-    def _trajectory(self, name: str, motion: PlannedMotion) -> JointTrajectory:
-        message = JointTrajectory(id=name, joints=[*self._arm.joints, self._arm.fingers])
-        message.captured.FromNanoseconds(self._now_ns)
-        message.points.extend(
-            TrajectoryPoint(time_s=t, position_rad=q) for t, q in zip(motion.times, motion.angles, strict=True)
-        )
-        message.phases.extend(TrajectoryPhase(name=name, start_s=start) for name, start in motion.phases)
-        return message
 
     def _say_phase(self, running: _Running) -> None:
         assert running.motion is not None

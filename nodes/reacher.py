@@ -1,0 +1,54 @@
+"""Reacher: does a list of tasks with a servo arm by the learned reaching, one after the other, and ends.
+
+Hears   arm/joint_states        foxglove.JointStates    15 Hz   rad
+        arm/safety              SafetyState             15 Hz, latched
+        arm/trajectory_status   TrajectoryStatus        event
+Says    arm/trajectory          JointTrajectory         event   rad
+        speech                  Speech                  event
+"""
+
+from pathlib import Path
+
+from paramove.bus import topics
+from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.imitation.reach_task import ReachStep, ReachTask
+from paramove.imitation.servo_arm_reaching import ServoArmReaching
+from paramove.imitation.setup import MovementSource
+from paramove.robots.description import RobotDescription
+
+HEARS = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)
+SAYS = (topics.ARM_TRAJECTORY, topics.SPEECH)
+
+
+class Config(NodeConfig):
+    """`robot`: folder of the arm's description. `tasks`: see `ReachStep`. `movement`: as of the synthesizer."""
+
+    robot: Path
+    tasks: tuple[ReachStep, ...]
+    movement: MovementSource = MovementSource()
+
+
+def run(bus: Bus, config: Config) -> None:
+    """Loop until all tasks are done, one cannot be done, or the bus closes."""
+    bus.starting("training or reading the reaching movement, and planning the tasks")
+    reaching = ServoArmReaching(RobotDescription.load(config.robot), config.movement.trained())
+    task = ReachTask(reaching, config.tasks, f"reach-{bus.now_ns}")
+    hear = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
+    bus.ready(task.sentence)
+    for event in bus.events(*HEARS, tick=True):
+        if not isinstance(event, Tick):
+            hear[HEARS.index(event.topic)](event.message)
+            continue
+        said = task.tick(event.now_ns)
+        for topic, messages in zip(SAYS, (said.trajectories, said.speech), strict=True):
+            for message in messages:
+                bus.publish(topic, message)
+        if task.failure:
+            bus.failed(task.failure)
+        if task.finished or task.failure:
+            return
+        bus.ready(task.sentence)
+
+
+if __name__ == "__main__":
+    main(run, HEARS, SAYS, Config)
