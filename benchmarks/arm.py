@@ -34,8 +34,8 @@ from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos, servo_port
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
 from paramove.safety.gate_io import State
@@ -93,18 +93,10 @@ class Rig:
 def rig(description: RobotDescription, patience: Patience = BUSY) -> Any:
     """A rig at the description's baud rate; ends with the arm at rest."""
     with (
-        DynamixelEmulator(emulated(description)) as emulator,
+        DynamixelEmulator(emulated_servos(description)) as emulator,
         DrivenArm(description, servo_port(description, emulator.port), patience=patience) as arm,
     ):
         yield Rig(arm, emulator, description)
-
-
-def emulated(description: RobotDescription) -> list[EmulatedServo]:
-    """The arm's servos in its base pose."""
-    places = description.units.to_counts(description.base_pose)
-    baud_rate = description.bus.baud_rate
-    pairs = zip(joint_servos(description), places, strict=True)
-    return [EmulatedServo(joint.model, joint.number, baud_rate, float(place)) for joint, place in pairs]
 
 
 def wait(what: Callable[[], bool]) -> None:
@@ -169,7 +161,7 @@ def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[
     """A process that drives the arm is killed; until all servos rest."""
     found = []
     for _ in range(trials):
-        with DynamixelEmulator(emulated(description)) as emulator:
+        with DynamixelEmulator(emulated_servos(description)) as emulator:
             command = [sys.executable, __file__, "--robot", str(folder), "--drive", emulator.port]
             with subprocess.Popen(command, stdout=subprocess.PIPE) as driver:
                 assert driver.stdout is not None

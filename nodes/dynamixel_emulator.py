@@ -21,7 +21,8 @@ REPORT_TICKS = 75
 class Config(NodeConfig):
     """`port`: a link to the port, `control`: a socket for faults, '' for none; both in the run folder or absolute.
 
-    `scene`: a file beside the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose.
+    `scene`: a file beside the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose;
+    `held`: whether the servos hold from the start.
     """
 
     robot: Path = Path("robot_description/koch_v1_1")
@@ -30,6 +31,7 @@ class Config(NodeConfig):
     control: str = ""
     posture_deg: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
+    held: bool = True
 
 
 def run(bus: Bus, config: Config) -> None:
@@ -37,7 +39,7 @@ def run(bus: Bus, config: Config) -> None:
     robot = RobotDescription.load(config.robot)
     control = bus.run_folder / config.control if config.control else None
     link = bus.run_folder / config.port
-    with EmulatedArm(robot, config.scene, link, control, config.posture_deg, config.seed) as arm:
+    with EmulatedArm(robot, config.scene, link, control, config.posture_deg, config.seed, config.held) as arm:
         bus.ready(arm.sentence)
         for event in bus.events(tick=True):
             if isinstance(event, Tick):

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import joint_servos, servo_port
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.driven_arm import servo_port
+from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 
 ROOT = Path(__file__).parents[2]
@@ -33,12 +33,7 @@ def port(request, robot):
     if name is not None:
         yield servo_port(robot, name)
         return
-    places = robot.units.to_counts(robot.base_pose)
-    servos = [
-        EmulatedServo(joint.model, joint.number, robot.bus.baud_rate, float(place))
-        for joint, place in zip(joint_servos(robot), places, strict=True)
-    ]
-    with DynamixelEmulator(servos) as emulator:
+    with DynamixelEmulator(emulated_servos(robot)) as emulator:
         port = servo_port(robot, emulator.port)
         port.latency_s = PATIENT_S
         yield port

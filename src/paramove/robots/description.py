@@ -72,6 +72,7 @@ class Chain:
         indices: Their places in the robot's joint vector.
         gripper: Name of the joint that closes the gripper; `gripper_index` its place.
         gripper_open, gripper_closed: Its angles, rad.
+        grip_current_ma: With which it holds whatever is between its fingers; None: its servo knows positions only.
         kinematics: Keeps to the robot's soft limits; in the frame of the base site.
     """
 
@@ -81,6 +82,7 @@ class Chain:
     gripper_index: int
     gripper_open: float
     gripper_closed: float
+    grip_current_ma: float | None
     sites: ChainSites
     kinematics: PlanarArm
 
@@ -242,6 +244,7 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: FloatArray, upper: F
         gripper_index=names.index(chain.gripper.joint),
         gripper_open=float(np.deg2rad(chain.gripper.open_deg)),
         gripper_closed=float(np.deg2rad(chain.gripper.closed_deg)),
+        grip_current_ma=chain.gripper.grip_current_ma,
         sites=chain.sites,
         kinematics=PlanarArm(
             names=chain.joints,

@@ -79,6 +79,12 @@ class FingersPart(_Part):
     closed_deg: float
 
 
+class GripperPart(FingersPart):
+    """`grip_current_ma`: with which it holds whatever is between its fingers; none for a servo without such a mode."""
+
+    grip_current_ma: float | None = Field(default=None, gt=0)
+
+
 class ArmSites(_Part):
     """Names of an arm's sites in the model file."""
 
@@ -126,7 +132,7 @@ class ChainPart(_Part):
     """An arm with a yaw, three pitches and perhaps a roll, and a gripper at its end."""
 
     joints: tuple[str, str, str, str] | tuple[str, str, str, str, str]
-    gripper: FingersPart
+    gripper: GripperPart
     sites: ChainSites
     links: ChainLinks
 

@@ -8,8 +8,8 @@ import pytest
 from paramove.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos, servo_port
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
 from tests.robots.dynamixel.person import Person
@@ -50,12 +50,7 @@ class PersonAtEmulator(Person):
 
 @pytest.fixture
 def emulator():
-    places = ROBOT.units.to_counts(ROBOT.base_pose)
-    servos = [
-        EmulatedServo(joint.model, joint.number, 1_000_000, float(place))
-        for joint, place in zip(joint_servos(ROBOT), places, strict=True)
-    ]
-    with DynamixelEmulator(servos) as emulator:
+    with DynamixelEmulator(emulated_servos(ROBOT)) as emulator:
         yield emulator
 
 

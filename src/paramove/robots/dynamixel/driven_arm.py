@@ -21,7 +21,7 @@ from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_loop import ServoLoop
-from paramove.robots.dynamixel.servo_models import model_named
+from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.hoap3.driver import ArmDriver
 from paramove.safety.gate_io import SafetySettings, State
@@ -29,6 +29,8 @@ from paramove.safety.self_collision import SelfCollision
 
 FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from where it is commanded: more means that somebody or something holds it."""
+LATENCY_SHARE = 0.8
+"""Of the loop's period: so long it may wait for a servo. A missing one costs periods, one that is late costs none."""
 SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
 
 
@@ -126,7 +128,8 @@ def servo_port(description: RobotDescription, name: str) -> ServoPort:
     """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus."""
     if description.bus is None:
         raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
-    return ServoPort(name, description.bus.baud_rate)
+    latency_s = LATENCY_SHARE * 1e-6 * description.stream.period_us
+    return ServoPort(name, description.bus.baud_rate, latency_s)
 
 
 def self_collision(description: RobotDescription) -> SelfCollision:
@@ -139,7 +142,18 @@ def self_collision(description: RobotDescription) -> SelfCollision:
 def joint_servos(description: RobotDescription) -> tuple[JointServo, ...]:
     """The servos of a described arm, in the order of its joint vector."""
     rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
-    return tuple(JointServo(name, number, model_named(motor)) for name, number, motor in rows)
+    return tuple(
+        JointServo(name, number, model_named(motor), grip_current=_grip_current(description, name, motor))
+        for name, number, motor in rows
+    )
+
+
+def _grip_current(description: RobotDescription, joint: str, motor: str) -> int | None:
+    """In the servo's units."""
+    chain = description.chain
+    if chain is None or joint != chain.gripper or chain.grip_current_ma is None:
+        return None
+    return round(chain.grip_current_ma / CURRENT_UNIT_MA[motor])
 
 
 def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:

@@ -19,6 +19,7 @@ from paramove.robots.dynamixel.emulated_mechanics import MujocoMechanics, ServoJ
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulated_verbs import EmulatorVerbs
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_memory import CURRENT_BASED_POSITION_MODE
 from paramove.robots.dynamixel.servo_models import model_named
 from paramove.robots.dynamixel.wire_faults import WireFaults
 
@@ -33,6 +34,7 @@ class EmulatedArm:
         control: Where lines of `EmulatorVerbs` are taken; None: nowhere.
         posture_deg: Of joints at the start; others begin in the base pose.
         seed: Of faults on the wire, when there are any.
+        held: Whether the servos hold at the start, as a program before has left them; else the arm falls at once.
     """
 
     def __init__(
@@ -43,9 +45,8 @@ class EmulatedArm:
         control: Path | None = None,
         posture_deg: Mapping[str, float] | None = None,
         seed: int = 0,
+        held: bool = False,
     ) -> None:
-        if robot.bus is None or len(robot.servo_ids) != robot.n_joints:
-            raise InputError(f"{robot.name} is no arm of servos: its robot.yaml has no bus, or joints without servo_id")
         pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
         for name, degrees in (posture_deg or {}).items():
             pose[robot.joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
@@ -57,13 +58,10 @@ class EmulatedArm:
             )
         ]
         self.robot = robot
+        self._servos = emulated_servos(robot)
         self.mechanics = MujocoMechanics(robot.model_path.parent / scene, joints, pose)
         self._objects = _free_bodies(self.mechanics.model)
-        self._servos = [
-            EmulatedServo(model_named(motor), number, robot.bus.baud_rate)
-            for motor, number in zip(robot.motors, robot.servo_ids, strict=True)
-        ]
-        self._link, self._control, self._seed = link, control, seed
+        self._link, self._control, self._seed, self._held = link, control, seed, held
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -72,6 +70,9 @@ class EmulatedArm:
                 self._link.parent.mkdir(parents=True, exist_ok=True)
             self.emulator = opened.enter_context(DynamixelEmulator(self._servos, self._link, self.mechanics))
             self.emulator.faults = WireFaults(seed=self._seed)
+            with self.emulator.lock:
+                for servo in self._servos if self._held else ():
+                    servo.hold()
             if self._control is not None:
                 names = dict(zip(self.robot.joint_names, self.robot.servo_ids, strict=True))
                 opened.enter_context(ControlSocket(self._control, EmulatorVerbs(self.emulator, names).do))
@@ -105,6 +106,23 @@ class EmulatedArm:
                     name=name, x=x, y=y, z=z, quaternion_xyzw=data.body(name).xquat[[1, 2, 3, 0]].tolist()
                 )
         return message
+
+
+def emulated_servos(robot: RobotDescription) -> list[EmulatedServo]:
+    """Servos as the description wants them, in the order of its joints, standing in the base pose.
+
+    Raises:
+        InputError: The robot is no arm of servos.
+    """
+    if robot.bus is None or len(robot.servo_ids) != robot.n_joints:
+        raise InputError(f"{robot.name} is no arm of servos: its robot.yaml has no bus, or joints without servo_id")
+    rows = zip(robot.motors, robot.servo_ids, robot.units.to_counts(robot.base_pose), strict=True)
+    servos = [
+        EmulatedServo(model_named(motor), number, robot.bus.baud_rate, float(count)) for motor, number, count in rows
+    ]
+    if robot.chain is not None and robot.chain.grip_current_ma is not None:
+        servos[robot.chain.gripper_index].preset("Operating Mode", CURRENT_BASED_POSITION_MODE)
+    return servos
 
 
 def _free_bodies(model: mujoco.MjModel) -> list[str]:

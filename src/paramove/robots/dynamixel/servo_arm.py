@@ -25,8 +25,8 @@ from paramove.safety.gate_io import Fault
 Counts = NDArray[np.int16]
 
 WATCHDOG_UNIT_S = 0.020
-NOISE_SHARE, NOISE_ANSWERS = 0.10, 200
-"""More answers lost than this, of about so many, and the wire is not fit to move by."""
+NOISE_SHARE, NOISE_EXCHANGES = 0.2, 50
+"""More exchanges with damaged bytes than this, of about so many, and the wire is not fit to move by."""
 LOW_VOLTAGE_SHARE = 0.10
 
 
@@ -199,15 +199,15 @@ class ServoArm:
 
     def _fault_of_noise(self) -> Fault | None:
         counts = self._chain.counts
-        asked, missing = counts.asked - self._noise_mark[0], counts.missing - self._noise_mark[1]
-        if asked >= NOISE_ANSWERS:
-            self._noise_mark = (counts.asked, counts.missing)
-            self._noisy = missing > NOISE_SHARE * asked
+        exchanges, noisy = counts.exchanges - self._noise_mark[0], counts.noisy - self._noise_mark[1]
+        if exchanges >= NOISE_EXCHANGES:
+            self._noise_mark = (counts.exchanges, counts.noisy)
+            self._noisy = noisy > NOISE_SHARE * exchanges
         if not self._noisy:
             return None
         sentence = (
-            f"more than {NOISE_SHARE:.0%} of the servos' answers are lost or damaged ({counts.damaged} damaged since "
-            "the start): check cable, plugs and supply; two servos may have one ID"
+            f"more than {NOISE_SHARE:.0%} of the exchanges on the bus are damaged ({counts.noisy} of "
+            f"{counts.exchanges} so far): check cable, plugs and supply; two servos may have one ID"
         )
         return Fault("bus_noise", "", sentence)
 

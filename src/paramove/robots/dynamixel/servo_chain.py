@@ -89,6 +89,8 @@ class WireCounts:
     """What came over the wire since the chain was made.
 
     Attributes:
+        exchanges: Questions with an answer.
+        noisy: Exchanges with bytes that belonged to no sound packet.
         asked: Answers that were expected.
         missing: Those that did not come in time.
         damaged: Packets with a wrong checksum.
@@ -97,6 +99,8 @@ class WireCounts:
         echoed: Own packets that came back.
     """
 
+    exchanges: int = 0
+    noisy: int = 0
     asked: int = 0
     missing: int = 0
     damaged: int = 0
@@ -254,6 +258,8 @@ class ServoChain:
                     self.counts.stray += 1
             if not data and self.port.isPacketTimeout():
                 break
+        self.counts.exchanges += 1
+        self.counts.noisy += noise > 0
         self.counts.noise += noise
         return found
 

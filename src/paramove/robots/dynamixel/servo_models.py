@@ -203,3 +203,7 @@ def model_named(name: str) -> ServoModel:
     if name not in MODELS:
         raise InputError(f"servo model {name!r} is not known, found are {', '.join(sorted(MODELS))}")
     return MODELS[name]
+
+
+CURRENT_UNIT_MA = {"xm430_w350": 2.69, "xm430_w210": 2.69, "xl330_m288": 1.0, "xl330_m077": 1.0}
+"""mA of one unit of Goal Current (102) (e-Manual, "Goal Current"); XL430 has none."""
