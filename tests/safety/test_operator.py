@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from pydantic import ValidationError
 
@@ -31,12 +33,25 @@ def test_arms_once_when_the_gate_is_disarmed() -> None:
 
 
 def test_a_gate_found_armed_or_in_hold_is_left_alone() -> None:
-    for state in (SafetyState.STATE_ARMED, SafetyState.STATE_HOLD, SafetyState.STATE_STOPPING):
+    for state in (SafetyState.STATE_ARMED, SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP):
         assert Operator(arms_at_start=True).update(said(state), 0) is None
 
 
 def test_without_leave_it_never_arms() -> None:
     assert Operator(arms_at_start=False).update(said(SafetyState.STATE_DISARMED), 0) is None
+
+
+def test_once_an_earlier_process_has_armed_it_arms_no_more(tmp_path: Path) -> None:
+    memory = tmp_path / "armed"
+    first = Operator(arms_at_start=True, memory=memory)
+    assert not memory.exists()
+    assert first.update(said(SafetyState.STATE_DISARMED), 0) is not None
+    assert memory.exists()
+    second = Operator(arms_at_start=True, memory=memory)
+    assert second.update(said(SafetyState.STATE_DISARMED), 0) is None
+    assert second.sentence.startswith("does not arm: an operator of this run has armed before")
+    assert first.sentence == "arms once at the start"
+    assert Operator(arms_at_start=False, memory=memory).sentence == "does not arm"
 
 
 def test_a_real_robot_is_for_a_person_to_arm() -> None:

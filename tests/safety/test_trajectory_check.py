@@ -68,6 +68,7 @@ def test_a_start_within_two_degrees_is_faded_in_from_the_commanded_pose() -> Non
         ([0, 1], [[0, 0], [0]], JOINTS, "joints", 1, ""),
         ([0, 1, 1], [[0, 0]] * 3, JOINTS, "times", 2, ""),
         ([0, 2, 1], [[0, 0]] * 3, JOINTS, "times", 2, ""),
+        ([0, 1], [[0, 0]] * 3, JOINTS, "times", -1, ""),
         ([0.5, 1], [[0, 0]] * 2, JOINTS, "times", 0, ""),
         ([0, 1, float("nan")], [[0, 0]] * 3, JOINTS, "not_finite", 2, ""),
         ([0, 500], [[0, 0]] * 2, JOINTS, "times", 1, ""),
@@ -92,11 +93,39 @@ def test_refused_with_the_point_and_the_joint(
     assert refusal.value.allowed
 
 
+def test_a_joint_that_is_held_outside_its_range_may_begin_there_and_come_in_slowly() -> None:
+    held = HOAP3.base_pose.copy()
+    held[PLACES[1]] = LIMITS.upper[PLACES[1]] + np.deg2rad(0.8)
+    start = held[PLACES]
+
+    def to(times: list[float], elbow_deg: float) -> CheckedPath:
+        points = [list(start), [start[0], start[1] + np.deg2rad(elbow_deg)]]
+        return check_trajectory(JOINTS, times, points, held, LIMITS, np.deg2rad(2.0))
+
+    rows = to([0, 2], -10.0).rows
+    np.testing.assert_array_equal(rows[0], held)
+    with pytest.raises(TrajectoryRefusedError, match="velocity"):
+        to([0, 0.42], -36.0)
+    with pytest.raises(TrajectoryRefusedError, match="joint_limit"):
+        to([0, 2], 0.1)
+
+
 def test_a_trajectory_that_ends_in_motion_is_refused() -> None:
     times = [0.001 * i for i in range(201)]
     ramp = [[-0.5 * 900 * t**2, 0.0] for t in times]
     with pytest.raises(TrajectoryRefusedError, match="acceleration"):
         check(times, ramp)
+
+
+def test_a_tremble_within_velocity_and_acceleration_breaks_the_jerk() -> None:
+    times = 0.002 * np.arange(301)
+    size = np.sin(np.pi * times / times[-1]) ** 4
+    tremble = [[float(angle), 0.0] for angle in size * np.sin(100.0 * times)]
+    assert check(list(times), [[0.1 * a, 0.0] for a, _ in tremble]).duration_s == times[-1]
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check(list(times), [[0.14 * a, 0.0] for a, _ in tremble])
+    assert (refusal.value.code, refusal.value.joint) == ("jerk", "right_shoulder_pitch")
+    assert refusal.value.asked.endswith("deg/s³")
 
 
 @settings(deadline=None, max_examples=60, derandomize=True)

@@ -152,7 +152,8 @@ class SafetyCore:
     def _hear(self, now_ns: int, word: ArmWord, measured: Measured, inputs: Inputs) -> Targets | None:
         if word.captured_ns <= self._heard_ns:
             return None
-        self._heard_ns = word.captured_ns
+        # One from the future must not silence those to come.
+        self._heard_ns = max(self._heard_ns, min(word.captured_ns, now_ns))
         too_often = self._words.exceeded(now_ns)
         if not word.armed:
             if self.state is State.STOPPING:
@@ -171,13 +172,13 @@ class SafetyCore:
             if not refusals:
                 self.state = State.ARMED
                 self._accepted.clear()
-                self._played = measured.next_index
+                self._played = max(0, measured.next_index)
         return None
 
     def _age_fault(self, now_ns: int, word: ArmWord) -> tuple[Fault, ...]:
         """A word to arm counts only while the person who said it still looks; one to disarm always counts."""
         age_ms, allowed_ms = (now_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
-        if age_ms <= allowed_ms:
+        if abs(age_ms) <= allowed_ms:
             return ()
         sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
         return (Fault("arming_stale", "", sentence),)

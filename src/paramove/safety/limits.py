@@ -116,9 +116,10 @@ class MotionLimits:
             rest_at_end: Judge as if the last row were held after the end.
             stopping: Judge by what a controlled stop may use, with rest at the end.
         """
-        found = self._first("not_finite", ~np.isfinite(rows), rows, "a finite number", 1.0, "")
-        if found is not None:
-            return found
+        for known in (before, rows):
+            found = self._first("not_finite", ~np.isfinite(known), known, "a finite number", 1.0, "")
+            if found is not None:
+                return found
         history = self.history
         parts = [np.repeat(before[:1], max(0, history - len(before)), axis=0), before[-history:], rows]
         if rest_at_end or stopping:
@@ -152,7 +153,7 @@ class MotionLimits:
             ("jerk", jerks, jerk, "deg/s³"),
         ):
             values, limits = np.abs(found), np.broadcast_to(limit, found.shape)
-            # Written so that a NaN among the rows before is a violation too.
+            # Written so that a NaN would be a violation too.
             violation = self._first(
                 code, ~(values <= limits), values, f"{{limit:.4g}} {unit}", 180 / np.pi, unit, limits
             )

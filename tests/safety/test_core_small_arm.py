@@ -1,0 +1,291 @@
+"""The gate of an arm at 100 Hz: what is checked at arming, how often it is asked, reports, following, clearance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.safety_steps import MS
+from paramove.safety.gate_io import ArmWord, Fault, SafetySettings, State
+from paramove.safety.stop_ramp import straight_move
+from tests.safety.small_arm import HOME, LIMITS, PATH, SmallArm
+
+VOLTAGE, MODEL = Fault("voltage", "", "9.1 V, allowed 11 to 13 V"), Fault("model", "wrist", "XL430, allowed XM430")
+
+
+def test_a_movement_at_100_hz_passes_unchanged() -> None:
+    arm = SmallArm()
+    arm.arm()
+    arm.follow(PATH, len(PATH))
+    assert arm.core.faults == ()
+    np.testing.assert_array_equal(arm.stream[1 : len(PATH) + 1], PATH)
+    np.testing.assert_array_equal(arm.core.held(len(PATH)), PATH[-1])
+
+
+def test_all_failing_checks_are_told_together_and_nobody_is_armed() -> None:
+    arm = SmallArm()
+    away = np.array([0.0, 2.1, np.nan])
+    robot = replace(arm.measured(), captured_ns=arm.now + 10 * MS, at_rest=False, commanded=np.array([0, -2.1, 0]))
+    word = ArmWord(arm.now + 10 * MS, "", True)
+    _, state, faults = arm.step(measured=robot, word=word, arming_faults=(VOLTAGE, MODEL))
+    assert state is State.DISARMED
+    assert faults == ("voltage", "model", "arming_source", "arming_moving", "arming_pose_outside")
+    word = replace(word, captured_ns=word.captured_ns + 10 * MS, source="a person")
+    _, state, faults = arm.step(measured=replace(arm.measured(), captured_ns=arm.now, positions=away), word=word)
+    assert (state, faults) == (State.DISARMED, ("arming_pose_unknown",))
+    assert arm.arm()[1:] == (State.ARMED, ())
+    # A check that fails later forbids arming, it does not stop.
+    assert arm.step(arming_faults=(VOLTAGE,))[1:] == (State.ARMED, ())
+
+
+@pytest.mark.parametrize(("offset", "arms"), [(0.008, True), (0.0095, False), (-0.0095, True)])
+def test_the_pose_may_lie_half_a_degree_outside_the_mechanical_range(offset: float, arms: bool) -> None:
+    arm = SmallArm()
+    arm.stream = np.array([[2.0 + offset, 0.0, 0.0]])
+    _, state, faults = arm.arm()
+    assert (state is State.ARMED) is arms
+    if not arms:
+        sentence = arm.core.faults[0].sentence
+        assert sentence == (
+            "joint shoulder is measured at 115.14 deg, allowed -114.59 to 114.59 deg; move it inside by hand"
+        )
+        assert faults == ("arming_pose_outside", "arming_pose_outside")
+
+
+def test_outside_its_soft_range_an_arm_comes_back_slowly() -> None:
+    arm = SmallArm()
+    arm.stream = np.array([[1.6, 0.0, 0.0]])
+    arm.arm()
+    slow = 1.6 - 0.3 * (lambda u: 10 * u**3 - 15 * u**4 + 6 * u**5)(np.linspace(0, 1, 150)[1:])
+    path = np.zeros((149, 3))
+    path[:, 0] = slow
+    arm.follow(path, 149)
+    assert (arm.core.state, arm.core.faults) == (State.ARMED, ())
+    np.testing.assert_allclose(arm.stream[-1], [1.3, 0, 0], rtol=0, atol=1e-12)
+    arm = SmallArm()
+    arm.stream = np.array([[1.6, 0.0, 0.0]])
+    arm.arm()
+    path[:, 0] = 3.2 - slow
+    assert arm.step(proposal=lambda: arm.proposal(path))[1:] == (State.HOLD, ("joint_limit",))
+
+
+@pytest.mark.parametrize("rate", [None, 100.0])
+def test_more_proposals_than_the_rate_allows_stop_the_arm(rate: float | None) -> None:
+    arm = SmallArm(SafetySettings(proposals_per_s=rate))
+    arm.arm()
+    for _ in range(60):
+        arm.step(proposal=arm.proposal)
+    assert arm.core.state is State.ARMED, "the nominal rate passes"
+    for k in range(40):
+        arm.step(ms=0, proposal=replace(arm.proposal(), captured_ns=arm.now - k))
+    assert arm.core.state is (State.ARMED if rate is None else State.STOPPING)
+    assert [fault.code for fault in arm.core.faults] == ([] if rate is None else ["rate"])
+
+
+def test_the_same_proposal_again_is_counted_once() -> None:
+    arm = SmallArm(SafetySettings(proposals_per_s=4.0))
+    arm.arm()
+    proposal = arm.proposal()
+    for _ in range(20):
+        arm.step(ms=0, proposal=proposal)
+    assert arm.core.state is State.ARMED
+
+
+def test_arm_words_that_come_too_often_do_not_arm_but_those_that_disarm_are_heard() -> None:
+    arm = SmallArm(SafetySettings(words_per_s=20.0))
+    for k in range(6):
+        assert arm.step(word=ArmWord(arm.now + 10 * MS, "a person", k % 2 == 0))[1] is (
+            State.ARMED if k % 2 == 0 else State.DISARMED
+        )
+    assert arm.arm()[1:] == (State.DISARMED, ("arming_rate",))
+    assert "6 within 250 ms" in arm.core.faults[0].sentence
+    arm.step(ms=300)
+    assert arm.arm()[1] is State.ARMED
+    for _ in range(10):
+        state = arm.step(ms=1, word=ArmWord(arm.now + MS, "a person", False))[1]
+    assert state is State.DISARMED
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"positions": np.zeros(2)},
+        {"commanded": np.zeros((1, 3))},
+        {"next_index": -1},
+        {"next_index": 10_000},
+        {"next_index": 3},
+    ],
+)
+def test_a_report_that_cannot_be_true_stops_the_arm(fields: dict) -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    robot = replace(arm.measured(), captured_ns=arm.now + 10 * MS, **fields)
+    _, state, faults = arm.step(measured=robot, proposal=arm.proposal)
+    assert (state, faults) == (State.STOPPING, ("report",))
+    assert "allowed" in arm.core.faults[0].sentence
+
+
+def test_a_report_from_before_the_stream_is_not_taken_for_a_place_in_it() -> None:
+    arm = SmallArm()
+    arm.arm(measured=replace(arm.measured(), captured_ns=arm.now, next_index=-5))
+    _, state, faults = arm.step(measured=replace(arm.measured(), captured_ns=arm.now, next_index=-5))
+    assert state is not State.ARMED
+    assert faults == ("report",)
+
+
+def test_time_that_goes_back_stops_the_arm() -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    _, state, faults = arm.step(ms=0)
+    assert state is State.ARMED
+    arm.now -= 7 * MS
+    _, state, faults = arm.step(ms=0, proposal=arm.proposal)
+    assert (state, faults) == (State.STOPPING, ("clock",))
+    assert arm.core.faults[0].sentence == "the time went back by 7 ms, allowed 0 ms; arm again"
+
+
+@pytest.mark.parametrize("age_ms", [501, -501])
+def test_a_report_of_another_time_is_silence(age_ms: int) -> None:
+    arm = SmallArm()
+    arm.arm()
+    robot = replace(arm.measured(), captured_ns=arm.now + (10 - age_ms) * MS)
+    assert arm.step(measured=robot)[1:] == (State.DISCONNECTED, ("robot_silent",))
+    assert arm.core.faults[0].sentence.startswith("the robot was last heard 501 ms ago, allowed 500 ms; it comes to")
+
+
+def test_no_report_for_half_a_second_is_silence_too() -> None:
+    arm = SmallArm()
+    arm.arm()
+    assert arm.step(ms=500, measured=None)[1] is State.ARMED
+    assert arm.step(ms=1, measured=None)[1] is State.DISCONNECTED
+    assert arm.step(measured=None)[2] == ("robot_silent",)
+
+
+def test_a_joint_that_is_held_is_given_way_to_in_motion() -> None:
+    arm = SmallArm(SafetySettings(following=np.full(3, 0.1)))
+    arm.in_motion()
+    arm.push = np.array([0.0, 0.15, 0.0])
+    for _ in range(10):
+        assert arm.step(proposal=arm.proposal)[1] is State.ARMED
+    pose = arm.stream[arm.played + 1] + arm.push
+    targets, state, faults = arm.step(proposal=arm.proposal)
+    assert (state, faults) == (State.STOPPING, ("following",))
+    assert arm.core.faults[0].joint == "elbow"
+    assert targets is not None
+    np.testing.assert_allclose(targets.rows[-1], pose, rtol=0, atol=1e-9)
+    assert targets.ramp_rows == len(targets.rows)
+    for _ in range(100):
+        arm.step()
+    assert arm.core.state is State.HOLD
+    assert arm.arm()[2] == ("arming_following",)
+    assert arm.core.faults[0].sentence.startswith("elbow not where commanded")
+    arm.push = np.zeros(3)
+    assert arm.arm()[1] is State.ARMED
+
+
+def test_a_joint_that_is_pushed_at_rest_is_given_way_to() -> None:
+    arm = SmallArm(SafetySettings(following=np.full(3, 0.1)))
+    arm.arm()
+    arm.push = np.array([0.2, 0.0, 0.0])
+    given = [arm.step()[0] for _ in range(12)]
+    assert [targets is not None for targets in given] == [False] * 10 + [True, False]
+    np.testing.assert_allclose(arm.stream[-1], [0.2, 0, 0], rtol=0, atol=1e-12)
+
+
+def test_without_limits_of_following_a_held_joint_stops_nothing() -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    arm.push = np.array([0.0, 0.9, 0.0])
+    for _ in range(20):
+        assert arm.step(proposal=arm.proposal)[1] is State.ARMED
+
+
+class Wall:
+    """A wall that the first joint reaches at an angle of `at` rad, a metre a radian."""
+
+    def __init__(self, at: float) -> None:
+        self.at = at
+
+    def distances(self, q: np.ndarray) -> tuple[float, str, str]:
+        return self.at - float(q[0]), "hand", "wall"
+
+
+@pytest.mark.parametrize(("at", "passes"), [(1.5, True), (0.9, False), (1.003, False)])
+def test_a_movement_to_a_wall_is_refused_before_it_gets_there(at: float, passes: bool) -> None:
+    arm = SmallArm(clearance=Wall(at))
+    arm.arm()
+    arm.follow(PATH, len(PATH))
+    if passes:
+        assert arm.core.faults == ()
+        return
+    assert [fault.code for fault in arm.core.faults] == ["clearance"]
+    assert "hand and wall come within" in arm.core.faults[0].sentence
+    for _ in range(100):
+        arm.step()
+    assert arm.stream[:, 0].max() < at - 0.005
+
+
+def test_the_stop_after_the_rows_is_looked_at_too() -> None:
+    arm = SmallArm(clearance=Wall(PATH[29, 0] + 0.021))
+    arm.arm()
+    assert arm.step(proposal=arm.proposal)[2] == ("clearance",)
+    assert "in the stop after these rows" in arm.core.faults[0].sentence
+
+
+def test_a_word_from_the_future_neither_arms_nor_silences_later_ones() -> None:
+    arm = SmallArm()
+    assert arm.step(word=ArmWord(arm.now + 1011 * MS, "a person", True))[2] == ("arming_stale",)
+    assert arm.arm()[1] is State.ARMED
+    arm.step(word=ArmWord(arm.now + 10**15, "a person", True))
+    assert arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False))[1] is State.DISARMED
+
+
+@pytest.mark.parametrize("while_stopping", [True, False])
+def test_disarmed_in_motion_it_stops_first_and_is_not_held(while_stopping: bool) -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    if while_stopping:
+        assert arm.step(stop=VOLTAGE, proposal=arm.proposal)[1] is State.STOPPING
+    targets, state, _ = arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False), proposal=arm.proposal)
+    assert state is State.STOPPING
+    assert (targets is None) is while_stopping
+    for _ in range(60):
+        arm.step()
+    assert arm.core.state is State.DISARMED
+
+
+def test_rows_that_were_lost_are_not_waited_for_longer_than_half_a_second() -> None:
+    arm = SmallArm()
+    arm.arm()
+    arm.step(proposal=arm.proposal)
+    robot = arm.measured()
+    arm.step(stop=VOLTAGE, measured=replace(robot, captured_ns=arm.now + 10 * MS, at_rest=True, next_index=0))
+    for k in range(50):
+        assert arm.core.state is State.STOPPING, k
+        arm.step(measured=replace(robot, captured_ns=arm.now + 10 * MS, at_rest=k == 49, next_index=0))
+    assert arm.core.state is State.HOLD
+
+
+def test_faults_do_not_pile_up_while_held() -> None:
+    arm = SmallArm()
+    arm.step(stop=VOLTAGE)
+    for _ in range(5):
+        assert arm.step(stop=VOLTAGE)[1:] == (State.HOLD, ("voltage",))
+    assert arm.step(stop=MODEL)[2] == ("voltage", "model")
+    assert arm.step(stop=replace(MODEL, joint="elbow"))[2] == ("voltage", "model", "model")
+
+
+def test_rows_whose_stop_would_leave_the_range_are_refused_in_time() -> None:
+    path = straight_move(HOME, np.array([3.0, 0.0, 0.0]), LIMITS)
+    inside = path[path[:, 0] <= 1.5]
+    arm = SmallArm()
+    arm.arm()
+    arm.follow(inside, len(inside))
+    assert [fault.code for fault in arm.core.faults] == ["joint_limit"]
+    assert arm.core.faults[0].sentence.startswith("in the stop after these rows: joint shoulder leaves its range at")
+    for _ in range(100):
+        arm.step()
+    assert 0.1 < arm.stream[-1, 0] <= 1.5
+    assert arm.core.state is State.HOLD
