@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from paramove.bus import topics
 from paramove.bus.subscriber import Heard
 from paramove.dashboard.stop_button import Progress, StopButton
@@ -64,12 +66,13 @@ def test_another_fault_is_no_confirmation() -> None:
     assert rig.button.progress is Progress.ASKED
 
 
-def test_the_run_ends_a_while_after_the_arm_rests() -> None:
+@pytest.mark.parametrize("state", [SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP])
+def test_the_run_ends_a_while_after_the_arm_rests(state: SafetyState.State) -> None:
     rig = Rig()
     rig.pressed = True
     rig.button.look(SECOND)
-    rig.gate(SafetyState.STATE_HOLD, PERSON_STOP, 2 * SECOND)
-    rig.gate(SafetyState.STATE_HOLD, PERSON_STOP, 4 * SECOND)
+    rig.gate(state, PERSON_STOP, 2 * SECOND)
+    rig.gate(state, PERSON_STOP, 4 * SECOND)
     assert rig.button.progress is Progress.STOPPED
     assert not rig.button.is_over(4 * SECOND)
     assert rig.button.is_over(5 * SECOND)

@@ -433,7 +433,15 @@ def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
     assert learner.failure in told
 
 
-@pytest.mark.parametrize("state", [SafetyState.STATE_DISARMED, SafetyState.STATE_DISCONNECTED, SafetyState.STATE_HOLD])
+@pytest.mark.parametrize(
+    "state",
+    [
+        SafetyState.STATE_DISARMED,
+        SafetyState.STATE_DISCONNECTED,
+        SafetyState.STATE_HOLD,
+        SafetyState.STATE_ESTOP,
+    ],
+)
 def test_an_arm_that_is_armed_again_in_time_goes_on(state: SafetyState.State) -> None:
     story = Story()
     story.learner.on_safety(safety(SafetyState.STATE_ARMED))

@@ -1,0 +1,128 @@
+"""What the arm driver hands on to the safety gate: emergency stop, failed checks, faults; and another period."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
+from paramove.robots.hoap3.driver import SAFETY_STATES, ArmDriver
+from paramove.robots.hoap3.stream import StreamReader
+from paramove.safety.gate_io import Fault, SafetySettings, State
+from tests.robots.hoap3.fake_robot import Rig, armed, trajectory
+from tests.robots.hoap3.movements import HOAP3
+from tests.robots.hoap3.test_driver import GOAL, expect_within_limits
+
+
+def in_motion() -> Rig:
+    rig = armed()
+    rig.send("one", GOAL, duration_s=2.0)
+    for _ in range(8):
+        rig.tick()
+    assert not rig.robot.reader.at_rest
+    return rig
+
+
+def codes(rig: Rig) -> list[str]:
+    assert rig.says is not None
+    return [fault.code for fault in rig.says.safety.faults]
+
+
+def test_every_state_of_the_gate_has_its_word_on_the_bus() -> None:
+    assert set(SAFETY_STATES) == set(State)
+    assert set(SAFETY_STATES.values()) | {SafetyState.STATE_UNSPECIFIED} == set(SafetyState.State.values())
+
+
+def test_the_emergency_stop_stops_in_motion_and_is_left_only_by_release_and_a_new_word() -> None:
+    rig = in_motion()
+    rig.driver.on_emergency(True)
+    rig.driver.on_emergency(False)  # a flicker within one period is a press
+    says = rig.tick()
+    assert says is not None
+    assert says.safety.state == SafetyState.STATE_ESTOP
+    assert says.stream is not None
+    assert says.stream.stop_ramp_frames * says.stream.joint_count * 2 == len(says.stream.frames)
+    assert rig.statuses[-1].state == TrajectoryStatus.STATE_STOPPED
+    assert "the emergency stop is pressed" in rig.statuses[-1].reason
+    for _ in range(20):
+        rig.tick()
+    assert rig.robot.reader.at_rest
+    rig.arm()
+    assert rig.driver.state is State.ESTOP
+    resting = rig.robot.reader.target.copy()
+    rig.driver.on_emergency(False)
+    rig.tick()
+    assert rig.driver.state is State.DISARMED
+    np.testing.assert_array_equal(rig.robot.reader.target, resting)
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+    expect_within_limits(rig)
+
+
+def test_failed_checks_are_all_told_and_forbid_arming_until_they_pass() -> None:
+    rig = Rig()
+    rig.tick()
+    rig.driver.on_arming_checks((Fault("voltage", "", "9 V"), Fault("model", "right_elbow", "another model")))
+    rig.arm()
+    assert rig.driver.state is State.DISARMED
+    assert codes(rig) == ["voltage", "model"]
+    rig.driver.on_arming_checks(())
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+
+
+def test_a_fault_of_the_robot_stops_and_is_held() -> None:
+    rig = in_motion()
+    rig.driver.on_fault(Fault("overload", "right_elbow", "joint right_elbow is overloaded"))
+    rig.tick()
+    assert rig.driver.state is State.STOPPING
+    for _ in range(20):
+        rig.tick()
+    assert rig.driver.state is State.HOLD
+    assert codes(rig) == ["overload"]
+    expect_within_limits(rig)
+
+
+def test_a_joint_that_does_not_follow_is_given_way_to() -> None:
+    rig = Rig()
+    rig.driver = ArmDriver(HOAP3, SafetySettings(following=np.full(28, np.deg2rad(5.0))))
+    rig.tick()
+    rig.arm()
+    elbow = HOAP3.index("right_elbow")
+    held = int(rig.robot.reader.target[elbow]) - 209 * 8
+    rig.robot.held_joints[elbow] = held
+    for _ in range(30):
+        rig.tick()
+    assert rig.driver.state is State.HOLD
+    assert codes(rig) == ["following"]
+    assert abs(int(rig.robot.reader.target[elbow]) - held) <= 1
+    expect_within_limits(rig)
+
+
+@pytest.mark.parametrize("period_us", [1000, 2000, 10_000])
+def test_rows_of_another_period_are_driven_by_the_same_driver(period_us: int) -> None:
+    robot = replace(HOAP3, stream=HOAP3.stream.model_copy(update={"period_us": period_us}))
+    reader = StreamReader(robot, robot.units.to_counts(robot.base_pose))
+    driver, now, played, statuses = ArmDriver(robot), 1_000_000_000, [reader.target], []
+    for tick in range(60):
+        now += 40_000_000
+        driver.on_robot_state(reader.state(reader.target, now), now)
+        if tick == 1:
+            driver.on_arm_request(ArmRequest(source="test", armed=True), now)
+        if tick == 3:
+            driver.on_trajectory(trajectory("one", GOAL, duration_s=1.0), now)
+        says = driver.tick(now)
+        statuses += says.statuses
+        if says.stream is not None:
+            assert says.stream.period_us == period_us
+            assert reader.offer(says.stream), reader.refusal
+        played += [reader.play() for _ in range(40_000 // period_us)]
+    assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED, statuses[-1].reason
+    assert reader.refused_batches == 0
+    steps = np.abs(np.diff(np.array(played, dtype=np.float64), axis=0))
+    period_s = period_us * 1e-6
+    per_rad = np.abs(robot.units.counts_per_rad)
+    assert (steps <= per_rad * robot.operating_velocity * period_s + 1).all()
