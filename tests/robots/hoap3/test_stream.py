@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.robots.hoap3.stream import StreamReader, StreamWriter
+from paramove.robots.joint_units import JointRangeError
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import stop_ramp
 from tests.robots.hoap3.movements import HOAP3, swing
@@ -154,3 +156,96 @@ def test_state_reports_target_and_measured_counts() -> None:
     assert (state.epoch, state.next_index, state.captured.ToNanoseconds()) == (EPOCH, 1, 1_500_000_000)
     assert list(state.target_counts) == list(frame)
     assert list(state.counts) == list(HELD)
+
+
+def test_frames_of_22_joints_are_refused_even_if_they_say_28() -> None:
+    robot = reader()
+    frames = np.repeat(HELD[None, :22], 10, axis=0)
+    assert not robot.offer(recoded(frames, 22))
+    assert robot.refusal == "22 joints, allowed 28"
+    assert not robot.offer(recoded(frames, 28))
+    assert robot.refusal == "440 bytes, allowed 1 to 5000 frames of 28 16 bit numbers"
+
+
+def test_counts_beyond_16_bits_never_become_a_batch() -> None:
+    rows = np.repeat(PATH[:1], 3, axis=0)
+    rows[1, 6] = np.deg2rad(40_000 / 209)
+    with pytest.raises(JointRangeError, match="right_shoulder_pitch"):
+        StreamWriter(HOAP3, EPOCH).batch(0, rows, 0)
+
+
+def test_more_frames_than_the_buffer_takes_are_refused() -> None:
+    robot = reader()
+    assert robot.offer(recoded(np.repeat(HELD[None], 5000, axis=0)))
+    assert not robot.offer(recoded(np.repeat(HELD[None], 5001, axis=0)))
+    assert "allowed 1 to 5000 frames" in robot.refusal
+    assert robot.depth == 5000
+
+
+def moving() -> StreamReader:
+    robot = reader()
+    assert robot.offer(cut(0, 300))
+    for _ in range(150):
+        robot.play()
+    return robot
+
+
+def test_a_batch_that_overlaps_takes_the_place_of_what_it_overlaps() -> None:
+    robot = moving()
+    assert robot.offer(cut(200, 300))
+    frames = [robot.play() for _ in range(350)]
+    np.testing.assert_array_equal(frames, HOAP3.units.to_counts(PATH[151:501]))
+
+
+def test_an_overlap_that_does_not_continue_the_movement_is_refused_and_the_ramp_plays() -> None:
+    robot = moving()
+    depth = robot.depth
+    elsewhere = cut(600, 300)
+    elsewhere.first_index = 200
+    assert not robot.offer(elsewhere)
+    assert "a step of" in robot.refusal
+    assert robot.depth == depth
+
+
+def test_after_a_lost_batch_the_next_joins_or_is_a_gap() -> None:
+    robot = moving()
+    assert robot.offer(cut(267, 300)), "one lost of batches every 67 frames: still within what is there"
+    robot = moving()
+    end = robot.next_index + robot.depth
+    assert not robot.offer(cut(end + 1, 300))
+    assert robot.refusal == f"first index {end + 1}, allowed up to {end}: a gap"
+    played = played_to_rest(robot)
+    assert np.abs(np.diff(played[-4:], axis=0)).max() <= 1
+
+
+def test_a_batch_repeated_changes_nothing_and_one_repeated_too_late_is_refused() -> None:
+    robot = moving()
+    batch = cut(200, 300)
+    assert robot.offer(batch)
+    depth = robot.depth
+    assert robot.offer(batch)
+    assert robot.depth == depth
+    for _ in range(60):
+        robot.play()
+    assert not robot.offer(batch)
+    assert robot.refusal == "first index 200, played up to 210: too late"
+    assert robot.depth == depth - 60
+
+
+def test_batches_in_the_wrong_order_are_played_smoothly_or_refused() -> None:
+    robot = moving()
+    assert robot.offer(cut(240, 300))
+    assert robot.offer(cut(180, 300)), "the older one ends earlier, in its own ramp"
+    frames = [*(robot.play() for _ in range(330))]
+    np.testing.assert_array_equal(frames, HOAP3.units.to_counts(PATH[151:481]))
+    played = played_to_rest(robot)
+    assert np.abs(np.diff(played[-4:], axis=0)).max() <= 1
+
+
+def test_accelerations_are_judged_over_a_frame_of_10_ms() -> None:
+    slow = replace(HOAP3, stream=HOAP3.stream.model_copy(update={"period_us": 10_000}))
+    robot = StreamReader(slow, HELD)
+    path = PATH[10::10]
+    assert robot.offer(StreamWriter(slow, EPOCH).batch(0, path, 0)), robot.refusal
+    assert not robot.offer(StreamWriter(slow, EPOCH).batch(0, path[:60], 0))
+    assert "counts in 1 frames" in robot.refusal
