@@ -8,7 +8,7 @@ BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
 
-.PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds bare clean
+.PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds mutation bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -41,6 +41,15 @@ format: setup ## puts the code into its standard form
 
 benchmark-seeds: setup ## the demo with many worlds: make benchmark-seeds SEEDS=0-29
 	@$(BIN)/paramove evaluate rule_learning --seeds $(SEEDS) $(ARGS)
+
+mutation: setup ## changes the safety gate in thousands of ways: do the tests notice? (build/mutation, an hour)
+	rm -rf build/mutation && mkdir -p build/mutation
+	python3 -m venv build/mutation/venv
+	build/mutation/venv/bin/python -m pip install --quiet mutmut==3.8.1
+	cp -R pyproject.toml src tests benchmarks nodes sim robot_description build/mutation
+	cd build/mutation && PYTHONPATH=$$(echo venv/lib/python3*/site-packages) OMP_NUM_THREADS=1 \
+	  ../../$(BIN)/python -m mutmut run $(ARGS)
+	cd build/mutation && PYTHONPATH=$$(echo venv/lib/python3*/site-packages) ../../$(BIN)/python -m mutmut results
 
 setup: ## installs what is missing; done by the others too
 	@sh docker/setup.sh
