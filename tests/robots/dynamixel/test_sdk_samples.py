@@ -277,7 +277,7 @@ class TestEasySdk:
         group.clearStagedReadCommands()
         group.addCmd(first.stageIsLEDOn())
         group.addCmd(second.stageGetPresentVelocity())
-        assert group.executeRead() == [0, 0]
+        until(lambda: group.executeRead() == [0, 0])
 
     def test_a_servo_that_is_not_there_is_told(self, connector):
         with pytest.raises(DxlRuntimeError) as told:
