@@ -12,6 +12,7 @@ from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.packets import ALERT, BROADCAST, Instruction, Packet, PacketReader, encoded
 from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.wire_faults import WireFaults
+from tests.docs.markdown import ROOT, table
 
 BAUD = 57600
 FAR_S = 1e6
@@ -226,5 +227,7 @@ def test_a_line_that_cannot_be_done_is_refused_and_changes_nothing(bench, line, 
     assert bench.do("voltage 11.1") == ""  # the lock was given back
 
 
-def test_every_verb_tells_how_it_is_written():
+def test_every_verb_is_described_where_people_look():
     assert all(usage.split()[0] == name for name, (usage, _) in VERBS.items())
+    described = [line.strip("`") for line, _ in table(ROOT / "docs" / "how-to" / "emulated_servos.md", "verbs")]
+    assert described == [usage for usage, _ in VERBS.values()]

@@ -217,7 +217,7 @@ VERBS: dict[str, tuple[str, Callable[[EmulatorVerbs, list[str]], str]]] = {
     "baud": ("baud ID RATE", _each(_baud)),
     "remove": ("remove ID", _each(_remove)),
     "restore": ("restore ID", _each(_restore)),
-    "torque": ("torque ID on|off", _each(_torque)),
+    "torque": ("torque ID STATE", _each(_torque)),
     "eeprom": ("eeprom ID ITEM VALUE", _each(_eeprom)),
     "delay": ("delay MS", _delay),
     "faults": ("faults [NAME=VALUE]", _faults),

@@ -35,6 +35,7 @@ class ServoMemory:
     def __init__(self, model: ServoModel) -> None:
         self.model = model
         self._bytes = bytearray(model.size)
+        self._values: dict[str, int] = {}  # what the bytes say: the servo looks at it thousands of times a second
         self._at = {one.address + i: one for one in model.registers.values() for i in range(one.size)}
         self.reset(0)
 
@@ -61,14 +62,13 @@ class ServoMemory:
         return name in self.model.registers
 
     def __getitem__(self, name: str) -> int:
-        register = self.model.registers[name]
-        data = self._bytes[register.address : register.address + register.size]
-        return int.from_bytes(data, "little", signed=register.signed)
+        return self._values[name]
 
     def __setitem__(self, name: str, value: int) -> None:
         register = self.model.registers[name]
         data = (value % (1 << 8 * register.size)).to_bytes(register.size, "little")
         self._bytes[register.address : register.address + register.size] = data
+        self._values[name] = int.from_bytes(data, "little", signed=register.signed)
 
     def read(self, address: int, size: int) -> bytes:
         """Raises RefusedError beyond the end of the table."""
@@ -99,6 +99,10 @@ class ServoMemory:
             self._bytes[target] = byte
             if target in self._at:
                 written.add(self._at[target].name)
+        for name in written:
+            register = self.model.registers[name]
+            told = self._bytes[register.address : register.address + register.size]
+            self._values[name] = int.from_bytes(told, "little", signed=register.signed)
         return written
 
     def _touched(self, written: dict[int, int]) -> list[Register]:
