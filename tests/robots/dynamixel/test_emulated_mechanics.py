@@ -3,6 +3,8 @@
 import math
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_body import OVERLOAD_S, HardwareError
@@ -257,6 +259,36 @@ def test_the_same_questions_lead_to_the_same_movement(tmp_path):
         arm.run(0.5)
         ends.append((arm.angle(), arm.angle("elbow")))
     assert ends[0] == ends[1]
+
+
+names = ["Goal Position", "Goal Velocity", "Goal Current", "Goal PWM", "Torque Enable", "Operating Mode", "Drive Mode"]
+names += ["Profile Velocity", "Profile Acceleration", "Position P Gain", "Position I Gain", "Position D Gain"]
+names += [
+    "Velocity P Gain",
+    "Velocity I Gain",
+    "Homing Offset",
+    "Bus Watchdog",
+    "PWM Limit",
+    "Current Limit",
+    "Shutdown",
+]
+values = st.sampled_from([0, 1, 3, 4, 5, 16, -1, 885, -885, 4095]) | st.integers(-20_000, 40_000)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    model=st.sampled_from(sorted(MODELS)),
+    writes=st.lists(st.tuples(st.integers(1, 2), st.sampled_from(names), values), max_size=15),
+)
+def test_whatever_is_written_the_world_goes_on_and_no_motor_exceeds_itself(tmp_path, model, writes):
+    arm = Arm(tmp_path, MODELS[model])
+    for number, name, value in writes:
+        if name in arm.servos[0].memory:
+            arm.write(number, name, value)
+        arm.run(0.02)
+        for servo in arm.servos:
+            assert abs(servo.torque) <= 2.01 * servo.model.stall_torque  # the way back adds what it drives against
+    assert all(math.isfinite(place) for place in (arm.angle(), arm.angle("elbow")))
 
 
 def test_what_is_wrong_with_a_world_is_told(tmp_path):

@@ -111,6 +111,12 @@ def test_voltage_is_that_of_all_servos(bench):
     assert bench.value(2, "Hardware Error Status") == 0  # 3.5 to 7 V
 
 
+def test_one_servo_may_have_a_voltage_of_its_own(bench):
+    bench.do("voltage 9.5 shoulder")
+    bench.wait(0.01)
+    assert (bench.value(1, "Present Input Voltage"), bench.value(2, "Present Input Voltage")) == (95, 50)
+
+
 def test_a_reboot_in_motion_stops_it_with_the_ram_as_at_the_start(bench):
     bench.write(1, "Profile Velocity", 20)
     bench.write(1, "Torque Enable", 1)

@@ -131,7 +131,7 @@ def _voltage(verbs: EmulatorVerbs, words: list[str]) -> str:
     volts = _number(words[0])
     if not 0.0 <= volts <= 60.0:
         raise InputError(f"a supply has 0 to 60 V, found {words[0]}")
-    for servo in verbs.emulator.bus.servos:
+    for servo in verbs.servos(words[1]) if len(words) > 1 else verbs.emulator.bus.servos:
         servo.voltage = volts
     return ""
 
@@ -211,7 +211,7 @@ VERBS: dict[str, tuple[str, Callable[[EmulatorVerbs, list[str]], str]]] = {
     "overheat": ("overheat ID", _each(_overheat)),
     "encoder": ("encoder ID", _each(_failing(HardwareError.ENCODER))),
     "shock": ("shock ID", _each(_failing(HardwareError.SHOCK))),
-    "voltage": ("voltage VOLTS", _voltage),
+    "voltage": ("voltage VOLTS [ID]", _voltage),
     "reboot": ("reboot ID", _each(_reboot)),
     "dup": ("dup ID [MODEL]", _duplicate),
     "baud": ("baud ID RATE", _each(_baud)),
