@@ -3,6 +3,7 @@
 Hears   arm/trajectory          JointTrajectory        events
         operator/arm            ArmRequest             events, latched
         operator/stop           StopRequest            events, latched
+        operator/estop          StopRequest            events, latched
 Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
         arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
         arm/trajectory_status   TrajectoryStatus       events
@@ -17,7 +18,7 @@ from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, topics.OPERATOR_STOP)
+HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
 SAYS = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
 
@@ -39,7 +40,7 @@ def run(bus: Bus, config: Config) -> None:
         hear = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
             topics.OPERATOR_ARM: arm.on_arm_request,
-            topics.OPERATOR_STOP: arm.on_stop,
+            **dict.fromkeys(topics.STOPS, arm.on_stop),
         }
         for event in bus.events(*HEARS, tick=True):
             if not isinstance(event, Tick):

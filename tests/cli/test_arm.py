@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import json
-from pathlib import Path
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.cli.terminal_person import TerminalPerson
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.robots.dynamixel.arm_calibration import COUNTS_PER_RAD, ArmCalibration, calibration_path
-from paramove.robots.dynamixel.arm_plan import load_plan
+from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+from paramove.robots.dynamixel.calibration_path import calibration_path
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_models import MODELS
 from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.servo_setup import only_servo
 from paramove.safety.gate_io import PERSON_STOP
+from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, koch_servos, rest
+from tests.robots.dynamixel.small_arm import LINK, SERIAL
 
-ROOT = Path(__file__).parents[2]
-KOCH = ROOT / "robot_description" / "koch_v1_1"
-PLAN = load_plan(KOCH)
-SERIAL = "FT6Z5NCH"
-LINK = f"usb-FTDI_USB__-__Serial_Converter_{SERIAL}-if00-port0"
 RATE = PLAN.baud_rate
 
 
@@ -70,8 +66,8 @@ class Bench:
         self.emulator = self._opened.enter_context(DynamixelEmulator(servos, self.by_id / link))
         return servos
 
-    def plug_in_koch(self, rate=RATE):
-        return self.plug_in(*(EmulatedServo(MODELS[one.model], one.number, rate) for one in PLAN.servos))
+    def plug_in_koch(self):
+        return self.plug_in(*koch_servos())
 
     def connect(self, *servos):
         with self.emulator.lock:
@@ -82,13 +78,14 @@ class Bench:
         texts = [str(word) for word in ("arm", *words, *places)]
         app = build("arm")
         with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("paramove.robots.dynamixel.servo_setup.only_servo", few_rates)
             for module in ("arm_setup", "arm_calibrate"):
                 patch.setattr(f"paramove.cli.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
             return CliRunner().invoke(app, texts)
 
     def calibrated(self):
         """A calibration of the arm as it is described, whose settings the servos have."""
-        done = self.arm("calibrate", "--robot", KOCH, steps=hands(self))
+        done = self.arm("calibrate", "--robot", KOCH, steps=hands(self.emulator))
         assert done.exit_code == 0, done.output
         return calibration_path(SERIAL, self.data)
 
@@ -99,35 +96,9 @@ def desk(tmp_path):
         yield bench
 
 
-def rest():
-    """Nothing is done."""
-
-
-def hands(bench, stop_at=None):
-    """What a person does when a Koch is calibrated, step by step."""
-
-    def move(angles):
-        def act():
-            with bench.emulator.lock:
-                for servo, planned in zip(bench.emulator.bus.servos, PLAN.servos, strict=True):
-                    if planned.joint in angles:
-                        servo.turned(2048.0 + COUNTS_PER_RAD * angles[planned.joint])
-
-        return act
-
-    def share(part):
-        ends = {one.joint: (max(one.lower, -2.9), min(one.upper, 2.9)) for one in PLAN.servos}
-        return {joint: low + part * (high - low) for joint, (low, high) in ends.items()}
-
-    steps = [(rest, "\n")]
-    parts = [*np.linspace(0.5, 0.0, 5), *np.linspace(0.0, 1.0, 9)]
-    steps += [(move(share(part)), "look\n") for part in parts]
-    zero = dict.fromkeys((one.joint for one in PLAN.servos), 0.0)
-    steps += [(rest, "\n"), (move(zero), "\n")]
-    for one in PLAN.servos:
-        steps.append((move({one.joint: 0.3}), "\n"))
-    steps.append((rest, "\n"))
-    return steps[:stop_at]
+def few_rates(chain):
+    """To be quick; that all are asked, the tests of scans show."""
+    return only_servo(chain, (RATE, 2_000_000))
 
 
 def test_scan_lists_the_servos(desk):
@@ -216,7 +187,7 @@ def test_setup_that_ends_before_tells_how_to_go_on(desk):
 
 def test_calibrate_writes_file_and_servos(desk):
     desk.plug_in_koch()
-    done = desk.arm("calibrate", "--robot", KOCH, steps=hands(desk))
+    done = desk.arm("calibrate", "--robot", KOCH, steps=hands(desk.emulator))
     assert done.exit_code == 0, done.output
     path = calibration_path(SERIAL, desk.data)
     assert f"{path}: 6 joints" in done.stdout
@@ -235,7 +206,7 @@ def test_calibrate_that_ends_before_keeps_the_old_file(desk, stop_at):
     desk.plug_in_koch()
     path = desk.calibrated()
     before = path.read_text()
-    done = desk.arm("calibrate", "--robot", KOCH, steps=[*hands(desk, stop_at), (rest, "q\n")])
+    done = desk.arm("calibrate", "--robot", KOCH, steps=[*hands(desk.emulator)[:stop_at], (rest, "q\n")])
     assert done.exit_code == 1
     assert "nothing was saved" in done.stderr
     assert path.read_text() == before
@@ -317,7 +288,7 @@ def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
     fault = SafetyFault(code=PERSON_STOP, sentence="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
-    monkeypatch.setattr("paramove.cli.arm_estop.stop_arm", lambda folder, source, patience_s: state)
+    monkeypatch.setattr("paramove.safety.terminal_stop.stop_arm", lambda folder, source, patience_s: state)
     done = CliRunner().invoke(build("arm"), ["arm", "estop"])
     assert done.exit_code == code
     assert ("hold, stopped from the terminal" in done.stdout) == (code == 0)

@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
-MARKERS = ("check only", "needs a running demo", "in the example")
+MARKERS = ("check only", "needs a running demo", "in the example", "on an emulated arm")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ the line before the block, change that:
 
     <!-- check only: why -->       the targets, sub-commands and options exist, but nothing is started
     <!-- needs a running demo -->  run while the demo runs in the same domain
+    <!-- on an emulated arm -->    run with an emulated Koch v1.1 plugged in, in the order of the page
     <!-- in the example: 78 -->    run by `test_examples.py` in a workspace with the files that the page shows; 78 is
                                    the exit code that is expected, 0 if it is left out
 """
@@ -26,7 +27,10 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from tests.docs.markdown import MARKERS, PAGES, ROOT, Block, blocks
+from tests.robots.dynamixel.koch_arm import PLAN, hands, koch_servos
+from tests.robots.dynamixel.small_arm import LINK
 
 BLOCKS = [block for path in PAGES for block in blocks(path)]
 RUNTIME = tempfile.TemporaryDirectory(prefix="paramove-docs-")  # sockets lie there; short, as their paths must be
@@ -94,6 +98,48 @@ def demo(tmp_path_factory):
 @pytest.mark.parametrize("block", marked("needs a running demo"))
 def test_commands_look_at_a_running_demo(block, demo):
     run_block(block)
+
+
+REQUEST = "Enter when it is done, q to end.\n"
+LAST_JOINT = f"  {PLAN.servos[-1].joint}: "
+ON_THE_ARM = {block.path for block in BLOCKS if block.marker == "on an emulated arm"}
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in sorted(ON_THE_ARM)])
+def test_commands_work_on_an_emulated_arm(page, tmp_path):
+    """One after the other, as a person follows the page."""
+    (tmp_path / "by-id").mkdir()
+    places = {"PARAMOVE_SERIAL_BY_ID": str(tmp_path / "by-id"), "PARAMOVE_DATA": str(tmp_path / "data")}
+    with DynamixelEmulator(koch_servos(), tmp_path / "by-id" / LINK) as emulator:
+        for block in (one for one in BLOCKS if one.path == page and one.marker == "on an emulated arm"):
+            for command in block.commands:
+                steps = hands(emulator) if "calibrate" in command else []
+                code, output = attended(command, steps, ENVIRONMENT | places)
+                assert code == 0, f"{block}\n{command}\n{output}"
+
+
+def attended(command, steps, environment):
+    """Exit code and output of a command whose requests a person follows: each is read before the next step is taken."""
+    with subprocess.Popen(
+        ["bash", "-euo", "pipefail", "-c", command],
+        cwd=ROOT,
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as running:
+        said = []
+        for act, line in steps:
+            for answer in iter(running.stdout.readline, ""):
+                said.append(answer)
+                if answer.endswith(REQUEST) or answer.startswith(LAST_JOINT):
+                    break
+            act()
+            running.stdin.write(line)
+            running.stdin.flush()
+        rest, _ = running.communicate(timeout=60)
+    return running.returncode, "".join(said) + rest
 
 
 @pytest.mark.parametrize("block", marked("check only"))
@@ -189,6 +235,8 @@ CHECKS = {
     "git": check_git,
     "docker": check_docker,
     "cp": check_program,
+    "ls": check_program,
+    "sudo": check_nothing,
     "cd": check_nothing,
     ".": check_nothing,
     "apt-get": check_nothing,

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from paramove.cli.arm_options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
 from paramove.cli.bus_options import JsonOption
-from paramove.robots.dynamixel.bus_bench import BusBench, bench_bus, latency_timer_ms, slow_timer
 from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from paramove.robots.dynamixel.bus_bench import BusBench
 
 FINDING = 3
 
@@ -30,6 +32,8 @@ def bench(
 
     Exit codes: 0 measured; 3 it cannot hold --rate, or the adapter's latency timer is slow; 69 no adapter or servo.
     """
+    from paramove.robots.dynamixel.bus_bench import bench_bus, latency_timer_ms, slow_timer
+
     with open_arm(by_id, serial, data, baud_rate) as arm:
         numbers = [servo.number for servo in arm.chain.ping_all()]
         if not numbers:

@@ -9,8 +9,6 @@ import typer
 
 from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
 from paramove.cli.terminal_person import QuitError, TerminalPerson
-from paramove.robots.dynamixel.arm_plan import load_plan
-from paramove.robots.dynamixel.calibration_procedure import ArmCalibrator
 from paramove.supervision import exit_codes
 
 
@@ -28,6 +26,9 @@ def calibrate(
     Exit codes: 0 calibrated; 1 ended before, and the old file stays; 69 no adapter, or a servo does not answer;
     78 what was shown does not fit the description, with the cause.
     """
+    from paramove.robots.dynamixel.arm_plan import load_plan
+    from paramove.robots.dynamixel.calibration_procedure import ArmCalibrator
+
     with explained():
         plan = load_plan(robot)
     created = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")

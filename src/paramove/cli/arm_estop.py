@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import typer
 
-from paramove.bus.endpoint import BusFolderError, TopicTakenError
-from paramove.bus.settings import default_folder
 from paramove.cli.arm_options import ended
 from paramove.cli.bus_options import DomainOption
-from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.safety.gate_io import PERSON_STOP
-from paramove.safety.terminal_stop import stop_arm
 from paramove.supervision import exit_codes
 
 PATIENCE_S = 1.0
@@ -24,6 +19,12 @@ def estop(domain: DomainOption = None) -> None:
 
     Exit codes: 0 the safety gate has answered; 69 it has not within 1 s.
     """
+    from paramove.bus.endpoint import BusFolderError, TopicTakenError
+    from paramove.bus.settings import default_folder
+    from paramove.msgs.safety_state_pb2 import SafetyState
+    from paramove.safety.gate_io import PERSON_STOP
+    from paramove.safety.terminal_stop import stop_arm
+
     folder = default_folder(domain)
     if not folder.is_dir():
         raise ended(f"nothing is running in {folder}; {REAL_ONE}", exit_codes.UNAVAILABLE)

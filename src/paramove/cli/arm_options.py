@@ -7,19 +7,21 @@ import errno
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.arm_calibration import VARIABLE as DATA_VARIABLE
-from paramove.robots.dynamixel.arm_calibration import ArmCalibration, calibration_path
+from paramove.robots.dynamixel.calibration_path import VARIABLE as DATA_VARIABLE
+from paramove.robots.dynamixel.calibration_path import calibration_path
 from paramove.robots.dynamixel.serial_adapters import VARIABLE as BY_ID_VARIABLE
 from paramove.robots.dynamixel.serial_adapters import SerialAdapter, serial_adapter
-from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError, ServoSilentError
-from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 from paramove.supervision import exit_codes
 from paramove.supervision.processes import printable
+
+if TYPE_CHECKING:
+    from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel.servo_chain import ServoChain
 
 DEFAULT_BAUD_RATE = 1_000_000
 LATENCY_S = 0.1
@@ -66,12 +68,17 @@ class OpenArm:
 
     def calibration(self) -> ArmCalibration:
         """Of this arm. Raises CalibrationError."""
+        from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+
         return ArmCalibration.load(self.path, self.adapter.serial)
 
 
 @contextlib.contextmanager
 def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int = 0) -> Iterator[OpenArm]:
     """The adapter's port, open at this baud rate or the calibrated one; ends the command, with the cause, on errors."""
+    from paramove.robots.dynamixel.servo_chain import ServoChain
+    from paramove.robots.dynamixel.servo_port import ServoPort
+
     with explained():
         try:
             adapter = serial_adapter(serial, by_id)
@@ -90,6 +97,9 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
     """Ends the command with a sentence where a servo, the port or a file is not as it must be."""
+    from paramove.robots.dynamixel.servo_chain import ServoError, ServoSilentError
+    from paramove.robots.dynamixel.servo_port import PortLostError
+
     try:
         yield
     except (ServoSilentError, PortLostError) as error:
@@ -110,6 +120,8 @@ def ended(sentence: str, code: int) -> typer.Exit:
 
 def configured_baud_rate(path: Path) -> int:
     """As calibrated, 0 without a calibration that can be read."""
+    from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+
     try:
         return ArmCalibration.read(path).bus.baud_rate
     except InputError:

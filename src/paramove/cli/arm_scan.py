@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from paramove.cli.arm_options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
 from paramove.cli.bus_options import JsonOption, show
-from paramove.robots.dynamixel.bus_scan import USUAL_BAUD_RATES, BusScan, FoundServo, scan_bus
 from paramove.robots.dynamixel.hardware_error import in_words
 from paramove.robots.dynamixel.serial_adapters import serial_adapters
 from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from paramove.robots.dynamixel.bus_scan import BusScan, FoundServo
 
 FINDING = 3
 
@@ -34,6 +36,8 @@ def scan(
     Exit codes: 0 servos were found; 3 something about them must be put right; 69 no adapter, or no servo answers;
     75 the adapter is in use; 77 not allowed to open it.
     """
+    from paramove.robots.dynamixel.bus_scan import USUAL_BAUD_RATES, scan_bus
+
     adapters = [one for one in serial_adapters(by_id) if serial in ("", one.serial)]
     if not adapters:
         with open_arm(by_id, serial, data):  # says why there is none

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
 from paramove.cli.terminal_person import QuitError, TerminalPerson
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo, load_plan
-from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError
-from paramove.robots.dynamixel.servo_setup import only_servo, set_up
 from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
+    from paramove.robots.dynamixel.servo_chain import ServoChain
 
 
 def setup(
@@ -31,6 +32,8 @@ def setup(
 
     Exit codes: 0 all are set up; 1 ended before; 69 no adapter; 78 no such joint or description.
     """
+    from paramove.robots.dynamixel.arm_plan import load_plan
+
     with explained():
         plan = load_plan(robot)
         wanted = _wanted(plan, joints)
@@ -55,6 +58,9 @@ def _wanted(plan: ArmPlan, joints: list[str] | None) -> list[PlannedServo]:
 
 def _set_up(chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: TerminalPerson) -> None:
     """Asks until the right servo is connected alone and has taken its settings."""
+    from paramove.robots.dynamixel.servo_chain import ServoError
+    from paramove.robots.dynamixel.servo_setup import only_servo, set_up
+
     while True:
         person.until_done(f"Connect the servo of {servo.joint} ({servo.model}) and no other.", list)
         try:

@@ -20,9 +20,6 @@ from paramove.cli.arm_options import (
     open_arm,
 )
 from paramove.cli.bus_options import JsonOption, show
-from paramove.robots.dynamixel.arm_calibration import sign_again
-from paramove.robots.dynamixel.arm_plan import load_plan
-from paramove.robots.dynamixel.servo_settings import adopted, compare, write_settings
 from paramove.supervision import exit_codes
 
 FINDING = 3
@@ -50,6 +47,10 @@ def verify(
     Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or a
     servo stopped answering; 78 the file is damaged, edited and not signed, or of another arm.
     """
+    from paramove.robots.dynamixel.arm_calibration import sign_again
+    from paramove.robots.dynamixel.arm_plan import load_plan
+    from paramove.robots.dynamixel.servo_settings import adopted, compare
+
     if write and adopt:
         raise ended("--write and --adopt are contrary: choose one", exit_codes.USAGE)
     with explained():
@@ -72,6 +73,8 @@ def verify(
 
 
 def _write(arm: OpenArm) -> None:
+    from paramove.robots.dynamixel.servo_settings import write_settings
+
     for name, joint in arm.calibration().joints.items():
         for register, (before, after) in write_settings(arm.chain, joint).items():
             typer.echo(f"{name}: {register} {before} is now {after}", err=True)

@@ -28,8 +28,8 @@ class QuitError(Exception):
 class TerminalPerson:
     """Asks on the standard output and reads the standard input, never the whole keyboard.
 
-    At a terminal Enter says that something is done, and q ends. Otherwise lines do: an empty one or "q"; any other has
-    the lines that are looked at printed, and the wait goes on.
+    At a terminal Enter says that something is done, and q ends. Otherwise lines do: an empty one or "q"; after any
+    other one more look is taken and printed, and the wait goes on.
     """
 
     def __init__(self, source: IO[Any] | None = None) -> None:
@@ -63,15 +63,14 @@ class TerminalPerson:
                         raise QuitError
 
     def _lines(self, look: Callable[[], list[str]]) -> None:
-        while True:
-            lines = look()
-            word = self._line(look)
-            if word.strip() == "" and word:
-                return
-            if word.strip() in QUIT or not word:
+        look()
+        while (word := self._line(look)).strip():
+            if word.strip() in QUIT:
                 raise QuitError
-            for line in lines:
+            for line in look():
                 typer.echo(f"  {printable(line)}")
+        if not word:
+            raise QuitError
 
     def _line(self, look: Callable[[], list[str]]) -> str:
         """The next line, looking while it is waited for."""

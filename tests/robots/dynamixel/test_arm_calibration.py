@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.arm_calibration import (
-    VARIABLE,
     ArmCalibration,
     CalibratedBus,
     CalibrationError,
     JointCalibration,
-    calibration_path,
     sign_again,
 )
+from paramove.robots.dynamixel.calibration_path import VARIABLE, calibration_path
 
 SERIAL = "FT6Z5NCH"
 ELBOW = JointCalibration(

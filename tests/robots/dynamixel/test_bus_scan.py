@@ -56,7 +56,7 @@ def test_two_servos_of_one_id_are_told():
     """Of the same model: to a ping both say the same, but they do not stand in the same place."""
     servos = [EmulatedServo(XL330_M288, number, 1_000_000) for number in (1, 2, 2)]
     servos[2].temperature, servos[2].voltage = 41.0, 4.6
-    found = scanned(servos, (1_000_000,))
+    found = scanned(servos, (1_000_000,), range(5))
     assert [one.number for one in found.servos] == [1]
     assert found.shared_ids == ((1_000_000, 2),)
     assert "ID 2 at 1000000 answers with damaged bytes: probably two servos have this ID" in found.findings()[0]

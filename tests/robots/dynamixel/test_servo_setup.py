@@ -49,7 +49,7 @@ def test_two_servos_are_refused(connected):
     chain, emulator = connected(EmulatedServo(XL330_M288, 1, 2_000_000), EmulatedServo(XL330_M288, 1, 2_000_000))
     emulator.bus.servos[1].temperature = 45.0
     with pytest.raises(InputError, match="two with the same ID"):
-        only_servo(chain, RATES)
+        only_servo(chain, RATES, range(4))
 
 
 def test_no_servo_is_told(connected):

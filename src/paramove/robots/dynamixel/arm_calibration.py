@@ -19,7 +19,6 @@ from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from platformdirs import user_data_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -28,7 +27,6 @@ from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
 
-VARIABLE = "PARAMOVE_DATA"
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
 CURRENT_BASED: Literal[5] = 5
@@ -212,17 +210,6 @@ class ArmCalibration(_Part):
 
 
 _REMEDY = "correct it and run `paramove arm verify --sign`, or run `paramove arm calibrate`"
-
-
-def calibration_path(serial: str, data: Path | None = None) -> Path:
-    """Where the calibration of the arm behind this adapter is kept.
-
-    Args:
-        serial: USB serial number of the adapter.
-        data: Folder; default $PARAMOVE_DATA, else that of the system for the user's data.
-    """
-    folder = data or Path(os.environ.get(VARIABLE) or user_data_path("paramove"))
-    return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
 
 
 def sign_again(path: Path) -> ArmCalibration:

@@ -15,6 +15,8 @@ USUAL_BAUD_RATES = (57600, 1_000_000, 115200, 2_000_000, 3_000_000, 4_000_000)
 LOOKED_AT = ("Torque Enable", "Hardware Error Status", "Present Input Voltage", "Present Temperature")
 ALL_IDS = range(253)
 ASKED_TIMES = 3
+SHORT_LATENCY_S = 0.02
+"""An adapter's latency timer is 16 ms at most."""
 BY_NUMBER = {model.number: model for model in MODELS.values()}
 
 
@@ -41,6 +43,11 @@ class FoundServo:
     temperature: int | None = None
     hardware_error: int | None = None
     torque: bool | None = None
+
+    @property
+    def is_mute(self) -> bool:
+        """Whether its table is known, but could not be read."""
+        return self.torque is None and model_of(self) is not None
 
 
 @dataclass(frozen=True)
@@ -110,13 +117,21 @@ def _heard(chain: ServoChain, ids: Sequence[int]) -> Iterator[tuple[int, FoundSe
     asked = ids if chain.counts.noise > noise else sorted(pinged)
     for number in asked:
         noise, stray = chain.counts.noise, chain.counts.stray
-        answer = pinged.get(number) or chain.ping(number)
+        answer = pinged.get(number) or _asked_in_vain(chain, number)
         servo = looked_at(chain, answer) if answer else None
-        failed = servo is None or servo.torque is None
-        if failed and (chain.counts.noise > noise or chain.counts.stray > stray):
+        if (servo is None or servo.is_mute) and (chain.counts.noise > noise or chain.counts.stray > stray):
             yield number, None
         elif servo is not None:
             yield number, servo
+
+
+def _asked_in_vain(chain: ServoChain, number: int) -> PingedServo | None:
+    """A ping of an ID that most likely nobody has, without much patience."""
+    latency_s, chain.port.latency_s = chain.port.latency_s, min(chain.port.latency_s, SHORT_LATENCY_S)
+    try:
+        return chain.ping(number)
+    finally:
+        chain.port.latency_s = latency_s
 
 
 def looked_at(chain: ServoChain, pinged: PingedServo) -> FoundServo:

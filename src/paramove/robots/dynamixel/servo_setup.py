@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Sequence
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.bus_scan import USUAL_BAUD_RATES, FoundServo, model_of, scan_bus
+from paramove.robots.dynamixel.bus_scan import ALL_IDS, USUAL_BAUD_RATES, FoundServo, model_of, scan_bus
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, ServoModel
 
@@ -14,13 +14,15 @@ NO_DELAY = 0
 """Of Return Delay Time (9): answers come at once, which a fast bus needs."""
 
 
-def only_servo(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES) -> FoundServo:
-    """The one servo that is connected, whatever its ID and baud rate.
+def only_servo(
+    chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, ids: Sequence[int] = ALL_IDS
+) -> FoundServo:
+    """The one servo that is connected, whatever its ID and baud rate; see `scan_bus`.
 
     Raises:
         InputError: None answers, more than one does, or its table is not known here.
     """
-    scan = scan_bus(chain, baud_rates)
+    scan = scan_bus(chain, baud_rates, ids)
     if scan.shared_ids:
         raise InputError(
             f"damaged answers from ID {scan.shared_ids[0][1]}: expected exactly one servo on the bus, found probably "

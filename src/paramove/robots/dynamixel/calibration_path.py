@@ -1,0 +1,22 @@
+"""Where the calibration of an arm is kept."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from platformdirs import user_data_path
+
+VARIABLE = "PARAMOVE_DATA"
+
+
+def calibration_path(serial: str, data: Path | None = None) -> Path:
+    """Where the calibration of the arm behind this adapter is kept.
+
+    Args:
+        serial: USB serial number of the adapter.
+        data: Folder; default $PARAMOVE_DATA, else that of the system for the user's data.
+    """
+    folder = data or Path(os.environ.get(VARIABLE) or user_data_path("paramove"))
+    return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
