@@ -242,6 +242,16 @@ def test_verify_signs_a_file_that_was_edited(desk):
     assert desk.arm("verify").exit_code == 0
 
 
+def test_verify_looks_for_servos_at_another_baud_rate(desk):
+    servos = desk.plug_in_koch()
+    desk.calibrated()
+    for servo in servos:
+        servo.memory["Baud Rate"] = 4
+    done = desk.arm("verify")
+    assert done.exit_code == 69
+    assert f"found 6 servos at 2000000, configured {RATE}; `paramove arm setup` sets" in done.stderr
+
+
 def test_verify_without_a_calibration_says_so(desk):
     desk.plug_in()
     done = desk.arm("verify")

@@ -53,7 +53,7 @@ def scan(
         findings += sentences
         told.append({"serial": adapter.serial, "device": adapter.device, "servos": _rows(found), "findings": sentences})
         if not as_json:
-            _tell(told[-1], rates)
+            _tell(told[-1], [rate for rate in rates if rate not in found.impossible])
     if as_json:
         typer.echo(json.dumps(told, indent=2))
     if findings:
@@ -62,7 +62,7 @@ def scan(
         raise ended("no servo answers: check the power of the arm and its cables", exit_codes.UNAVAILABLE)
 
 
-def _tell(adapter: dict[str, Any], rates: tuple[int, ...]) -> None:
+def _tell(adapter: dict[str, Any], rates: list[int]) -> None:
     typer.echo(f"adapter {adapter['serial']} ({adapter['device']}), asked at {', '.join(map(str, rates))}")
     show(adapter["servos"], as_json=False)
     for sentence in adapter["findings"]:

@@ -44,8 +44,8 @@ def verify(
 
     Reads only, without --write, --adopt or --sign.
 
-    Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or a
-    servo stopped answering; 78 the file is damaged, edited and not signed, or of another arm.
+    Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or no
+    servo answers; 78 the file is damaged, edited and not signed, or of another arm.
     """
     from paramove.robots.dynamixel.arm_calibration import sign_again
     from paramove.robots.dynamixel.arm_plan import load_plan
@@ -58,6 +58,7 @@ def verify(
     with open_arm(by_id, serial, data, baud_rate) as arm:
         if sign:
             sign_again(arm.path)
+        _check_baud_rate(arm)
         if write:
             _write(arm)
         if adopt:
@@ -70,6 +71,18 @@ def verify(
         typer.echo(f"{arm.path}: {len(rows) or 'no'} difference{'s' * (len(rows) != 1)}")
     if rows:
         raise typer.Exit(FINDING)
+
+
+def _check_baud_rate(arm: OpenArm) -> None:
+    """Looks for the servos at other baud rates if none answers, and ends the command."""
+    from paramove.robots.dynamixel.bus_scan import USUAL_BAUD_RATES, scan_bus
+
+    rate = arm.chain.port.baud_rate
+    if any(arm.chain.ping(joint.id) for joint in arm.calibration().joints.values()):
+        return
+    found = scan_bus(arm.chain, [other for other in USUAL_BAUD_RATES if other != rate])
+    told = "; ".join(found.findings(rate)) or f"no servo answers, neither at {rate} nor at another usual baud rate"
+    raise ended(f"{told}; `paramove arm setup` sets the baud rate", exit_codes.UNAVAILABLE)
 
 
 def _write(arm: OpenArm) -> None:

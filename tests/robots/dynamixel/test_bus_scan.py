@@ -70,6 +70,19 @@ def test_two_models_of_one_id_are_told():
     assert found.shared_ids == ((1_000_000, 3),)
 
 
+def test_a_baud_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
+    set_rate = ServoPort.setBaudRate
+
+    def refuse(port, rate):
+        if rate == 4_000_000:
+            raise ValueError("Failed to set custom baud rate (4000000)")
+        return set_rate(port, rate)
+
+    monkeypatch.setattr(ServoPort, "setBaudRate", refuse)
+    found = scanned([EmulatedServo(XL330_M288, 1, 1_000_000)], (4_000_000, 1_000_000))
+    assert ([one.number for one in found.servos], found.impossible) == ([1], (4_000_000,))
+
+
 def test_a_silent_bus_has_no_servos():
     assert scanned([EmulatedServo(XL330_M288, 1, 9600)], (1_000_000,)).servos == ()
 

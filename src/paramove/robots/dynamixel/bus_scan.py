@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from dynamixel_easy_sdk.control_table import ControlTable
 from dynamixel_easy_sdk.dynamixel_error import DxlRuntimeError
@@ -57,10 +57,12 @@ class BusScan:
     Attributes:
         servos: By baud rate and ID.
         shared_ids: Baud rates and IDs to which damaged answers come: two servos may talk at the same time.
+        impossible: Baud rates that the adapter does not have.
     """
 
     servos: tuple[FoundServo, ...]
-    shared_ids: tuple[tuple[int, int], ...] = field(default=())
+    shared_ids: tuple[tuple[int, int], ...] = ()
+    impossible: tuple[int, ...] = ()
 
     def findings(self, baud_rate: int = 0) -> list[str]:
         """Sentences about what is not as it should be. `baud_rate`: that is configured, 0 if none is."""
@@ -97,9 +99,14 @@ def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, id
     before = chain.port.baud_rate
     found: list[FoundServo] = []
     shared: list[tuple[int, int]] = []
+    impossible: list[int] = []
     try:
         for rate in baud_rates:
-            chain.port.setBaudRate(rate)
+            try:
+                chain.port.setBaudRate(rate)
+            except (ValueError, OSError):  # pyserial has both for a rate that an adapter does not have
+                impossible.append(rate)
+                continue
             for number, servo in _heard(chain, ids):
                 if servo is None:
                     shared.append((rate, number))
@@ -107,7 +114,7 @@ def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, id
                     found.append(servo)
     finally:
         chain.port.setBaudRate(before)
-    return BusScan(tuple(found), tuple(shared))
+    return BusScan(tuple(found), tuple(shared), tuple(impossible))
 
 
 def _heard(chain: ServoChain, ids: Sequence[int]) -> Iterator[tuple[int, FoundServo | None]]:
