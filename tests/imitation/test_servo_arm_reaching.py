@@ -47,6 +47,14 @@ class Oracle:
         return any(name.split("_")[-1] not in ("cube", "cylinder") for name in names)
 
 
+def has_a_pose(plan: ServoArmReaching, target: np.ndarray) -> bool:
+    try:
+        plan._poses.pitch_at(target, 0.0, (np.deg2rad(-90), np.deg2rad(120)))
+    except OutOfReachError:
+        return False
+    return True
+
+
 def assert_playable(name: str, motion: PlannedMotion, start: np.ndarray | None = None) -> None:
     """The driver's own check takes it, and the jerk is within the description's."""
     plan, robot = reaching(name), description(name)
@@ -60,19 +68,15 @@ def assert_playable(name: str, motion: PlannedMotion, start: np.ndarray | None =
 
 @each_arm
 def test_reaches_what_is_in_reach_exactly_within_limits_and_clear_of_the_table(name: str) -> None:
-    plan, oracle, reached = reaching(name), Oracle(name), 0
-    for target in places(name, 25, (0.015, 0.2), seed=1):
-        try:
-            motion = plan.reach(target)
-        except OutOfReachError as error:
-            assert "cannot be reached" in str(error), "a place that can be reached has a way to it"
-            continue
-        reached += 1
+    plan, oracle = reaching(name), Oracle(name)
+    targets = [one for one in places(name, 25, (0.015, 0.2), seed=1) if has_a_pose(plan, one)]
+    assert len(targets) >= 22
+    for target in targets:
+        motion = plan.reach(target)
         assert np.linalg.norm(oracle.hand(motion.angles[-1]) - target) < 1e-6
         np.testing.assert_allclose(motion.angles[0], plan.base_angles, rtol=0, atol=1e-12)
         assert_playable(name, motion)
         assert not any(oracle.touches_table(row) for row in motion.angles[::4])
-    assert reached >= 22
 
 
 @each_arm
@@ -142,7 +146,7 @@ def test_the_way_has_the_arch_and_the_progress_of_the_person(name: str) -> None:
     line = target - motion.gripper[0]
     along = (way - motion.gripper[0]) @ line / (line @ line)
     beside = np.linalg.norm(way - motion.gripper[0] - along[:, None] * line, axis=1)
-    assert beside.max() > 0.015
+    assert beside.max() > 0.1 * np.linalg.norm(line)
 
 
 @each_arm

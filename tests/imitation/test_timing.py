@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from paramove.imitation.timing import fade_in, minimum_jerk, resampled, slowed_times, soft_ends
+from paramove.imitation.timing import (
+    fade_in,
+    minimum_jerk,
+    ramped,
+    resampled,
+    rest_to_rest,
+    slowed_times,
+    smoothed,
+    soft_ends,
+)
 
 PERIOD = 0.005
 
@@ -103,3 +112,35 @@ def test_resampled_at_even_times_with_the_same_ends(duration: float) -> None:
     np.testing.assert_allclose(found[[0, -1]], values[[0, -1]], rtol=0, atol=1e-12)
     stretched = even * duration / even[-1]
     np.testing.assert_allclose(found, np.column_stack([np.sin(stretched), stretched**2]), rtol=0, atol=1e-4)
+
+
+def test_ramped_progress_rests_at_both_ends_and_is_even_between() -> None:
+    u = np.linspace(0.0, 1.0, 401)
+    way = ramped(u)
+    np.testing.assert_allclose(way[[0, 200, 400]], [0.0, 0.5, 1.0], rtol=0, atol=1e-12)
+    speed = np.diff(way) / np.diff(u)
+    np.testing.assert_allclose(speed[100:300], speed[200], rtol=1e-9, atol=0)
+    assert speed.min() >= 0.0
+    assert max(speed[0], speed[-1]) < 1e-3
+    assert np.abs(np.diff(speed)).max() < 0.025  # no jump
+
+
+def test_smoothing_keeps_the_ends_and_straight_lines() -> None:
+    line = np.linspace(1.0, 3.0, 30)[:, None] * [1.0, -2.0]
+    np.testing.assert_allclose(smoothed(line, 4.0), line, rtol=0, atol=1e-9)
+    rough = line + np.random.default_rng(0).normal(0.0, 0.1, line.shape)
+    smooth = smoothed(rough, 4.0)
+    np.testing.assert_allclose(smooth[[0, -1]], rough[[0, -1]], rtol=0, atol=1e-12)
+    assert np.abs(np.diff(smooth, 2, axis=0)).max() < 0.1 * np.abs(np.diff(rough, 2, axis=0)).max()
+
+
+def test_from_rest_to_rest_within_velocity_acceleration_and_jerk() -> None:
+    knots = np.cumsum(np.random.default_rng(1).normal(0.0, 0.2, (12, 2)), axis=0)
+    limits = (np.array([1.5, 1.0]), np.array([6.0, 8.0]), np.array([200.0, 100.0]))
+    rows = rest_to_rest(knots, 0.5, 0.01, limits)
+    np.testing.assert_allclose(rows[[0, -1]], knots[[0, -1]], rtol=0, atol=1e-12)
+    padded = np.concatenate([rows[:1]] * 3 + [rows] + [rows[-1:]] * 3)
+    for order, limit in enumerate(limits, start=1):
+        assert (np.abs(np.diff(padded, order, axis=0)).max(axis=0) <= limit * 0.01**order * (1 + 1e-9)).all()
+    short = rest_to_rest(np.zeros((4, 2)), 0.5, 0.01, limits)
+    assert len(short) == 51

@@ -22,6 +22,7 @@ from nodes import (
     camera,
     colour_tracker,
     operator,
+    reacher,
     recognizer,
     recorder,
     relocator,
@@ -42,7 +43,9 @@ from paramove.vision.homography import PlaneHomography
 from tests.action_space import drawn_arm
 from tests.imitation.fake_driver import Cell, goal
 from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
+from tests.imitation.servo_cell import ServoCell
 from tests.nodes.bad_messages import first_not_finite, variants
+from tests.nodes.test_reacher import ARM_FOLDER, TASKS
 from tests.robots.hoap3.fake_robot import FakeRobot, trajectory
 from tests.robots.hoap3.movements import HOAP3
 from tests.rules.pointing_story import PointingStory
@@ -190,6 +193,15 @@ def of_synthesizer() -> list[Event]:
     return cell.events
 
 
+def of_reacher() -> list[Event]:
+    cell = ServoCell()
+    cell.disarm(SafetyState.STATE_DISARMED, "sentence")
+    cell.tick(5)
+    cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
+    cell.reason = "a reason"
+    return [*cell.run().events, *cell.tick(60).events]
+
+
 def of_arm_driver() -> list[Event]:
     robot, events = FakeRobot(), []
     robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
@@ -228,6 +240,7 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
     "rule_learner": (rule_learner, of_rule_learner, {}),
     "relocator": (relocator, of_relocator, {}),
     "synthesizer": (synthesizer, of_synthesizer, {"robot": ROBOT_FOLDER}),
+    "reacher": (reacher, of_reacher, {"robot": ARM_FOLDER, "tasks": TASKS}),
     "arm_driver": (arm_driver, of_arm_driver, {"robot": ROBOT_FOLDER}),
     "operator": (operator, of_operator, {"arms_at_start": True}),
     "recorder": (recorder, of_recorder, {}),
@@ -236,7 +249,7 @@ NODES: dict[str, tuple[Any, Callable[[], list[Event]], dict[str, Any]]] = {
 
 def _config(node: str, folder: Path) -> Any:
     module, _, parameters = NODES[node]
-    if node == "synthesizer":
+    if node in ("synthesizer", "reacher"):
         reaching_model().save(folder / "reaching.npz")
         parameters = {**parameters, "movement": {"file": folder / "reaching.npz"}}
     if node == "body_tracker":

@@ -13,6 +13,7 @@ FloatArray = NDArray[np.float64]
 
 REST_NS = 300_000_000
 STALE_NS = 1_000_000_000
+MOST = 2.0 * np.pi
 REST_TOLERANCE = np.deg2rad(0.5)
 
 
@@ -28,10 +29,10 @@ class SettledJoints:
         self._heard: deque[tuple[int, FloatArray]] = deque()
 
     def hear(self, message: JointStates, now_ns: int) -> None:
-        """Take in measured joints; a message in which one is missing or not finite counts for nothing."""
+        """Take in measured joints; a message in which one is missing, or no angle, counts for nothing."""
         measured = {joint.name: joint.position for joint in message.joints}
         angles = np.array([measured.get(name, np.nan) for name in self._joints])
-        if not np.isfinite(angles).all():
+        if not (np.abs(angles) <= MOST).all():  # NaN is not below either
             return
         self._heard.append((now_ns, angles))
         while len(self._heard) > 2 and now_ns - self._heard[1][0] >= REST_NS:
