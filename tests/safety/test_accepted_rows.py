@@ -118,6 +118,14 @@ def test_without_a_ramp_it_begins_where_the_last_row_ends_or_the_robot_is() -> N
     np.testing.assert_allclose(targets.rows[-1], 0.1, rtol=0, atol=1e-12)
 
 
+def test_it_begins_at_the_last_row_itself() -> None:
+    rows = AcceptedRows(LIMITS)
+    rows.accept(0, np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]]), NOTHING, at(0))
+    targets = rows.give_way(None, at(2, np.array([0.02, 0.0, 0.0])))
+    assert targets is not None
+    np.testing.assert_array_equal(targets.rows, [[0.02, 0.0, 0.0]])
+
+
 def test_a_pose_outside_the_range_is_given_way_to_as_far_as_allowed_and_an_unknown_one_not() -> None:
     rows = AcceptedRows(LIMITS)
     targets = rows.give_way(None, at(0, np.array([1.9, -1.9, 0.0])))

@@ -289,3 +289,27 @@ def test_rows_whose_stop_would_leave_the_range_are_refused_in_time() -> None:
         arm.step()
     assert 0.1 < arm.stream[-1, 0] <= 1.5
     assert arm.core.state is State.HOLD
+
+
+def disarmed_in_motion() -> SmallArm:
+    arm = SmallArm()
+    arm.in_motion()
+    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False), proposal=arm.proposal)
+    assert arm.core.state is State.STOPPING
+    return arm
+
+
+def test_a_fault_after_the_word_to_disarm_is_held() -> None:
+    arm = disarmed_in_motion()
+    arm.step(stop=VOLTAGE)
+    for _ in range(60):
+        arm.step()
+    assert arm.core.state is State.HOLD
+
+
+def test_a_word_to_disarm_is_forgotten_with_the_robot_that_it_was_for() -> None:
+    arm = disarmed_in_motion()
+    assert arm.step(ms=600, measured=None)[1] is State.DISCONNECTED
+    assert arm.step()[1] is State.DISARMED
+    arm.arm()
+    assert arm.step(stop=VOLTAGE)[1] is State.HOLD

@@ -24,7 +24,7 @@ def test_arms_once_when_the_gate_is_disarmed() -> None:
     request = operator.update(said(SafetyState.STATE_DISARMED), SECOND)
     assert request is not None
     assert request.armed
-    assert request.source
+    assert (request.source, request.reason) == ("operator node", "start of a simulated run")
     assert request.captured.ToNanoseconds() == SECOND
     assert operator.update(said(SafetyState.STATE_DISARMED), SECOND + SECOND // 15) is None
     assert operator.update(said(SafetyState.STATE_DISARMED), 2 * SECOND) is not None  # the word was lost

@@ -14,14 +14,16 @@ ARM = """<mujoco><worldbody>
  <geom name="table" type="plane" size="0 0 1" pos="0 0 -0.5"/>
  <body name="base"><geom type="sphere" size="0.05"/>
   <body name="upper"><joint name="shoulder" type="hinge" axis="0 1 0"/>
-   <geom type="capsule" size="0.02" fromto="0.1 0 0 0.3 0 0"/>
+   <geom type="capsule" size="0.02" contype="0" fromto="0.1 0 0 0.3 0 0"/>
    <body name="collar" pos="0.3 0 0"><geom type="sphere" size="0.03"/>
     <body name="fore"><joint name="elbow" type="hinge" axis="0 1 0"/>
    <geom type="capsule" size="0.02" fromto="0.1 0 0 0.3 0 0"/>
-     <body name="hand" pos="0.3 0 0"><joint name="wrist" type="slide" axis="1 0 0"/><geom type="sphere" size="0.02"/>
+     <body name="hand" pos="0.3 0 0"><joint name="wrist" type="slide" axis="1 0 0"/>
+      <geom type="sphere" size="0.02" conaffinity="0"/>
       <geom type="box" size="1 1 1" contype="0" conaffinity="0"/></body>
   </body></body></body></body>
  <body name="ring"><geom type="sphere" size="0.06" pos="0.1 0 0"/></body>
+ <body name="wall" pos="-0.64 0 0"><geom type="plane" size="0 0 1" zaxis="1 0 0"/></body>
  <body name="loose"><freejoint name="free"/>
   <geom type="sphere" size="0.01" pos="5 5 5" contype="2" conaffinity="4"/></body>
 </worldbody></mujoco>"""
@@ -74,6 +76,20 @@ def test_the_hand_over_the_table_is_measured_and_far_is_far() -> None:
     np.testing.assert_allclose(distance, 0.03, rtol=0, atol=1e-6)
     assert "hand" in (one, other) or "fore" in (one, other)
     assert collision.distances(np.zeros(3)) == (0.05, "", "")
+
+
+def test_a_wall_without_end_is_measured_too() -> None:
+    distance, one, other = arm().distances(np.array([3.0, 0.0, 0.0]))
+    assert "wall" in (one, other)  # to the hand as near as to the end of the forearm
+    np.testing.assert_allclose(distance, 0.64 + 0.6 * np.cos(3.0) - 0.02, rtol=0, atol=1e-6)
+
+
+def test_only_what_touches_in_every_random_pose_is_left_out() -> None:
+    folded = np.array([0.0, 3.0, 0.0])
+    assert ("fore", "ring") not in bodies(SelfCollision(MODEL, JOINTS, np.zeros(3), folded, folded, n_samples=3))
+    for seed in range(40):
+        some = SelfCollision(MODEL, JOINTS, np.zeros(3), LOWER, UPPER, n_samples=12, seed=seed)
+        assert ("fore", "ring") in bodies(some)
 
 
 def test_a_joint_the_model_does_not_have_or_that_has_no_angle_is_named() -> None:

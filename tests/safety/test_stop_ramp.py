@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.safety.limits import MotionLimits
-from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.stop_ramp import longest_path_s, stop_ramp, straight_move
 from tests.robots.hoap3.movements import HOAP3, swing
 
 LIMITS = MotionLimits.of(HOAP3)
@@ -44,3 +47,52 @@ def test_where_the_path_is_cut_the_ramp_goes_straight_on_and_stays_in_range() ->
     acceleration = np.abs(rows[8:] - 2 * rows[4:-4] + rows[:-8]) / 16e-6
     assert (acceleration <= LIMITS.stop_acceleration * 1.001).all()
     np.testing.assert_allclose(ramp[-1], ramp[-2], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(("kind", "order"), [("velocity", 1), ("acceleration", 2), ("jerk", 3)])
+def test_a_straight_move_is_as_fast_as_its_tightest_limit_allows(kind: str, order: int) -> None:
+    wide = {name: np.full(28, 1e9) for name in ("velocity", "acceleration", "jerk")}
+    limits = replace(LIMITS, **{**wide, kind: np.full(28, 0.5)})
+    goal = PATH[0] + np.linspace(-1.0, 0.8, 28)
+    rows = np.concatenate([np.repeat(PATH[:1], 3, axis=0), straight_move(PATH[0], goal, limits)])
+    # The jerk of this profile is largest at its two ends, where it jumps: difference quotients inside see it from 0.
+    peak = np.abs(np.diff(rows[3:], n=order, axis=0)).max() / limits.dt_s**order
+    assert 0.496 < peak <= 0.5 * 1.001
+    np.testing.assert_allclose(rows[-1], goal, rtol=0, atol=1e-12)
+    assert (rows[3] != rows[2]).any(), "the first row is one step on"
+
+
+def test_a_straight_move_to_where_it_is_is_one_row() -> None:
+    np.testing.assert_array_equal(straight_move(PATH[0], PATH[0], LIMITS), PATH[:1])
+
+
+def test_the_longest_path_is_what_a_stop_from_the_operating_velocity_runs_over() -> None:
+    cruise = PATH[:1] + np.outer(np.arange(1, 600), LIMITS.velocity * LIMITS.dt_s)
+    ramp = stop_ramp(PATH[0], cruise, LIMITS)
+    run_over = (ramp[-1] - PATH[0]) / LIMITS.velocity
+    np.testing.assert_allclose(run_over, run_over[0], rtol=0, atol=1e-9)
+    assert run_over[0] < longest_path_s(LIMITS) <= run_over[0] + 2.6 * LIMITS.dt_s
+
+
+def test_a_stop_keeps_what_is_left_of_acceleration_and_jerk_and_takes_no_longer_than_that() -> None:
+    """At constant speed all of it is the stop's own: 1.5 v/T, or 6 v/T² and 3 a/T."""
+    for spare, jerk, bound in ((0.5, 1e6, "acceleration"), (1e6, 0.5, "jerk")):
+        one = np.full(28, 1.0)
+        limits = replace(
+            LIMITS, velocity=one, acceleration=0.1 * one, stop_acceleration=(0.1 + spare) * one, jerk=jerk * one
+        )
+        speed = 0.2
+        cruise = PATH[:1] + np.outer(np.arange(1, 9000), speed * limits.dt_s * one)
+        duration_s = len(stop_ramp(PATH[0], cruise, limits)) * limits.dt_s
+        if bound == "acceleration":
+            expected = 1.5 * speed / spare
+        else:
+            expected = (3 * 0.1 + np.sqrt(9 * 0.01 + 24 * jerk * speed)) / (2 * jerk)
+        np.testing.assert_allclose(duration_s, expected, rtol=0, atol=1.1e-3)
+
+
+def test_joints_that_do_not_move_make_no_stop_longer() -> None:
+    slow = replace(LIMITS, jerk=np.where(np.arange(28) == 0, 1e-3, LIMITS.jerk))
+    still = PATH.copy()
+    still[:, 0] = still[0, 0]
+    np.testing.assert_array_equal(stop_ramp(still[500], still[501:], slow), stop_ramp(still[500], still[501:], LIMITS))

@@ -128,6 +128,35 @@ def test_a_tremble_within_velocity_and_acceleration_breaks_the_jerk() -> None:
     assert refusal.value.asked.endswith("deg/s³")
 
 
+def test_a_refusal_says_code_place_joint_asked_and_allowed() -> None:
+    refusal = TrajectoryRefusedError("start", 3, "right_elbow", "7 deg", "2 deg")
+    assert str(refusal) == "trajectory refused (start) at point 3, joint right_elbow: asked 7 deg, allowed 2 deg"
+    assert (refusal.code, refusal.index, refusal.joint) == ("start", 3, "right_elbow")
+    assert (refusal.asked, refusal.allowed) == ("7 deg", "2 deg")
+    assert (
+        str(TrajectoryRefusedError("id", -1, "", "none", "one")) == "trajectory refused (id): asked none, allowed one"
+    )
+    assert " at point 0" in str(TrajectoryRefusedError("start", 0, "", "", ""))
+
+
+@pytest.mark.parametrize(("offsets", "index"), [([-60, 0, 0, 0], 1), ([0, 0, -60, 0], 3), ([0, 0, 0, -60], 4)])
+def test_the_point_is_that_to_which_the_movement_is_too_fast(offsets: list[float], index: int) -> None:
+    points = [[0.0, 0.0]] + [[float(sum(offsets[: k + 1])), 0.0] for k in range(4)]
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check([0.0, 0.5, 1.0, 1.5, 2.0], points)
+    assert (refusal.value.code, refusal.value.index) == ("velocity", index)
+
+
+@pytest.mark.parametrize(("duration_s", "faded_s"), [(1.0, 0.5), (0.3, 0.3)])
+def test_the_difference_at_the_start_is_faded_out_within_half_a_second(duration_s: float, faded_s: float) -> None:
+    path = check([0, duration_s], [[1.0, 0], [1.0, 0]])
+    left = (START[0] + np.deg2rad(1.0) - path.rows[:, PLACES[0]]) / np.deg2rad(1.0)
+    end = round(faded_s * 1000)
+    u = np.arange(end + 1) / end
+    np.testing.assert_allclose(left[: end + 1], 1 - (10 * u**3 - 15 * u**4 + 6 * u**5), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(left[end:], 0.0, rtol=0, atol=1e-12)
+
+
 @settings(deadline=None, max_examples=60, derandomize=True)
 @given(
     gaps=st.lists(st.floats(min_value=0.002, max_value=0.4), min_size=1, max_size=12),

@@ -78,7 +78,7 @@ class AcceptedRows:
         start = self._sent.rows[-1] if self._sent else measured.commanded
         goal = np.clip(measured.positions, self._limits.lower, self._limits.upper)
         rows = straight_move(start, goal, self._limits) if np.isfinite(goal).all() else goal[None]
-        if self._limits.first_violation(rows, start[None], rest_at_end=True) is not None:
+        if self._limits.first_violation(rows, start[None]) is not None:
             return ramp
         targets = self.accept(index, rows[:0], rows, measured)
         if ramp is None:
