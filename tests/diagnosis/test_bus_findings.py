@@ -55,7 +55,7 @@ def wrong(tmp_path_factory):
     link = tmp_path_factory.mktemp("by-id") / "usb-adapter"
     with DynamixelEmulator(wrong_servos(), link) as emulator:
         emulator.bus.receive = overheard = Overheard(emulator.bus)
-        found = bus_findings(link, RATES, PATIENT_S)
+        found = bus_findings(link, RATES, PATIENT_S, range(8))
         yield emulator, link, found, frozenset(overheard.instructions)
 
 
@@ -83,11 +83,11 @@ def test_every_servo_is_listed_with_what_it_tells(findings):
 def test_a_double_id_is_told(findings):
     (one,) = about(findings, "servo 1", Level.PROBLEM)
     assert one.sentence == "2 servos have the ID 1: they talk at once"
-    assert "write1ByteTxRx(p, 1, 7, NEW_ID)" in one.remedy[-1]
+    assert "unplug all of them but one" in one.remedy[0]
 
 
 def test_a_voltage_outside_of_the_limits_is_told(findings):
-    (two,) = about(findings, "servo 2", Level.PROBLEM)
+    two, _ = about(findings, "servo 2", Level.PROBLEM)
     assert two.sentence == "measures 9.0 V, its limits are 3.5 to 7.0 V"
     assert "5 V" in two.remedy[0]
 
@@ -98,7 +98,8 @@ def test_errors_are_told_in_words(findings):
 
 
 def test_heat_is_told(findings):
-    (five,) = about(findings, "servo 5", Level.PROBLEM)
+    five, error = about(findings, "servo 5", Level.PROBLEM)
+    assert "overheated" in error.sentence
     assert five.sentence == "is 75 °C hot, its limit is 72 °C"
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from paramove.diagnosis.bus_scan import READS, USUAL_BAUD_RATES, FoundServo, ScannedRate, scan
+from paramove.diagnosis.bus_scan import ALL_IDS, READS, USUAL_BAUD_RATES, FoundServo, ScannedRate, scan
 from paramove.diagnosis.finding import Finding, Level, Machine
 from paramove.diagnosis.serial_ports import usable_ports
 from paramove.input_error import InputError
@@ -46,17 +46,23 @@ def servos_findings(machine: Machine) -> Iterator[Finding]:
         yield Finding("servos", Level.WARNING, "none were asked: there is no serial port that is free")
 
 
-def bus_findings(port: Path, baud_rates: Sequence[int] = USUAL_BAUD_RATES, patience_s: float = 0.1) -> list[Finding]:
+def bus_findings(
+    port: Path,
+    baud_rates: Sequence[int] = USUAL_BAUD_RATES,
+    patience_s: float = 0.1,
+    ids: Sequence[int] = ALL_IDS,
+) -> list[Finding]:
     """Asks the servos on a port, and judges what they tell.
 
     Args:
         port: For example a link in /dev/serial/by-id.
         baud_rates: At which is asked, bit/s.
         patience_s: For the beginning of an answer, beyond the time of its bytes.
+        ids: That are asked one by one where servos answer and something disturbs them.
     """
     try:
         with ServoPort(str(port), baud_rates[0]) as opened:
-            scanned = list(scan(opened, baud_rates, patience_s))
+            scanned = list(scan(opened, baud_rates, patience_s, ids))
     except (InputError, PortLostError) as error:
         return [Finding("bus", Level.PROBLEM, str(error), facts={"port": str(port)})]
     servos = [servo for rate in scanned for servo in rate.servos]
@@ -69,7 +75,7 @@ def bus_findings(port: Path, baud_rates: Sequence[int] = USUAL_BAUD_RATES, patie
 def servo_findings(port: Path, servo: FoundServo) -> list[Finding]:
     """Of one servo: first what it tells, then what is wrong with it."""
     about = f"servo {servo.number}"
-    told = [servo.model, f"firmware {servo.firmware}", f"{servo.baud_rate} bit/s"]
+    told = [servo.model, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
     facts: dict[str, object] = {"port": str(port), "id": servo.number, "model": servo.model}
     facts |= {"firmware": servo.firmware, "baud_rate": servo.baud_rate}
     if (tenths := servo.values.get("Present Input Voltage")) is not None:

@@ -18,6 +18,7 @@ from paramove.robots.dynamixel.servo_port import BITS_PER_BYTE, ServoPort
 USUAL_BAUD_RATES = (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 """bit/s; the first is set at the factory."""
 IDS = 252
+ALL_IDS = range(IDS + 1)
 PING_ANSWER_BYTES = 14
 PING_S = 0.016 + 0.003 * IDS
 """Beyond the time of the answers of all; as dynamixel-sdk 4.1.0 waits (`broadcastPing`)."""
@@ -58,13 +59,15 @@ class Heard:
 
     Attributes:
         answers: From servos.
-        damaged: Whether there were packets whose checksum is wrong, as when two servos talk at once.
+        damaged: Whether there were packets whose checksum is wrong.
         foreign: Whether bytes came in, but no packet at all.
+        stray: Whether there were bytes that belong to no packet, as when two servos talk at once.
     """
 
     answers: list[Packet] = field(default_factory=list)
     damaged: bool = False
     foreign: bool = False
+    stray: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,13 +88,16 @@ class ScannedRate:
     servos: tuple[FoundServo, ...] = ()
 
 
-def scan(port: ServoPort, baud_rates: Sequence[int], patience_s: float = 0.1) -> Iterator[ScannedRate]:
+def scan(
+    port: ServoPort, baud_rates: Sequence[int], patience_s: float = 0.1, ids: Sequence[int] = ALL_IDS
+) -> Iterator[ScannedRate]:
     """Asks at each rate who is there, then those for their state.
 
     Args:
         port: Open.
         baud_rates: bit/s.
         patience_s: For the beginning of an answer, beyond the time of its bytes.
+        ids: That are asked one by one where servos answer and something disturbs them.
 
     Raises PortLostError if the port goes away.
     """
@@ -108,7 +114,25 @@ def scan(port: ServoPort, baud_rates: Sequence[int], patience_s: float = 0.1) ->
         for number in sorted(first):
             at_once = sum(one.id == number for one in heard.answers)
             servos.append(_examined(port, first[number], at_once, patience_s))
+        if heard.stray and first:
+            servos += _one_by_one(port, [number for number in ids if number not in first], patience_s)
+            servos.sort(key=lambda one: one.number)
         yield ScannedRate(baud_rate, True, heard.damaged, heard.foreign, tuple(servos))
+
+
+def _one_by_one(port: ServoPort, ids: Sequence[int], patience_s: float) -> Iterator[FoundServo]:
+    """Servos that were not understood among the others; two of one ID are never understood."""
+    window_s = PING_ANSWER_BYTES * BITS_PER_BYTE / port.baud_rate + patience_s
+    for number in ids:
+        for _ in range(READS):
+            heard = _asked(port, Packet(number, Instruction.PING), window_s)
+            answers = [one for one in heard.answers if one.id == number and len(one.parameters) == 4]
+            if answers:
+                yield _examined(port, answers[0], len(answers), patience_s)
+            if answers or not heard.stray:
+                break
+        else:
+            yield FoundServo(number, "unknown models", 0, port.baud_rate, at_once=2)
 
 
 def _examined(port: ServoPort, ping: Packet, at_once: int, patience_s: float) -> FoundServo:
@@ -130,7 +154,7 @@ def _examined(port: ServoPort, ping: Packet, at_once: int, patience_s: float) ->
 
 def _asked(port: ServoPort, question: Packet, window_s: float, quiet_s: float | None = None) -> Heard:
     """All that comes in within a time, s, or until nothing has come for another since the first answer."""
-    heard, reader, n_bytes, n_packets = Heard(), PacketReader(), 0, 0
+    heard, reader, n_bytes, n_packets, n_read = Heard(), PacketReader(), 0, 0, 0
     port.clearPort()
     port.writePort(encoded(question))
     port.setPacketTimeoutMillis(1e3 * window_s)
@@ -141,11 +165,14 @@ def _asked(port: ServoPort, question: Packet, window_s: float, quiet_s: float | 
             n_packets += 1
             if not isinstance(packet, Packet):
                 heard.damaged = True
-            elif packet.instruction == Instruction.STATUS:  # else it is the question, from an adapter with an echo
+                continue
+            n_read += len(encoded(packet))
+            if packet.instruction == Instruction.STATUS:  # else it is the question, from an adapter with an echo
                 heard.answers.append(packet)
         if data and heard.answers and quiet_s is not None:
             port.setPacketTimeoutMillis(1e3 * quiet_s)
     heard.foreign = n_bytes > 0 and n_packets == 0
+    heard.stray = n_bytes > n_read
     return heard
 
 
