@@ -147,5 +147,7 @@ class DynamixelEmulator:
         free_s = self._now_s() + len(question) * byte_s  # it was there at once; on a wire it takes its time
         for delay_s, answer in answers:
             free_s += delay_s + len(answer) * byte_s
-            self._stopped.wait(max(0.0, free_s - self._now_s()))
+            early_s = free_s - self._now_s()
+            if early_s > 0.0:
+                self._stopped.wait(early_s)
             os.write(self._ours, answer)
