@@ -7,13 +7,14 @@ import typer
 from paramove.cli.arm_bench import bench
 from paramove.cli.arm_calibrate import calibrate
 from paramove.cli.arm_estop import estop
+from paramove.cli.arm_jog import jog
 from paramove.cli.arm_reboot import reboot
 from paramove.cli.arm_scan import scan
 from paramove.cli.arm_setup import setup
 from paramove.cli.arm_verify import verify
 
 app = typer.Typer(
-    name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, reboot and stop an arm of servos."
+    name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, move and stop an arm of servos."
 )
-for command in (scan, setup, calibrate, verify, reboot, bench, estop):
+for command in (scan, setup, calibrate, verify, reboot, bench, jog, estop):
     app.command()(command)

@@ -25,7 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
     "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
     "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
-    "arm": ("paramove.cli.arm", "Find, set up, calibrate, check, reboot and stop an arm of servos."),
+    "arm": ("paramove.cli.arm", "Find, set up, calibrate, check, move and stop an arm of servos."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import, split and synthesize demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "models": ("paramove.cli.models", "List, show, plot and compare movement models."),

@@ -47,6 +47,27 @@ class TerminalPerson:
         else:
             self._lines(look)
 
+    @contextlib.contextmanager
+    def pressing(self) -> Iterator[Callable[[float], str]]:
+        """A function that waits so many seconds for a key and gives it, "" if none was pressed.
+
+        It raises QuitError for q, and at the end of the input. Other programs write keys without Enter between them.
+        """
+        with contextlib.ExitStack() as opened:
+            descriptor = self._source.fileno()
+            if self._source.isatty():
+                opened.enter_context(_unbuffered(descriptor))
+
+            def pressed(seconds: float) -> str:
+                if not select.select([descriptor], [], [], seconds)[0]:
+                    return ""
+                key = os.read(descriptor, 1).decode(errors="replace")
+                if key in QUIT or not key:
+                    raise QuitError
+                return key
+
+            yield pressed
+
     def _keys(self, look: Callable[[], list[str]]) -> None:
         shown = 0
         with _unbuffered(self._source.fileno()) as descriptor:

@@ -1,0 +1,92 @@
+"""One joint moved by small steps, as a person presses keys: from keys to trajectories. Without clock and sockets."""
+
+from __future__ import annotations
+
+import numpy as np
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
+
+SHORTEST_S = 0.5
+FASTEST = float(np.deg2rad(10.0))
+"""On the average of a step, rad/s."""
+POINTS = 21
+OVER = (TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED)
+
+
+class Jogging:
+    """`hear` what the arm's driver says; `step` and `choose` as keys are pressed.
+
+    Args:
+        name: Begins the ids of the trajectories, and must be another for each run of the program.
+        step: Of one key, rad.
+
+    Attributes:
+        chosen: Place of the joint that is moved.
+        angles: Measured, by joint, rad; empty before the driver has said them.
+        sentence: How the last step fared.
+    """
+
+    def __init__(self, name: str, step: float) -> None:
+        self.chosen = 0
+        self.angles: dict[str, float] = {}
+        self.sentence = ""
+        self._name, self._step = name, step
+        self._count = 0
+        self._goals: dict[str, float] = {}
+        self._waits_for = ""
+
+    @property
+    def joint(self) -> str:
+        """Name of the joint that is moved, "" before any is known."""
+        return list(self.angles)[self.chosen] if self.angles else ""
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a step is under way."""
+        return bool(self._waits_for)
+
+    def choose(self, place: int) -> None:
+        """The joint at this place, from 0, is moved from now on; one that does not exist is passed over."""
+        if 0 <= place < len(self.angles):
+            self.chosen = place
+
+    def hear_states(self, message: JointStates) -> None:
+        """Where the joints are."""
+        self.angles = {joint.name: joint.position for joint in message.joints}
+        self.chosen = min(self.chosen, max(len(self.angles) - 1, 0))
+
+    def hear_status(self, message: TrajectoryStatus) -> None:
+        """How the driver fares with a step."""
+        if message.trajectory_id != self._waits_for or message.state not in OVER:
+            return
+        self._waits_for = ""
+        if message.state == TrajectoryStatus.STATE_SUCCEEDED:
+            self.sentence = "there"
+        else:
+            self._goals.clear()  # it is not where the last step was to lead
+            self.sentence = message.reason
+
+    def step(self, direction: int, now_ns: int) -> JointTrajectory | None:
+        """The trajectory of one step, 1 up or -1 down; None while the last is under way or no joint is known.
+
+        It begins at the goal of the joint's last step, so that steps add up although the joint sags, and goes from rest
+        to rest with the least jerk.
+        """
+        if self.is_moving or not self.angles:
+            return None
+        begin = self._goals.get(self.joint, self.angles[self.joint])
+        end = begin + direction * self._step
+        self._goals = {self.joint: end}
+        self._count += 1
+        self._waits_for, self.sentence = f"{self._name}-{self._count}", "moving"
+        message = JointTrajectory(id=self._waits_for, joints=[self.joint])
+        message.captured.FromNanoseconds(now_ns)
+        share = np.linspace(0.0, 1.0, POINTS)
+        course = begin + (end - begin) * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        duration_s = max(SHORTEST_S, self._step / FASTEST)
+        message.points.extend(
+            TrajectoryPoint(time_s=time_s, position_rad=[angle])
+            for time_s, angle in zip(duration_s * share, course, strict=True)
+        )
+        return message
