@@ -34,7 +34,8 @@ from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
+from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
@@ -94,7 +95,9 @@ def rig(description: RobotDescription, patience: Patience = BUSY) -> Any:
     """A rig at the description's baud rate; ends with the arm at rest."""
     with (
         DynamixelEmulator(emulated_servos(description)) as emulator,
-        DrivenArm(description, servo_port(description, emulator.port), patience=patience) as arm,
+        DrivenArm(
+            description, joint_servos(description), servo_port(description, emulator.port), patience=patience
+        ) as arm,
     ):
         yield Rig(arm, emulator, description)
 
@@ -175,7 +178,7 @@ def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[
 
 def drive(description: RobotDescription, port: str) -> None:
     """What is killed: moves the arm, and says so."""
-    with DrivenArm(description, servo_port(description, port), patience=BUSY) as arm:
+    with DrivenArm(description, joint_servos(description), servo_port(description, port), patience=BUSY) as arm:
         wait(lambda: arm._loop.driver.state is State.DISARMED)
         arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
         wait(lambda: arm._loop.driver.state is State.ARMED)

@@ -11,31 +11,23 @@ Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
         arm/motors              MotorStatus            1 Hz
 """
 
-from pathlib import Path
-
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+from paramove.robots.dynamixel.arm_setup import ServoArmSetup
+from paramove.robots.dynamixel.driven_arm import DrivenArm
 
 HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
 SAYS = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
 
 
-class Config(NodeConfig):
-    """`robot`: its description. `port`: seen from the run's folder. `torque_off`: limp when disarmed and at the end."""
-
-    robot: Path
-    port: Path
-    torque_off: bool = False
+class Config(NodeConfig, ServoArmSetup):
+    """See `ServoArmSetup`."""
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
-    description = RobotDescription.load(config.robot)
-    port = servo_port(description, str(bus.run_folder / config.port))
-    with DrivenArm(description, port, config.torque_off) as arm:
+    with config.driven_arm(bus.run_folder) as arm:
         bus.when_readable(arm.readable, lambda: say(bus, arm))
         hear = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.driven_arm import servo_port
+from paramove.robots.dynamixel.arm_setup import servo_port
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from paramove.robots.dynamixel.driven_arm import DrivenArm, joint_servos
+from paramove.robots.dynamixel.arm_setup import joint_servos
+from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from tests.robots.dynamixel.person import Person
@@ -47,7 +48,7 @@ def test_it_holds_without_a_jump(arm):
 def test_it_moves_its_last_joint_a_little_and_back(robot, port):
     place = robot.chain.indices[-1]
     joint = robot.joint_names[place]
-    with DrivenArm(robot, port, torque_off=True, patience=PATIENCE) as driven:
+    with DrivenArm(robot, joint_servos(robot), port, torque_off=True, patience=PATIENCE) as driven:
         person = Person(driven)
         person.hears_until(lambda: person.angles)
         person.arms_and_waits()

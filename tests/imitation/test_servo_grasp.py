@@ -1,4 +1,4 @@
-"""The planned motion moves a real body in physics: held by friction alone, servos no stronger than their data sheets."""
+"""The planned motion moves a body in physics: held by friction alone, servos no stronger than their data sheets."""
 
 from __future__ import annotations
 

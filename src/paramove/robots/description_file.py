@@ -106,9 +106,10 @@ class ArmPart(_Part):
 
 
 class BusParameters(_Part):
-    """The servos' bus; they speak Dynamixel Protocol 2.0."""
+    """The servos' bus; they speak Dynamixel Protocol 2.0. `calibrate`: whether zeros differ from arm to arm."""
 
     baud_rate: int = Field(gt=0)
+    calibrate: bool = False
 
 
 class ChainSites(_Part):

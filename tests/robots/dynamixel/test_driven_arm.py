@@ -7,8 +7,9 @@ import pytest
 
 from paramove.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
-from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.driven_arm import DrivenArm, servo_port
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
+from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
@@ -62,7 +63,7 @@ def port(emulator, latency_s: float = LATENCY_S):
 
 @pytest.fixture
 def person(emulator):
-    with DrivenArm(ROBOT, port(emulator), patience=PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), patience=PATIENCE) as arm:
         yield PersonAtEmulator(arm, emulator)
 
 
@@ -140,7 +141,7 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
     with DynamixelEmulator(emulator.bus.servos, link) as linked:
         port = servo_port(ROBOT, str(link))
         port.latency_s = LATENCY_S
-        with DrivenArm(ROBOT, port, patience=Patience(silent_s=0.5, watchdog_s=2.54)) as arm:
+        with DrivenArm(ROBOT, joint_servos(ROBOT), port, patience=Patience(silent_s=0.5, watchdog_s=2.54)) as arm:
             person = PersonAtEmulator(arm, linked)
             person.arms_and_waits()
             person.moves()
@@ -156,7 +157,7 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
 
 @pytest.mark.parametrize(("torque_off", "torque"), [(False, [1] * 5), (True, [0] * 5)])
 def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque):
-    with DrivenArm(ROBOT, port(emulator), torque_off, PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), torque_off, PATIENCE) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
         person.moves()
@@ -165,7 +166,7 @@ def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque
 
 
 def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(emulator):
-    with DrivenArm(ROBOT, port(emulator, 0.05), True, PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), True, PATIENCE) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
         with emulator.lock:
@@ -174,10 +175,6 @@ def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(e
 
 
 def test_a_missing_port_is_told_with_the_remedy():
-    with pytest.raises(InputError, match="by-id"), DrivenArm(ROBOT, servo_port(ROBOT, "/dev/ttyUSB77")):
+    arm = DrivenArm(ROBOT, joint_servos(ROBOT), servo_port(ROBOT, "/dev/ttyUSB77"))
+    with pytest.raises(InputError, match="by-id"), arm:
         pass
-
-
-def test_a_robot_without_a_servo_bus_is_refused():
-    with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
-        servo_port(RobotDescription.load("robot_description/hoap3"), "/dev/null")

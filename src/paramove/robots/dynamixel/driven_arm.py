@@ -17,20 +17,17 @@ from paramove.bus.topics import Topic
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
-from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_loop import ServoLoop
-from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.hoap3.driver import ArmDriver
-from paramove.safety.gate_io import SafetySettings, State
+from paramove.safety.gate_io import Fault, SafetySettings, State
 from paramove.safety.self_collision import SelfCollision
 
 FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from where it is commanded: more means that somebody or something holds it."""
-LATENCY_SHARE = 0.8
-"""Of the loop's period: so long it may wait for a servo. A missing one costs periods, one that is late costs none."""
 SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
 
 
@@ -38,10 +35,12 @@ class DrivenArm:
     """An arm that is driven while this is a context.
 
     Args:
-        description: Of an arm with servos.
+        description: Of an arm with servos; its units are those of this very arm.
+        servos: In the order of its joints.
         port: Of its bus, closed.
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         patience: With silence.
+        standing_faults: That keep the arm from being armed, whatever its servos say.
 
     Raises:
         InputError: On entering: the port is missing, forbidden or in use.
@@ -51,7 +50,13 @@ class DrivenArm:
     """
 
     def __init__(
-        self, description: RobotDescription, port: ServoPort, torque_off: bool = False, patience: Patience | None = None
+        self,
+        description: RobotDescription,
+        servos: tuple[JointServo, ...],
+        port: ServoPort,
+        torque_off: bool = False,
+        patience: Patience | None = None,
+        standing_faults: tuple[Fault, ...] = (),
     ) -> None:
         patience = patience or Patience()
         following = np.full(description.n_joints, FOLLOWING)
@@ -60,7 +65,7 @@ class DrivenArm:
         self._driver = ArmDriver(description, settings, self_collision(description))
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(
-            self._driver, description, joint_servos(description), port, torque_off, patience, self._wake
+            self._driver, description, servos, port, torque_off, patience, standing_faults, self._wake
         )
         self._slow_ns = self._motors_ns = 0
         self._state: State | None = None
@@ -124,36 +129,11 @@ class DrivenArm:
             os.write(self._written, b".")
 
 
-def servo_port(description: RobotDescription, name: str) -> ServoPort:
-    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus."""
-    if description.bus is None:
-        raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
-    latency_s = LATENCY_SHARE * 1e-6 * description.stream.period_us
-    return ServoPort(name, description.bus.baud_rate, latency_s)
-
-
 def self_collision(description: RobotDescription) -> SelfCollision:
     """Distances between the parts of a described robot, as its model has them."""
     model = mujoco.MjModel.from_xml_path(str(description.model_path))
     d = description
     return SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
-
-
-def joint_servos(description: RobotDescription) -> tuple[JointServo, ...]:
-    """The servos of a described arm, in the order of its joint vector."""
-    rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
-    return tuple(
-        JointServo(name, number, model_named(motor), grip_current=_grip_current(description, name, motor))
-        for name, number, motor in rows
-    )
-
-
-def _grip_current(description: RobotDescription, joint: str, motor: str) -> int | None:
-    """In the servo's units."""
-    chain = description.chain
-    if chain is None or joint != chain.gripper or chain.grip_current_ma is None:
-        return None
-    return round(chain.grip_current_ma / CURRENT_UNIT_MA[motor])
 
 
 def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_chain import Answered, ServoChain, ServoError
 from paramove.robots.dynamixel.servo_checks import (
     ENDS,
@@ -36,11 +37,18 @@ class Patience:
 
     Attributes:
         silent_s: By the loop, of a servo.
-        watchdog_s: By a servo, of the bus; then it stops by itself. At most 2.54 s.
+        watchdog_s: By a servo, of the bus; then it stops by itself. 0.02 to 2.54 s.
     """
 
     silent_s: float = 0.050
     watchdog_s: float = 0.100
+
+    def __post_init__(self) -> None:
+        """Raises InputError for times that no loop or servo has."""
+        if not 0.0 < self.silent_s < np.inf or not WATCHDOG_UNIT_S <= self.watchdog_s <= 127 * WATCHDOG_UNIT_S:
+            raise InputError(
+                f"silent_s is more than 0 and watchdog_s 0.02 to 2.54 s, found {self.silent_s} and {self.watchdog_s}"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,7 @@ class ServoLoop:
         port: Closed; it is opened here, and again after it was lost.
         torque_off: Whether the arm goes limp when it is disarmed and when the loop ends; by default it holds.
         patience: With silence.
+        standing_faults: That keep the arm from being armed, whatever its servos say.
         said: Called in the loop's thread when `take` has something.
 
     Raises:
@@ -55,6 +56,7 @@ class ServoLoop:
         port: ServoPort,
         torque_off: bool = False,
         patience: Patience | None = None,
+        standing_faults: tuple[Fault, ...] = (),
         said: Callable[[], None] = lambda: None,
     ) -> None:
         self.driver = driver
@@ -68,6 +70,7 @@ class ServoLoop:
         self._servos = servos
         self._torque_off = torque_off
         self._patience = patience
+        self._standing_faults = standing_faults
         self._said = said
         self._arm = ServoArm(servos, ServoChain(port), self._period_s, patience)
         self._reader: StreamReader | None = None
@@ -153,7 +156,7 @@ class ServoLoop:
 
     def _prepare(self) -> ArmReading | None:
         """Check the servos and let them hold where they are, before the gate hears the word to arm."""
-        self.driver.on_arming_checks(self._arm.check() or self._arm.take_hold())
+        self.driver.on_arming_checks(self._standing_faults or self._arm.check() or self._arm.take_hold())
         return self._arm.measured()
 
     def _fault(self, reading: ArmReading) -> Fault | None:

@@ -1,0 +1,96 @@
+"""A servo arm as a launch file names it: its description, port and calibration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+from paramove.robots.dynamixel.driven_arm import DrivenArm
+from paramove.robots.dynamixel.serial_adapters import serial_of
+from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.robots.dynamixel.servo_checks import JointServo
+from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
+from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.safety.gate_io import Fault
+
+LATENCY_SHARE = 0.8
+"""Of the loop's period: so long it may wait for a servo. A missing one costs periods, one that is late costs none."""
+
+
+class ServoArmSetup(BaseModel):
+    """Parameters of a servo arm.
+
+    Attributes:
+        robot: Folder of the arm's description.
+        port: Of its bus, seen from the run's folder: a link in /dev/serial/by-id, whose name has the adapter's number.
+        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
+        patience: With silence.
+        calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
+        nominal: Whether they are even for an arm that everybody assembles differently, as in simulation.
+    """
+
+    robot: Path
+    port: Path
+    torque_off: bool = False
+    patience: Patience = Patience()
+    calibration: Path | None = None
+    nominal: bool = False
+
+    def driven_arm(self, run_folder: Path) -> DrivenArm:
+        """The arm, not yet driven.
+
+        Raises:
+            InputError: Its description or calibration is missing or wrong, or is another arm's.
+        """
+        description = RobotDescription.load(self.robot)
+        calibration = None
+        if self.calibration is not None:
+            calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
+            d = description
+            description = replace(d, units=calibration.units(d.joint_names, d.lower, d.upper))
+        faults = () if self.nominal or calibration is not None else uncalibrated(description)
+        servos = joint_servos(description, calibration)
+        port = servo_port(description, str(run_folder / self.port))
+        return DrivenArm(description, servos, port, self.torque_off, self.patience, faults)
+
+
+def servo_port(description: RobotDescription, name: str) -> ServoPort:
+    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus."""
+    if description.bus is None:
+        raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
+    return ServoPort(name, description.bus.baud_rate, LATENCY_SHARE * 1e-6 * description.stream.period_us)
+
+
+def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:
+    """Of an arm whose zeros every owner has to measure."""
+    if description.bus is None or not description.bus.calibrate:
+        return ()
+    sentence = (
+        f"{description.name} is assembled differently by everybody, and this one is not calibrated: run `paramove arm "
+        "calibrate`, then name its file as the driver's `calibration`"
+    )
+    return (Fault("not_calibrated", "", sentence),)
+
+
+def joint_servos(description: RobotDescription, calibration: ArmCalibration | None = None) -> tuple[JointServo, ...]:
+    """The servos of a described arm, in the order of its joint vector."""
+    rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
+    offsets = dict.fromkeys(description.joint_names, 0)
+    if calibration is not None:
+        offsets = {name: joint.homing_offset for name, joint in calibration.joints.items()}
+    return tuple(
+        JointServo(name, number, model_named(motor), offsets[name], _grip_current(description, name, motor))
+        for name, number, motor in rows
+    )
+
+
+def _grip_current(description: RobotDescription, joint: str, motor: str) -> int | None:
+    """In the servo's units."""
+    chain = description.chain
+    if chain is None or joint != chain.gripper or chain.grip_current_ma is None:
+        return None
+    return round(chain.grip_current_ma / CURRENT_UNIT_MA[motor])

@@ -1,0 +1,69 @@
+"""A servo arm as a launch file names it: with which zeros it is driven, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from paramove.input_error import InputError
+from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.dynamixel.arm_calibration import CalibrationError
+from paramove.robots.dynamixel.arm_setup import ServoArmSetup, joint_servos, servo_port, uncalibrated
+from paramove.robots.dynamixel.emulated_arm import emulated_servos
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_arm import Patience
+from tests.robots.dynamixel.person import Person
+from tests.robots.dynamixel.small_arm import calibration
+
+FOLDER = Path("robot_description")
+KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
+PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
+
+
+def setup(port: Path, **parameters) -> ServoArmSetup:
+    return ServoArmSetup(robot=FOLDER / "koch_v1_1", port=port, patience=PATIENCE, **parameters)
+
+
+def test_grippers_hold_with_a_limited_current_and_other_joints_by_position():
+    assert [servo.mode for servo in joint_servos(OPEN)] == [3, 3, 3, 3, 5]
+    assert joint_servos(OPEN)[-1].grip_current == round(200 / 2.69)
+    assert joint_servos(KOCH)[-1].grip_current == 400
+
+
+def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(tmp_path):
+    assert uncalibrated(OPEN) == ()
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link).driven_arm(tmp_path) as arm:
+        person = Person(arm)
+        person.waits_for("DISARMED")
+        person.arms()
+        person.hears_until(lambda: person.safety.faults)
+        assert person.codes() == [("not_calibrated", "")]
+        assert "`paramove arm calibrate`" in person.safety.faults[0].sentence
+
+
+def test_in_simulation_its_zeros_are_those_of_the_description(tmp_path):
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, nominal=True).driven_arm(tmp_path) as arm:
+        arm_sees = Person(arm)
+        arm_sees.arms_and_waits()
+        np.testing.assert_allclose(arm_sees.angles[-1], KOCH.base_pose, rtol=0, atol=np.deg2rad(0.1))
+
+
+def test_another_arms_calibration_is_refused(tmp_path):
+    path = tmp_path / "arm.yaml"
+    calibration().save(path)
+    with pytest.raises(CalibrationError, match="of the arm behind adapter"):
+        setup(tmp_path / "usb-FTDI_9999-if00-port0", calibration=path).driven_arm(tmp_path)
+
+
+def test_a_robot_without_a_servo_bus_is_refused():
+    with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
+        servo_port(RobotDescription.load(FOLDER / "hoap3"), "/dev/null")
+
+
+@pytest.mark.parametrize("wrong", [{"silent_s": 0.0}, {"watchdog_s": 3.0}, {"watchdog_s": 0.001}])
+def test_impossible_patience_is_refused(wrong):
+    with pytest.raises((InputError, ValidationError), match=r"watchdog_s 0\.02 to 2\.54 s"):
+        ServoArmSetup(robot=FOLDER / "koch_v1_1", port=Path("x"), patience=wrong)
