@@ -109,7 +109,7 @@ def explained() -> Iterator[None]:
     except InputError as error:
         raise ended(str(error), error.exit_code) from error
     except OSError as error:
-        raise ended(f"{error.filename}: {error.strerror}", exit_codes.PERMISSION) from error
+        raise ended(str(error), exit_codes.PERMISSION) from error
 
 
 def ended(sentence: str, code: int) -> typer.Exit:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from paramove.robots.dynamixel.arm_calibration import (
     COUNTS_PER_RAD,
+    CURRENT_BASED,
     EXTENDED,
     LONGEST_TRAVEL,
     POSITION,
@@ -115,6 +116,13 @@ def test_the_shorter_way_is_taken(later, earlier):
     step = difference(later, earlier)
     assert -PULSES_PER_TURN // 2 <= step < PULSES_PER_TURN // 2
     assert (earlier + step - later) % PULSES_PER_TURN == 0
+
+
+@pytest.mark.parametrize("offset", [2000, 4090])
+def test_a_gripper_holds_with_a_limited_current(offset):
+    joint = calibrated_joint(SERVO, planned(grips=True), shown(BACK_AND_FORTH, 1, offset).travel(), offset, 100)
+    assert joint.operating_mode == CURRENT_BASED
+    assert abs(joint.angle(offset)) <= HALF_COUNT
 
 
 def test_what_cannot_be_calibrated_is_refused_with_the_reason():

@@ -24,6 +24,7 @@ class PlannedServo:
         posture: Its angle in the posture in which the arm is held for calibration, rad.
         sign: 1 where the servo counts up with the angle in the arm as it is described, else -1.
         direction: Where the joint moves with a growing angle, in words.
+        grips: Whether it holds with a limited current, in Current-based Position Control Mode.
     """
 
     joint: str
@@ -34,6 +35,7 @@ class PlannedServo:
     posture: float = 0.0
     sign: int = 1
     direction: str = ""
+    grips: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,7 @@ def load_plan(folder: Path) -> ArmPlan:
             upper=float(robot.upper[place]),
             sign=1 if robot.units.counts_per_rad[place] > 0 else -1,
             direction=words.get(joint, ""),
+            grips=robot.chain is not None and robot.chain.grip_current_ma is not None and joint == robot.chain.gripper,
         )
         servos.append(servo)
     return ArmPlan(robot.name, robot.bus.baud_rate, tuple(servos))

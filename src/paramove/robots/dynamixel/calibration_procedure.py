@@ -89,8 +89,9 @@ class ArmCalibrator:
         for servo in self._plan.servos:
             registers = model_named(servo.model).registers
             self._chain.write(servo.number, registers["Torque Enable"], 0)
-            if self._chain.read(servo.number, registers["Homing Offset"]):
-                self._chain.write(servo.number, registers["Homing Offset"], 0)
+            for name in ("Drive Mode", "Homing Offset"):
+                if self._chain.read(servo.number, registers[name]):
+                    self._chain.write(servo.number, registers[name], 0)
 
     def _positions(self) -> dict[int, int]:
         """Of all servos; of those alone that answered while an answer is missing now and then."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from paramove.robots.dynamixel.arm_calibration import (
     COUNTS_PER_RAD,
+    CURRENT_BASED,
     EXTENDED,
     LONGEST_TRAVEL,
     POSITION,
@@ -116,7 +117,7 @@ def calibrated_joint(
             f"joint {planned.joint} was moved by {abs(step)} counts, at least {SMALLEST_MOVE} show a direction: move "
             "it further"
         )
-    mode: Literal[3, 4] = EXTENDED if travel.has_seam else POSITION
+    mode: Literal[3, 4, 5] = CURRENT_BASED if planned.grips else EXTENDED if travel.has_seam else POSITION
     joint = JointCalibration(
         id=servo.number,
         model=servo.model,

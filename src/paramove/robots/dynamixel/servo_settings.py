@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paramove.robots.dynamixel.arm_calibration import (
+    CURRENT_BASED,
     EXTENDED,
     POSITION,
     ArmCalibration,
@@ -18,7 +19,14 @@ from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, Register, model_named
 
 FILE, DESCRIPTION, SERVO = "file", "description", "servo"
-SETTINGS = ("Return Delay Time", "Operating Mode", "Homing Offset", "Max Position Limit", "Min Position Limit")
+SETTINGS = (
+    "Return Delay Time",
+    "Drive Mode",
+    "Operating Mode",
+    "Homing Offset",
+    "Max Position Limit",
+    "Min Position Limit",
+)
 """Kept without power; written while torque is off."""
 
 
@@ -41,10 +49,11 @@ class Difference:
 
 
 def settings(joint: JointCalibration) -> dict[str, int]:
-    """Values of `SETTINGS` that its servo must have. In the extended mode a servo does not look at its limits."""
+    """Values of `SETTINGS` that its servo must have. In the other modes a servo does not look at its limits."""
     within_turn = joint.operating_mode == POSITION
     return {
         "Return Delay Time": 0,
+        "Drive Mode": 0,
         "Operating Mode": joint.operating_mode,
         "Homing Offset": joint.homing_offset,
         "Max Position Limit": joint.max_counts if within_turn else PULSES_PER_TURN - 1,
@@ -120,7 +129,7 @@ def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
                 f"joint {name}: servo {joint.id} has Homing Offset {read['Homing Offset']}, and a calibration has "
                 "none: `paramove arm verify --write` sets it to 0"
             )
-        if read["Operating Mode"] not in (POSITION, EXTENDED, 5):
+        if read["Operating Mode"] not in (POSITION, EXTENDED, CURRENT_BASED):
             raise CalibrationError(
                 f"joint {name}: servo {joint.id} has operating mode {read['Operating Mode']}, not 3 to 5"
             )
