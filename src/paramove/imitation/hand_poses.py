@@ -51,6 +51,13 @@ class HandPoses:
                 return float(pitch)
         raise self._refusal(goal, wanted, band, len(pitches) > 0)
 
+    def middle(self, height: float, band: tuple[float, float]) -> FloatArray:
+        """Of the places straight ahead at this height that are reached with a pitch of a band, [3], m."""
+        ahead = np.arange(0.02, 0.5, _GRID_M)
+        places = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
+        found = self._chain.kinematics.all_joint_angles(places[:, None], np.linspace(*band, 13)[None])
+        return np.asarray(places[np.isfinite(found).all(axis=-1).any(axis=-1).any(axis=-1)].mean(axis=0))
+
     def _poses(self, goal: FloatArray, wanted: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Pitches in order of their distance from the wanted one, with the joint angles, [P] and [P, J]."""
         pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(wanted, *band)])

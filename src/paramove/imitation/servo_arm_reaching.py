@@ -8,7 +8,6 @@ lowers it, the hand closes and lifts the object, a learned movement carries it o
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,7 +75,8 @@ class ServoArmReaching:
         self._clearance = TableClearance(description, chain, o.table_z)
         self._poses = HandPoses(chain, self._clearance, self._gripper(o.work_opening))
         length = float(np.hypot(*self._arm.upper_arm) + np.hypot(*self._arm.forearm) + self._arm.hand[0])
-        self._person = PlacedPerson(robot_movement(model, length), self._middle(), self._arm.yaw_axis, POINTS)
+        middle = self._poses.middle(o.table_z, self._band(o.grasp_band_deg))
+        self._person = PlacedPerson(robot_movement(model, length), middle, self._arm.yaw_axis, POINTS)
 
     def reach(self, target: ArrayLike, start: ArrayLike | None = None) -> PlannedMotion:
         """Bring the end effector to a place with an open hand, by the learned movement.
@@ -164,22 +164,41 @@ class ServoArmReaching:
     ) -> None:
         """Along a learned way; with an arch or less of what the person does where that is not clear, or slow."""
         refusal, best = "", None
-        for share, arch in product(_SHARES, _ARCHES_M):
-            tried = way.milder(share).raised(arch)
+        for share in _SHARES:
+            mild = way.milder(share)
+            gripper = self._openings(motion.end, mild, opening)
+            rows, fault = self._clear(motion.end, mild, point, pitch, gripper, clearance)
+            refusal = refusal or fault
+            if rows is not None and (best is None or len(rows) < len(best)):
+                best = rows
+            if best is not None and self._period * len(best) <= self.options.patience:
+                break
+        if best is None:
+            raise OutOfReachError(f"no way leads to {metres(point)} from {metres(self._hand(motion.end))}: {refusal}")
+        motion.add(name, best, holding)
+
+    def _clear(
+        self,
+        start: FloatArray,
+        way: LearnedWay,
+        point: FloatArray,
+        pitch: float,
+        gripper: FloatArray,
+        clearance: float,
+    ) -> tuple[FloatArray | None, str]:
+        """Rows along a way with the least arch with which it is clear; if it never is, None and what is in the way."""
+        refusal = ""
+        for arch in _ARCHES_M:
             try:
-                rows = self._along(motion.end, tried, point, pitch, self._openings(motion.end, tried, opening))
+                rows = self._along(start, way.raised(arch), point, pitch, gripper)
             except NoJointPathError as error:
                 refusal = refusal or str(error)
                 continue
             fault = self._fault(rows, clearance)
+            if not fault:
+                return rows, ""
             refusal = refusal or fault
-            if not fault and (best is None or len(rows) < len(best)):
-                best = rows
-                if self._period * len(rows) <= self.options.patience:
-                    break
-        if best is None:
-            raise OutOfReachError(f"no way leads to {metres(point)} from {metres(self._hand(motion.end))}: {refusal}")
-        motion.add(name, best, holding)
+        return None, refusal
 
     def _line(self, motion: MotionRows, name: str, point: FloatArray, pitch: float, holding: bool = False) -> None:
         """Straight, with the gripper as it is."""
@@ -276,14 +295,6 @@ class ServoArmReaching:
     def _above(self, point: FloatArray, pitch: float) -> tuple[FloatArray, float]:
         above = point + self.options.lift * _UP
         return above, self._poses.pitch_at(above, pitch, self._band(self.options.reach_band_deg))
-
-    def _middle(self) -> FloatArray:
-        """Of what the arm can grasp at on the table, straight ahead, [3], m."""
-        ahead = np.arange(0.02, 0.5, 0.005)
-        places = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, self.options.table_z)], axis=1)
-        pitches = np.linspace(*self._band(self.options.grasp_band_deg), 13)
-        found = np.isfinite(self._arm.all_joint_angles(places[:, None], pitches[None])).all(axis=-1)
-        return np.asarray(places[found.any(axis=-1).any(axis=-1)].mean(axis=0))
 
     def _hand(self, angles: FloatArray) -> FloatArray:
         return self._arm.forward(angles[..., :-1]).position
