@@ -40,7 +40,7 @@ def offered(line, cwd=ROOT, **variables):
     ("line", "expected"),
     [
         ("paramove la", {"launch"}),
-        ("paramove launch ", {"pointing", "relocate_by_pointing", "rule_learning"}),
+        ("paramove launch ", {"dynamixel_arm", "pointing", "relocate_by_pointing", "rule_learning"}),
         ("paramove launch rule_learning --with re", {"real", "real_time"}),
         ("paramove launch pointing --with rep", {"replay"}),
         ("paramove launch rule_learning --set camera.w", {"camera.width="}),

@@ -9,10 +9,13 @@ from paramove.supervision.launch_file import load
 
 ROOT = Path(__file__).parents[2]
 LAUNCH_FILES = sorted(path.stem for path in (ROOT / "launch").glob("*.yaml"))
+SIMULATED = {"dynamixel_arm": "emulated"}
+"""The overlay that stands for the hardware, where it is not `sim`."""
 
 
-@pytest.mark.parametrize("overlay", ["sim", "real"])
-@pytest.mark.parametrize("name", LAUNCH_FILES)
+@pytest.mark.parametrize(
+    ("name", "overlay"), [(name, one) for name in LAUNCH_FILES for one in (SIMULATED.get(name, "sim"), "real")]
+)
 def test_nodes_fit_together(name, overlay):
     launch = load(ROOT / "launch", name, [overlay])
     application.check(launch, ROOT)
