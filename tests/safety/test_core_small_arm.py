@@ -174,6 +174,7 @@ def test_a_joint_that_is_held_is_given_way_to_in_motion() -> None:
     assert (state, faults) == (State.STOPPING, ("following",))
     assert arm.core.faults[0].joint == "elbow"
     assert targets is not None
+    assert targets.first_index == arm.played + 2
     np.testing.assert_allclose(targets.rows[-1], pose, rtol=0, atol=1e-9)
     assert targets.ramp_rows == len(targets.rows)
     for _ in range(100):
@@ -313,3 +314,118 @@ def test_a_word_to_disarm_is_forgotten_with_the_robot_that_it_was_for() -> None:
     assert arm.step()[1] is State.DISARMED
     arm.arm()
     assert arm.step(stop=VOLTAGE)[1] is State.HOLD
+
+
+def test_after_a_word_to_disarm_in_motion_a_later_fault_is_held() -> None:
+    arm = disarmed_in_motion()
+    for _ in range(60):
+        arm.step()
+    assert (arm.core.state, arm.core.faults) == (State.DISARMED, ())
+    arm.arm()
+    assert arm.step(stop=VOLTAGE)[1] is State.HOLD
+
+
+def test_a_silent_robot_is_not_disarmed_by_a_word() -> None:
+    arm = SmallArm()
+    arm.arm()
+    robot = arm.measured()
+    word = ArmWord(arm.now + 600 * MS, "a person", False)
+    assert arm.step(ms=600, measured=robot, word=word)[1] is State.DISCONNECTED
+
+
+def test_what_the_faults_of_arming_say() -> None:
+    arm = SmallArm()
+    robot = replace(arm.measured(), captured_ns=arm.now + 2000 * MS, at_rest=False)
+    lost = replace(robot, positions=np.array([0.0, np.nan, 0.0]), commanded=np.array([0.0, -2.1, 0.0]))
+    arm.step(ms=2000, measured=lost, word=ArmWord(arm.now + 500 * MS, "", True))
+    told = [(fault.code, fault.joint, fault.sentence) for fault in arm.core.faults]
+    outside = "joint elbow is commanded at -120.32 deg, allowed -114.59 to 114.59 deg; move it inside by hand"
+    assert told == [
+        ("arming_stale", "", "the arm word was said 1500 ms ago, allowed 1000 ms; say it again"),
+        ("arming_source", "", "the arm word names no source; say who arms"),
+        ("arming_moving", "", "the robot is moving; arm it at rest"),
+        ("arming_pose_unknown", "", "the measured pose is not known: [ 0. nan  0.]"),
+        ("arming_pose_outside", "elbow", outside),
+    ]
+    arm = SmallArm(SafetySettings(following=np.full(3, 0.1), words_per_s=3.0))
+    arm.push = np.array([0.2, 0.0, 0.2])
+    arm.arm()
+    arm.arm()
+    told = [(fault.code, fault.joint, fault.sentence) for fault in arm.core.faults]
+    away = "shoulder, wrist not where commanded; see what holds them or command where they are"
+    assert told == [
+        ("arming_following", "shoulder", away),
+        ("arming_rate", "", "more arm words than allowed: 1 within 250 ms; wait"),
+    ]
+
+
+def test_what_the_faults_of_reports_and_time_say() -> None:
+    arm = SmallArm()
+    arm.arm()
+    arm.now -= 1
+    arm.step(ms=0)
+    assert [(f.code, f.joint) for f in arm.core.faults] == [("clock", "")]
+    arm = SmallArm()
+    arm.arm()
+    arm.step(measured=replace(arm.measured(), captured_ns=arm.now + 10 * MS, positions=np.zeros(2)))
+    sentence = "the robot says poses of shape (2,) and (3,), allowed (3,)"
+    assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [("report", "", sentence)]
+    arm = SmallArm()
+    arm.arm()
+    arm.step(measured=replace(arm.measured(), captured_ns=arm.now + 10 * MS, next_index=4))
+    sentence = "the robot is at row 4, allowed 0 to 0; was it restarted?"
+    assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [("report", "", sentence)]
+    arm = SmallArm()
+    arm.arm()
+    arm.step(ms=501, measured=None)
+    sentence = (
+        "the robot was last heard 501 ms ago, allowed 500 ms; it comes to rest by itself; arm again once it is back"
+    )
+    assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [("robot_silent", "", sentence)]
+
+
+PROPOSED = "more proposals than allowed: 1 within 250 ms"
+
+
+@pytest.mark.parametrize(
+    ("fields", "code", "sentence"),
+    [
+        (
+            {"joint_names": ("a", "b")},
+            "names",
+            "rows are for 2 other joints, allowed: shoulder, elbow, wrist",
+        ),
+        ({"rows": PATH[:4, :2]}, "length", "rows have shape (4, 2), allowed [up to 5000, 3]"),
+        ({"ahead": PATH[0]}, "length", "rows have shape (3,), allowed [up to 5000, 3]"),
+        ({"rows": np.zeros((5001, 3))}, "length", "rows have shape (5001, 3), allowed [up to 5000, 3]"),
+        ({"rows": PATH[:0]}, "length", "the proposal is empty, at least one row is needed"),
+        ({"epoch": 4}, "epoch", "rows of epoch 4, allowed 5: of an earlier life"),
+        ({"first_index": -1}, "played", "rows from index -1, allowed from 0: earlier ones are played"),
+        ({"first_index": 1}, "gap", "rows from index 1, allowed up to 0: no gap"),
+    ],
+)
+def test_what_the_faults_of_proposals_say(fields: dict, code: str, sentence: str) -> None:
+    arm = SmallArm()
+    arm.arm()
+    arm.step(proposal=lambda: replace(arm.proposal(), **fields))
+    assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [(code, "", sentence)]
+
+
+@pytest.mark.parametrize(("age_ms", "passes"), [(0, True), (250, True), (251, False), (-1, False)])
+def test_a_proposal_may_be_a_quarter_of_a_second_old(age_ms: int, passes: bool) -> None:
+    arm = SmallArm()
+    arm.arm()
+    arm.step(proposal=lambda: replace(arm.proposal(), captured_ns=arm.now - age_ms * MS))
+    told = [(f.code, f.joint, f.sentence) for f in arm.core.faults]
+    assert told == ([] if passes else [("stale", "", f"rows were made {age_ms} ms ago, allowed 0 to 250 ms")])
+
+
+def test_as_many_rows_as_the_buffer_takes_pass_and_a_rate_that_is_broken_is_told() -> None:
+    arm = SmallArm(SafetySettings(proposals_per_s=4.0))
+    arm.arm()
+    still = np.zeros((5000, 3))
+    targets = arm.step(proposal=lambda: replace(arm.proposal(), rows=still, ahead=still[:0]))[0]
+    assert targets is not None
+    assert len(targets.rows) == 5000
+    arm.step(proposal=lambda: replace(arm.proposal(), first_index=5000, rows=still[:2], ahead=still[:0]))
+    assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [("rate", "", PROPOSED)]

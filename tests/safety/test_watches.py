@@ -29,7 +29,7 @@ def test_a_source_that_is_silent_counts_as_pressed() -> None:
     assert watch.fault(600 * MS, None) is None
     silent = watch.fault(601 * MS, None)
     assert silent is not None
-    assert silent.code == "emergency_silent"
+    assert (silent.code, silent.joint) == ("emergency_silent", "")
     assert silent.sentence == (
         "the emergency stop was not heard for 501 ms, allowed 500 ms, and counts as pressed; bring its source back, "
         "then arm again"
@@ -95,6 +95,8 @@ def test_one_more_than_the_allowed_within_a_quarter_second_is_too_many(per_s: fl
     assert watch.allowed == allowed
     assert not any(watch.exceeded(i) for i in range(allowed))
     assert watch.exceeded(250 * MS - 1)
+    at_once = RateWatch(per_s)
+    assert [at_once.exceeded(0) for _ in range(allowed + 1)] == [False] * allowed + [True]
     late = RateWatch(per_s)
     assert not any(late.exceeded(i) for i in range(allowed))
     assert not late.exceeded(250 * MS)

@@ -159,7 +159,6 @@ class SafetyCore:
             if self.state is State.STOPPING:
                 self._disarm_after_stop = True
             elif self.state is State.ARMED and self._moving(measured):
-                self._disarm_after_stop = True
                 return self._stop(now_ns, None, inputs.proposal, measured)
             else:
                 self.state = State.DISARMED
