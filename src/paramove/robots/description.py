@@ -93,8 +93,8 @@ class RobotDescription:
 
     All arrays have shape [J]; angles in rad. `lower`, `upper` are the mechanical range, `soft_lower`, `soft_upper` what
     commands keep to. `velocity` is the motor's limit; `operating_*` are our limits for planned movement. A robot like
-    HOAP-3 has `firmware` and `arms`; one of servos on a bus has `bus`, `servo_ids` in the order of the joints, and a
-    `chain`. What a robot has not is None or empty.
+    HOAP-3 has `firmware` and `arms`; one of servos on a bus has `bus`, `servo_ids` and `position_gains` (P, I, D of the
+    servo's own loop, in its units) in the order of the joints, and a `chain`. What a robot has not is None or empty.
     """
 
     name: str
@@ -120,6 +120,7 @@ class RobotDescription:
     arms: dict[str, Arm]
     bus: BusParameters | None
     servo_ids: tuple[int, ...]
+    position_gains: tuple[tuple[int, int, int] | None, ...]
     chain: Chain | None
 
     @property
@@ -217,6 +218,7 @@ def _assemble(path: Path, file: RobotFile) -> RobotDescription:
         arms={side: _arm(names, arm) for side, arm in file.arms.items()},
         bus=file.bus,
         servo_ids=tuple(joint.servo_id for joint in joints if joint.servo_id is not None),
+        position_gains=tuple(motor.position_gains for motor in motors),
         chain=None if file.chain is None else _chain(names, file.chain, soft_lower, soft_upper),
     )
 

@@ -37,7 +37,7 @@ class JointPart(_Part):
 
 
 class MotorPart(_Part):
-    """What a kind of motor can do and may do."""
+    """What a kind of motor can do and may do. `position_gains`: P, I and D of a servo's own loop, in its units."""
 
     loop: Literal["velocity", "servo"]
     torque_average: float = Field(gt=0)
@@ -48,6 +48,7 @@ class MotorPart(_Part):
     operating_acceleration_deg_s2: float = Field(gt=0)
     stop_acceleration_deg_s2: float = Field(gt=0)
     jerk_deg_s3: float = Field(gt=0)
+    position_gains: tuple[int, int, int] | None = None
 
 
 class FirmwareParameters(_Part):

@@ -78,13 +78,14 @@ def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:
 
 def joint_servos(description: RobotDescription, calibration: ArmCalibration | None = None) -> tuple[JointServo, ...]:
     """The servos of a described arm, in the order of its joint vector."""
-    rows = zip(description.joint_names, description.servo_ids, description.motors, strict=True)
-    offsets = dict.fromkeys(description.joint_names, 0)
+    d = description
+    offsets = dict.fromkeys(d.joint_names, 0)
     if calibration is not None:
         offsets = {name: joint.homing_offset for name, joint in calibration.joints.items()}
+    rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, strict=True)
     return tuple(
-        JointServo(name, number, model_named(motor), offsets[name], _grip_current(description, name, motor))
-        for name, number, motor in rows
+        JointServo(name, number, model_named(motor), offsets[name], _grip_current(d, name, motor), gains)
+        for name, number, motor, gains in rows
     )
 
 

@@ -25,6 +25,7 @@ from paramove.safety.gate_io import Fault
 
 Counts = NDArray[np.int16]
 
+GAINS = ("Position P Gain", "Position I Gain", "Position D Gain")
 WATCHDOG_UNIT_S = 0.020
 NOISE_SHARE, NOISE_EXCHANGES = 0.2, 50
 """More exchanges with damaged bytes than this, of about so many, and the wire is not fit to move by."""
@@ -138,6 +139,8 @@ class ServoArm:
         self._chain.write(number, registers["Goal Position"], goal)
         if (found := self._chain.read(number, registers["Goal Position"])) != goal:
             raise ServoError(number, f"servo {number} was told the goal {goal} and has {found}: reboot it")
+        for name, gain in zip(GAINS, servo.gains or (), strict=False):
+            self._chain.write(number, registers[name], gain)
         if servo.grip_current is not None:
             self._chain.write(number, servo.model.registers["Goal Current"], servo.grip_current)
         self._chain.write(number, registers["Torque Enable"], 1)

@@ -30,6 +30,7 @@ class JointServo:
         model: Of the servo.
         homing_offset: That the servo must have, pulses.
         grip_current: Of a gripper that holds with a limited current, in the servo's units; None: position mode.
+        gains: P, I and D of the servo's position loop, in its units; None: those that it has.
     """
 
     joint: str
@@ -37,6 +38,7 @@ class JointServo:
     model: ServoModel
     homing_offset: int = 0
     grip_current: int | None = None
+    gains: tuple[int, int, int] | None = None
 
     @property
     def mode(self) -> int:
