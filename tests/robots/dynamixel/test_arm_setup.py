@@ -8,8 +8,8 @@ from pydantic import ValidationError
 
 from paramove.input_error import InputError
 from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.arm_calibration import CalibrationError
-from paramove.robots.dynamixel.arm_setup import ServoArmSetup, joint_servos, servo_port, uncalibrated
+from paramove.robots.dynamixel.arm_calibration import CalibrationError, JointCalibration
+from paramove.robots.dynamixel.arm_setup import ServoArmSetup, calibrated, joint_servos, servo_port, uncalibrated
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
@@ -19,6 +19,14 @@ from tests.robots.dynamixel.small_arm import calibration
 FOLDER = Path("robot_description")
 KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
 PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
+
+
+def one_of(place: int) -> JointCalibration:
+    """A joint of which only a half of the travel was shown, and whose zero is somewhere else."""
+    return JointCalibration(
+        id=place + 1, model=KOCH.motors[place], firmware=45, sign=1, operating_mode=3, homing_offset=0,
+        zero_counts=2000 + place, min_counts=1500, max_counts=2010 + place,
+    )  # fmt: skip
 
 
 def setup(port: Path, **parameters) -> ServoArmSetup:
@@ -56,6 +64,19 @@ def test_another_arms_calibration_is_refused(tmp_path):
     calibration().save(path)
     with pytest.raises(CalibrationError, match="of the arm behind adapter"):
         setup(tmp_path / "usb-FTDI_9999-if00-port0", calibration=path).driven_arm(tmp_path)
+
+
+def test_a_calibrated_arm_has_its_own_zeros_and_keeps_to_the_travel_that_was_shown():
+    shown = calibration().model_copy(
+        update={"joints": {name: one_of(place) for place, name in enumerate(KOCH.joint_names)}}
+    )
+    arm = calibrated(KOCH, shown)
+    assert (arm.soft_lower >= KOCH.soft_lower).all()
+    assert (arm.soft_upper <= arm.upper).all()
+    for place, name in enumerate(KOCH.joint_names):
+        assert arm.units.zero_counts[place] == shown.joints[name].zero_counts
+        low, high = shown.joints[name].travel
+        assert low - 1e-9 <= arm.lower[place] < arm.upper[place] <= high + 1e-9
 
 
 def test_a_robot_without_a_servo_bus_is_refused():

@@ -1,10 +1,12 @@
 """The servos of an arm: what keeps them from holding, that nothing moves when they begin to, and what is noticed."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from paramove.robots.dynamixel.arm_calibration import JointCalibration
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
@@ -200,6 +202,24 @@ def test_the_last_word_goes_to_every_servo_even_if_one_does_not_answer(arm, emul
     assert len(failed) == 2
     assert all("servo 1 did not answer" in one for one in failed)
     assert memory(emulator, "Torque Enable") == [1, 0, 0]
+
+
+def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_is_in(emulator, port):
+    across = JointCalibration(
+        id=3, model="xl330_m288", firmware=45, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
+        min_counts=3000, max_counts=5200,
+    )  # fmt: skip
+    with emulator.lock:
+        servo = emulator.bus.servos[2]
+        servo.preset("Operating Mode", 4)
+        servo.turned(100.0)  # beyond the seam: 4196 in the counts of the joint
+    arm = ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S)
+    assert arm.measured().counts[2] == 4196
+    assert arm.check() == ()
+    assert arm.take_hold() == ()
+    arm.command(np.array([1000, 2000, 4090], dtype=np.int16))
+    arm.measured()
+    assert memory(emulator, "Goal Position")[2] == 4090 - 4096
 
 
 def test_a_pulled_plug_is_told(arm, emulator):

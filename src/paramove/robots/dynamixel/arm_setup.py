@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from pydantic import BaseModel
 
 from paramove.robots.description import DescriptionError, RobotDescription
@@ -50,12 +51,19 @@ class ServoArmSetup(BaseModel):
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
-            d = description
-            description = replace(d, units=calibration.units(d.joint_names, d.lower, d.upper))
+            description = calibrated(description, calibration)
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         port = servo_port(description, str(run_folder / self.port))
         return DrivenArm(description, servos, port, self.torque_off, self.patience, faults)
+
+
+def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:
+    """The description with the units of one arm, and not beyond the travel that was shown. Raises CalibrationError."""
+    d = description
+    units = calibration.units(d.joint_names, d.lower, d.upper)
+    soft_lower, soft_upper = np.maximum(d.soft_lower, units.lower), np.minimum(d.soft_upper, units.upper)
+    return replace(d, units=units, lower=units.lower, upper=units.upper, soft_lower=soft_lower, soft_upper=soft_upper)
 
 
 def servo_port(description: RobotDescription, name: str) -> ServoPort:
@@ -79,12 +87,10 @@ def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:
 def joint_servos(description: RobotDescription, calibration: ArmCalibration | None = None) -> tuple[JointServo, ...]:
     """The servos of a described arm, in the order of its joint vector."""
     d = description
-    offsets = dict.fromkeys(d.joint_names, 0)
-    if calibration is not None:
-        offsets = {name: joint.homing_offset for name, joint in calibration.joints.items()}
+    calibrated = {} if calibration is None else calibration.joints
     rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, strict=True)
     return tuple(
-        JointServo(name, number, model_named(motor), offsets[name], _grip_current(d, name, motor), gains)
+        JointServo(name, number, model_named(motor), calibrated.get(name), _grip_current(d, name, motor), gains)
         for name, number, motor, gains in rows
     )
 

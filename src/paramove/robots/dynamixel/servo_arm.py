@@ -20,7 +20,9 @@ from paramove.robots.dynamixel.servo_checks import (
     torque_fault,
     voltage_fault,
 )
+from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.servo_port import PortLostError
+from paramove.robots.joint_units import INT16_RANGE
 from paramove.safety.gate_io import Fault
 
 Counts = NDArray[np.int16]
@@ -99,6 +101,7 @@ class ServoArm:
         self._chain = chain
         self._period_s = period_s
         self._patience = patience or Patience()
+        self._turns = [0 for _ in servos]
         self._numbers = [servo.number for servo in servos]
         self._registers = servos[0].model.registers  # those used here have one address in all models
         self._noise_mark = (0, 0)
@@ -174,8 +177,9 @@ class ServoArm:
         return tuple(failed)
 
     def command(self, counts: Counts) -> None:
-        """Goal positions of all joints, [J] pulses, in one packet."""
-        goals = {number: int(count) for number, count in zip(self._numbers, counts, strict=True)}
+        """Goal positions of all joints, [J] pulses within their ranges, in one packet."""
+        pairs = zip(self._numbers, counts, self._turns, strict=True)
+        goals = {number: int(count) + PULSES_PER_TURN * turns for number, count, turns in pairs}
         self._chain.sync_write(self._registers["Goal Position"], goals)
 
     def measured(self) -> ArmReading | None:
@@ -190,9 +194,13 @@ class ServoArm:
         if len(known) < len(newest):
             return None
         now_ns = time.monotonic_ns()
+        positions = [answer.values["Present Position"] for answer in known]
+        if not self.holds:  # while it holds, they stay the same
+            self._turns = [servo.turns(place) for servo, place in zip(self.servos, positions, strict=True)]
+        counts = np.array(positions) - PULSES_PER_TURN * np.array(self._turns)
         return ArmReading(
             at_ns=max(answer.at_ns for answer in known),
-            counts=np.array([answer.values["Present Position"] for answer in known], dtype=np.int16),
+            counts=np.clip(counts, *INT16_RANGE).astype(np.int16),
             ages_s=np.array([1e-9 * (now_ns - answer.at_ns) for answer in known]),
         )
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramove.robots.dynamixel.arm_calibration import JointCalibration
 from paramove.robots.dynamixel.hardware_error import hardware_errors
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoError
-from paramove.robots.dynamixel.servo_models import ServoModel
+from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, ServoModel
 from paramove.safety.gate_io import Fault
 
 POSITION_MODE, GRIP_MODE = 3, 5
@@ -28,7 +29,7 @@ class JointServo:
         joint: Name of the joint.
         number: ID of the servo.
         model: Of the servo.
-        homing_offset: That the servo must have, pulses.
+        calibration: Of the joint; None: it is set as it came, and counts within one turn.
         grip_current: Of a gripper that holds with a limited current, in the servo's units; None: position mode.
         gains: P, I and D of the servo's position loop, in its units; None: those that it has.
     """
@@ -36,14 +37,27 @@ class JointServo:
     joint: str
     number: int
     model: ServoModel
-    homing_offset: int = 0
+    calibration: JointCalibration | None = None
     grip_current: int | None = None
     gains: tuple[int, int, int] | None = None
 
     @property
     def mode(self) -> int:
         """Operating Mode (11) that it must have."""
-        return POSITION_MODE if self.grip_current is None else GRIP_MODE
+        if self.grip_current is not None:
+            return GRIP_MODE
+        return POSITION_MODE if self.calibration is None else self.calibration.operating_mode
+
+    @property
+    def homing_offset(self) -> int:
+        """Pulses that it must have."""
+        return 0 if self.calibration is None else self.calibration.homing_offset
+
+    def turns(self, position: int) -> int:
+        """Whole turns by which a servo that presents this position is beyond the counts of the joint's range."""
+        if self.mode == POSITION_MODE:
+            return 0
+        return position // PULSES_PER_TURN if self.calibration is None else self.calibration.turns(position)
 
     def __str__(self) -> str:
         return f"servo {self.number} ({self.joint})"
