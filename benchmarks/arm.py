@@ -8,7 +8,7 @@ do. Times are of the wall clock, so other programs lengthen them; the processes 
     command loss    the driver has nothing more to say; until the first row of the stop ramp is played
     driver killed   SIGKILL; until the servos rest by their bus watchdog
     stop            a person's word reaches the driver; until the first row of the stop ramp is played
-    unplugged       until the gate is disconnected
+    unplugged       until the gate lets nothing pass any more
     loop            periods of the loop, measured at the servos' end
 """
 
@@ -20,6 +20,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -51,11 +52,45 @@ BUSY = Patience(silent_s=0.25)
 """For what does not measure silence: other programs may take the processors for a while."""
 
 
+class Emulation:
+    """Emulated servos in a process of their own, as real ones have their own processors."""
+
+    def __init__(self, folder: Path, baud_rate: int, link: Path) -> None:
+        command = [sys.executable, __file__, "--robot", str(folder), "--emulate", str(link), "--baud", str(baud_rate)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.does("ready")
+
+    def does(self, word: str) -> None:
+        """Says a word and waits until it is done."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(word + "\n")
+        self._process.stdin.flush()
+        self._process.stdout.readline()
+
+    def end(self) -> None:
+        """Of the process."""
+        self._process.communicate("end\n")
+
+
+def emulate(description: RobotDescription, link: Path, baud_rate: int) -> None:
+    """What that process does: one answer for each word."""
+    bus = description.bus.model_copy(update={"baud_rate": baud_rate})
+    with DynamixelEmulator(emulated_servos(replace(description, bus=bus)), link) as emulator:
+        for line in sys.stdin:
+            word = line.strip()
+            if word == "end":
+                return
+            if word in ("unplug", "plug_in"):
+                getattr(emulator, word)()
+            say("done")
+
+
 class Rig:
     """An armed arm on an emulated bus, and movements to and fro."""
 
-    def __init__(self, arm: DrivenArm, emulator: DynamixelEmulator, description: RobotDescription) -> None:
-        self.arm, self.emulator, self.description = arm, emulator, description
+    def __init__(self, arm: DrivenArm, emulation: Emulation, description: RobotDescription) -> None:
+        self.arm, self.emulation, self.description = arm, emulation, description
         self._number = 0
         self._there = False
 
@@ -72,8 +107,7 @@ class Rig:
 
     def moves(self) -> None:
         """Begins a movement and returns while it is under way."""
-        with self.emulator.lock:
-            start = self.description.units.to_radians([s.memory["Goal Position"] for s in self.emulator.bus.servos])
+        start = self.description.units.to_radians(self.loop._reader.target)
         self._there = not self._there
         target = self.description.base_pose.copy()
         target[0] += 1.2 if self._there else -1.2
@@ -86,20 +120,23 @@ class Rig:
 
     def ramp_begins_ms(self, begun_s: float) -> float:
         """From then until a row of the stop ramp is the newest one played."""
-        wait(lambda: self.loop._reader is not None and self.loop._reader.playing != Hoap3State.PLAYING_FRAMES)
+        reader = self.loop._reader
+        wait(lambda: reader.playing != Hoap3State.PLAYING_FRAMES)
+        index = reader.next_index
+        wait(lambda: reader.next_index > index)
         return 1e3 * (time.monotonic() - begun_s)
 
 
 @contextmanager
-def rig(description: RobotDescription, patience: Patience = BUSY) -> Any:
+def rig(description: RobotDescription, folder: Path, patience: Patience = BUSY) -> Any:
     """A rig at the description's baud rate; ends with the arm at rest."""
-    with (
-        DynamixelEmulator(emulated_servos(description)) as emulator,
-        DrivenArm(
-            description, joint_servos(description), servo_port(description, emulator.port), patience=patience
-        ) as arm,
-    ):
-        yield Rig(arm, emulator, description)
+    with tempfile.TemporaryDirectory() as place:
+        link = Path(place) / "usb-emulated_0001-if00-port0"
+        emulation = Emulation(folder, description.bus.baud_rate, link)
+        port = servo_port(description, str(link))
+        with DrivenArm(description, joint_servos(description), port, patience=patience) as arm:
+            yield Rig(arm, emulation, description)
+        emulation.end()
 
 
 def wait(what: Callable[[], bool]) -> None:
@@ -111,10 +148,10 @@ def wait(what: Callable[[], bool]) -> None:
         time.sleep(0.0005)
 
 
-def stop_ms(description: RobotDescription, trials: int) -> list[float]:
+def stop_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """A person's stop, again and again."""
     found = []
-    with rig(description) as here:
+    with rig(description, folder) as here:
         for _ in range(trials):
             here.arms()
             here.moves()
@@ -125,10 +162,10 @@ def stop_ms(description: RobotDescription, trials: int) -> list[float]:
     return found
 
 
-def command_loss_ms(description: RobotDescription, trials: int) -> list[float]:
+def command_loss_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """The driver's logic says nothing any more, as if it hung; the loop plays what it has."""
     found = []
-    with rig(description) as here:
+    with rig(description, folder) as here:
         for _ in range(trials):
             here.arms()
             here.moves()
@@ -143,19 +180,19 @@ def command_loss_ms(description: RobotDescription, trials: int) -> list[float]:
     return found
 
 
-def unplugged_ms(description: RobotDescription, trials: int) -> list[float]:
-    """The plug is pulled; until the gate says that nobody is there."""
+def unplugged_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
+    """The plug is pulled; until the gate lets nothing pass any more."""
     found = []
-    with rig(description, Patience()) as here:
+    with rig(description, folder, Patience()) as here:
         for _ in range(trials):
             here.arms()
             here.moves()
             begun_s = time.monotonic()
-            threading.Thread(target=here.emulator.unplug).start()
-            wait(lambda: here.loop.driver.state is State.DISCONNECTED)
+            threading.Thread(target=here.emulation.does, args=("unplug",)).start()
+            wait(lambda: here.loop.driver.state is not State.ARMED)
             found.append(1e3 * (time.monotonic() - begun_s))
-            here.emulator.plug_in()
-            here.loop._port.name = here.emulator.port
+            here.emulation.does("plug_in")
+            wait(lambda: here.loop.lost == "")
             wait(lambda: here.loop.driver.state in (State.DISARMED, State.HOLD))
     return found
 
@@ -194,12 +231,12 @@ def drive(description: RobotDescription, port: str) -> None:
         time.sleep(PATIENT_S)
 
 
-def periods_ms(description: RobotDescription, baud_rate: int, rate_hz: int) -> np.ndarray:
+def periods_ms(description: RobotDescription, folder: Path, baud_rate: int, rate_hz: int) -> np.ndarray:
     """Between goals as they arrive, while the arm moves."""
     bus = description.bus.model_copy(update={"baud_rate": baud_rate})
     stream = description.stream.model_copy(update={"period_us": 1_000_000 // rate_hz})
     arrivals: list[float] = []
-    with rig(replace(description, bus=bus, stream=stream)) as here:
+    with rig(replace(description, bus=bus, stream=stream), folder) as here:
         here.arms()
         command = here.loop.arm.command
         here.loop.arm.command = lambda counts: (command(counts), arrivals.append(time.monotonic()))
@@ -217,18 +254,23 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--robot", type=Path, default=ROOT / "robot_description" / "open_manipulator_x")
     parser.add_argument("--drive", help=argparse.SUPPRESS)
+    parser.add_argument("--emulate", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--baud", type=int, default=1_000_000, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     description = RobotDescription.load(arguments.robot)
     if arguments.drive:
         drive(description, arguments.drive)
         return
+    if arguments.emulate:
+        emulate(description, arguments.emulate, arguments.baud)
+        return
     load, trials = os.getloadavg()[0], arguments.trials
     say(f"{description.name}, {len(os.sched_getaffinity(0))} processors, load {load:.1f} before")
     found: dict[str, Any] = {}
     for name, measured in (
-        ("stop", stop_ms(description, trials)),
-        ("command loss", command_loss_ms(description, trials)),
-        ("unplugged", unplugged_ms(description, trials)),
+        ("stop", stop_ms(description, arguments.robot, trials)),
+        ("command loss", command_loss_ms(description, arguments.robot, trials)),
+        ("unplugged", unplugged_ms(description, arguments.robot, trials)),
         ("driver killed", killed_ms(description, arguments.robot, max(3, trials // 4))),
     ):
         median, p99 = np.percentile(measured, [50, 99])
@@ -236,7 +278,7 @@ def main() -> None:
         goal = GOALS_MS[name]
         say(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
     for baud_rate, rate_hz in ((1_000_000, 100), (4_000_000, 200)):
-        periods = periods_ms(description, baud_rate, rate_hz)
+        periods = periods_ms(description, arguments.robot, baud_rate, rate_hz)
         median, p99 = np.percentile(periods, [50, 99])
         late = float((periods > 1.5e3 / rate_hz).mean())
         held = 1e3 / periods.mean()

@@ -68,7 +68,7 @@ class StreamParameters(_Part):
 
     period_us: int = Field(gt=0)
     cover_ms: int = Field(gt=0)
-    guard_ms: int = Field(gt=0)
+    guard_ms: int = Field(ge=0)
     start_tolerance_deg: float = Field(gt=0)
 
 

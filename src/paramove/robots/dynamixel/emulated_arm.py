@@ -109,7 +109,7 @@ class EmulatedArm:
 
 
 def emulated_servos(robot: RobotDescription) -> list[EmulatedServo]:
-    """Servos as the description wants them, in the order of its joints, standing in the base pose.
+    """Servos as `paramove arm setup` leaves them, in the order of its joints, standing in the base pose.
 
     Raises:
         InputError: The robot is no arm of servos.
@@ -120,6 +120,8 @@ def emulated_servos(robot: RobotDescription) -> list[EmulatedServo]:
     servos = [
         EmulatedServo(model_named(motor), number, robot.bus.baud_rate, float(count)) for motor, number, count in rows
     ]
+    for servo in servos:
+        servo.preset("Return Delay Time", 0)
     if robot.chain is not None and robot.chain.grip_current_ma is not None:
         servos[robot.chain.gripper_index].preset("Operating Mode", CURRENT_BASED_POSITION_MODE)
     return servos

@@ -29,6 +29,8 @@ MOVING = (State.ARMED, State.STOPPING)
 HOLDING = (*MOVING, State.HOLD)
 HEALTH_STEPS, SUPPLY_STEPS = 10, 100
 REOPEN_S = 0.5
+TICK_S = 0.02
+"""The driver's logic is asked so often; at once where something is wrong."""
 
 
 class ServoLoop:
@@ -76,6 +78,8 @@ class ServoLoop:
         self._reader: StreamReader | None = None
         self._says: list[DriverSays] = []
         self._step = 0
+        self._urgent = False
+        self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="servo_loop", daemon=True)
@@ -132,7 +136,8 @@ class ServoLoop:
             self.driver.on_fault(
                 Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again")
             )
-        self._tick(time.monotonic_ns())
+        if self._urgent or self._step % self._tick_steps == 0:
+            self._tick(time.monotonic_ns())
         self._step += 1
 
     def _move_and_read(self) -> None:
@@ -146,9 +151,10 @@ class ServoLoop:
             reader = self._reader = StreamReader(self._description, reading.counts)
         fault = self._fault(reading)
         if fault is not None and self._arm.holds:
-            self.driver.on_fault(fault)
+            self._tell(fault)
         if self.driver.wants_to_arm and self.driver.state not in MOVING:
             reading = self._prepare() or reading  # the checks took longer than a reading counts
+            self._urgent = True
             reader = self._reader = StreamReader(self._description, reading.counts)
         elif self._arm.holds and self.driver.state not in HOLDING:
             self._let_go()
@@ -167,7 +173,12 @@ class ServoLoop:
             fault = self._arm.look_after_supply() or fault
         return fault
 
+    def _tell(self, fault: Fault) -> None:
+        self.driver.on_fault(fault)
+        self._urgent = True
+
     def _tick(self, now_ns: int) -> None:
+        self._urgent = False
         says = self.driver.tick(now_ns)
         if says.stream is not None and self._reader is not None:
             self._reader.offer(says.stream)
