@@ -11,8 +11,12 @@ from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
 from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.robots.dynamixel.servo_models import XL430_W250
+from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 
 PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
@@ -24,9 +28,9 @@ ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
 class PersonAtEmulator(Person):
     """Also sees into the servos."""
 
-    def __init__(self, arm: DrivenArm, emulator: DynamixelEmulator) -> None:
+    def __init__(self, arm: DrivenArm, emulator: DynamixelEmulator, port: ServoPort | None = None) -> None:
         super().__init__(arm)
-        self.emulator = emulator
+        self.emulator, self.port = emulator, port
 
     def sends(self, target, duration_s: float = 1.0, name: str = "a") -> None:
         self.says(name, ROBOT.joint_names, [(0.0, ROBOT.units.to_radians(self.goals())), (duration_s, target)])
@@ -63,8 +67,9 @@ def port(emulator, latency_s: float = LATENCY_S):
 
 @pytest.fixture
 def person(emulator):
-    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), patience=PATIENCE) as arm:
-        yield PersonAtEmulator(arm, emulator)
+    closed = port(emulator)
+    with DrivenArm(ROBOT, joint_servos(ROBOT), closed, patience=PATIENCE) as arm:
+        yield PersonAtEmulator(arm, emulator, closed)
 
 
 def test_it_moves_as_it_is_told(person):
@@ -134,6 +139,44 @@ def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, name, 
     person.waits_for("HOLD")
     assert (code, "joint2") in person.codes()
     assert sum(person.memory("Torque Enable")) >= 4
+
+
+def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_somebody_arms_again(person):
+    person.arms_and_waits()
+    person.moves()
+    with person.emulator.lock:
+        person.emulator.bus.servos[1].reboot()
+    person.waits_for("HOLD")
+    assert person.codes()[0] in (("torque_lost", "joint2"), ("joint_silent", "joint2"))
+    assert person.memory("Torque Enable") == [1, 0, 1, 1, 1]
+
+
+def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):
+    person.arms_and_waits()
+    person.port.latency_s = 0.005
+    person.moves()
+    person.emulator.faults = WireFaults(damaged=0.2, seed=1)
+    person.waits_for("HOLD")
+    assert person.codes()[0][0] in ("bus_noise", "joint_silent")
+
+
+def test_a_second_servo_of_one_id_stops_the_arm(person):
+    person.arms_and_waits()
+    person.port.latency_s = 0.005
+    person.moves()
+    with person.emulator.lock:
+        person.emulator.bus.add(EmulatedServo(XL430_W250, 12, 1_000_000))
+    person.waits_for("HOLD")
+    assert person.codes()[0] in (("joint_silent", "joint2"), ("bus_noise", ""))
+
+
+def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
+    person.arms_and_waits()
+    person.moves()
+    with person.emulator.lock:
+        person.emulator.bus.servos[0].blocked = True
+    person.waits_for("HOLD")
+    assert ("following", "joint1") in person.codes()
 
 
 def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
