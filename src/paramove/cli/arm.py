@@ -6,6 +6,7 @@ import typer
 
 from paramove.cli.arm_bench import bench
 from paramove.cli.arm_calibrate import calibrate
+from paramove.cli.arm_enable import disable, enable
 from paramove.cli.arm_estop import estop
 from paramove.cli.arm_jog import jog
 from paramove.cli.arm_reboot import reboot
@@ -16,5 +17,5 @@ from paramove.cli.arm_verify import verify
 app = typer.Typer(
     name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, move and stop an arm of servos."
 )
-for command in (scan, setup, calibrate, verify, reboot, bench, jog, estop):
+for command in (scan, setup, calibrate, verify, reboot, bench, enable, disable, jog, estop):
     app.command()(command)

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 PERIOD_S, PATIENCE_S, STOP_S = 0.02, 3.0, 1.0
 KEYS = "1-9 choose a joint, + and - move it, space stops, a arms, q ends"
-SOURCE = "terminal"
 
 
 def jog(
@@ -59,36 +58,28 @@ class _Link:
     """The bus as jogging needs it, while it is a context."""
 
     def __init__(self, folder: Path, step: float) -> None:
-        import zmq
-
         from paramove.bus import topics
+        from paramove.bus.visitor import BusVisitor
         from paramove.robots.jogging import Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
         self._folder, self._topics = folder, topics
         self._state, self._shown = "", ""
         self._arms: Publisher | None = None
-        self._opened = contextlib.ExitStack()
-        self._owned = self._opened.enter_context(contextlib.ExitStack())
-        self._context = self._opened.enter_context(zmq.Context())
-        self._sockets = self._opened.enter_context(contextlib.ExitStack())
+        self._bus = BusVisitor(folder, "jog")
 
     def __enter__(self) -> _Link:
-        from paramove.bus.subscriber import Subscriber
-
         topics = self._topics
         with contextlib.ExitStack() as unfinished:
-            unfinished.push(self._opened)
-            self._says = self._publisher(topics.ARM_TRAJECTORY)
+            unfinished.push(self._bus)
+            self._says = self._bus.says(topics.ARM_TRAJECTORY)
             heard = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
-            self._hears: list[Subscriber] = [Subscriber(self._context, self._folder, topic) for topic in heard]
-            for subscriber in self._hears:
-                self._sockets.callback(subscriber.close)
+            self._hears: list[Subscriber] = [self._bus.hears(topic) for topic in heard]
             unfinished.pop_all()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._opened.close()
+    def __exit__(self, *error: Any) -> None:
+        self._bus.__exit__(*error)
 
     def wait_for_arm(self) -> None:
         """Ends the command if no driver says where the joints are, or none listens."""
@@ -101,6 +92,8 @@ class _Link:
 
     def press(self, key: str) -> None:
         """Does what a key stands for."""
+        from paramove.bus.visitor import say_now
+        from paramove.safety.terminal_arming import TERMINAL
         from paramove.safety.terminal_stop import stop_arm
 
         if key.isdecimal():
@@ -108,11 +101,11 @@ class _Link:
         elif key in ("+", "-"):
             message = self.jogging.step(1 if key == "+" else -1, time.monotonic_ns())
             if message is not None:
-                self._say(self._says, message)
+                say_now(self._says, message)
         elif key == "a":
             self._arm()
         elif key == " ":
-            answer = stop_arm(self._folder, SOURCE, STOP_S)
+            answer = stop_arm(self._folder, TERMINAL, STOP_S)
             self.jogging.sentence = "stopped" if answer else "no answer: use the switch of the motors' power"
 
     def exchange(self) -> None:
@@ -145,24 +138,13 @@ class _Link:
 
     def _arm(self) -> None:
         from paramove.bus.endpoint import TopicTakenError
+        from paramove.bus.visitor import say_now
         from paramove.msgs.safety_state_pb2 import ArmRequest
+        from paramove.safety.terminal_arming import TERMINAL
 
         try:
-            self._arms = self._arms or self._publisher(self._topics.OPERATOR_ARM)
+            self._arms = self._arms or self._bus.says(self._topics.OPERATOR_ARM)
         except TopicTakenError as error:
             self.jogging.sentence = str(error)
             return
-        request = ArmRequest(source=SOURCE, armed=True, reason="jogging")
-        request.captured.FromNanoseconds(time.monotonic_ns())
-        self._say(self._arms, request)
-
-    def _publisher(self, topic: Any) -> Publisher:
-        from paramove.bus.publisher import Publisher
-
-        publisher = Publisher(self._context, self._folder, topic, "jog")
-        self._owned.callback(publisher.ownership.release)
-        self._sockets.callback(publisher.close)
-        return publisher
-
-    def _say(self, publisher: Publisher, message: Any) -> None:
-        publisher.publish(message, time.monotonic_ns(), time.monotonic_ns())
+        say_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging"))

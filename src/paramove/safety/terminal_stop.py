@@ -10,8 +10,7 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.endpoint import TopicTakenError
-from paramove.bus.publisher import Publisher
-from paramove.bus.subscriber import Subscriber
+from paramove.bus.visitor import BusVisitor
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.safety.gate_io import PERSON_STOP
 
@@ -37,18 +36,14 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
     asked_ns = time.monotonic_ns()
     request = StopRequest(source=source)
     request.captured.FromNanoseconds(asked_ns)
-    with contextlib.ExitStack() as owned, zmq.Context() as context, contextlib.ExitStack() as sockets:
+    with BusVisitor(folder, "estop") as bus:
         publishers = []
         for topic in topics.STOPS:
             with contextlib.suppress(TopicTakenError):
-                publishers.append(Publisher(context, folder, topic, "estop"))
+                publishers.append(bus.says(topic))
         if not publishers:
             raise TopicTakenError(f"other programs say {' and '.join(topic.name for topic in topics.STOPS)} already")
-        for publisher in publishers:
-            owned.callback(publisher.ownership.release)  # after the context has ended, which removes the socket's file
-            sockets.callback(publisher.close)
-        gate = Subscriber(context, folder, topics.ARM_SAFETY)
-        sockets.callback(gate.close)
+        gate = bus.hears(topics.ARM_SAFETY)
         while time.monotonic() < end_s:
             for publisher in publishers:
                 publisher.publish(request, asked_ns, time.monotonic_ns())

@@ -1,0 +1,59 @@
+"""A program that says and hears topics of a run without being one of its nodes, such as a command in a terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import zmq
+
+from paramove.bus.publisher import Publisher
+from paramove.bus.subscriber import Subscriber
+from paramove.bus.topics import Topic
+
+
+class BusVisitor:
+    """Sockets on a run's bus, while it is a context.
+
+    Args:
+        folder: Of the run's bus.
+        name: Under which it speaks.
+    """
+
+    def __init__(self, folder: Path, name: str) -> None:
+        self._folder, self._name = folder, name
+        self._opened = contextlib.ExitStack()
+        self._owned = self._opened.enter_context(contextlib.ExitStack())  # released after the context has ended
+        self._context: zmq.Context[Any] = self._opened.enter_context(zmq.Context())
+        self._sockets = self._opened.enter_context(contextlib.ExitStack())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._opened.close()
+
+    def says(self, topic: Topic) -> Publisher:
+        """The one speaker of a topic. Raises TopicTakenError and BusFolderError."""
+        publisher = Publisher(self._context, self._folder, topic, self._name)
+        self._owned.callback(publisher.ownership.release)
+        self._sockets.callback(publisher.close)
+        return publisher
+
+    def hears(self, topic: Topic) -> Subscriber:
+        """A listener to a topic."""
+        subscriber = Subscriber(self._context, self._folder, topic)
+        self._sockets.callback(subscriber.close)
+        return subscriber
+
+
+def say_now(publisher: Publisher, message: Any) -> None:
+    """Say what a person wants at this moment; `captured` of the message is set."""
+    now_ns = time.monotonic_ns()
+    message.captured.FromNanoseconds(now_ns)
+    publisher.publish(message, now_ns, now_ns)

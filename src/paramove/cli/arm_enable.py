@@ -1,0 +1,85 @@
+"""`paramove arm enable` and `disable`: a person arms or disarms the arm of what is running, from any terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from paramove.cli.arm_options import ended
+from paramove.cli.bus_options import DomainOption
+from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from paramove.msgs.safety_state_pb2 import SafetyState
+
+PATIENCE_S = 5.0
+QUESTION = "Is everybody out of the arm's reach, and the switch of the motors' power in yours?"
+
+
+def enable(
+    yes: Annotated[bool, typer.Option("--yes", help="do not ask whether everybody is out of reach")] = False,
+    domain: DomainOption = None,
+) -> None:
+    """Arm the arm of the running application: from then on it may move, whenever the application wants it to.
+
+    Exit codes: 0 armed; 1 you said no; 3 the safety gate refuses, with every reason; 69 nobody answers; 75 another
+    program arms this arm.
+    """
+    if not yes and not typer.confirm(QUESTION):
+        raise ended("not armed", exit_codes.FAILURE)
+    state = _answer(True, domain)
+    if not _is(state, True):
+        if not state.faults:
+            raise ended(f"{_name(state)}, not armed: the arm's driver does not answer", exit_codes.UNAVAILABLE)
+        raise ended(f"{_name(state)}, not armed: {_reasons(state)}", exit_codes.JUDGED_A_FAILURE)
+    typer.echo("ARMED: the arm may move; `paramove arm disable` or `paramove arm estop` ends that")
+
+
+def disable(domain: DomainOption = None) -> None:
+    """Disarm the arm of the running application: it comes to rest, and nothing moves it until somebody arms it again.
+
+    Exit codes: 0 disarmed; 3 it is not, with every reason; 69 nobody answers; 75 another program arms this arm.
+    """
+    state = _answer(False, domain)
+    if not _is(state, False):
+        raise ended(f"{_name(state)}, not disarmed: {_reasons(state)}", exit_codes.JUDGED_A_FAILURE)
+    typer.echo("DISARMED")
+
+
+def _answer(armed: bool, domain: str | None) -> SafetyState:
+    from paramove.bus.endpoint import BusFolderError, TopicTakenError
+    from paramove.bus.settings import default_folder
+    from paramove.safety.terminal_arming import arm_by_word
+
+    folder = default_folder(domain)
+    if not folder.is_dir():
+        raise ended(f"nothing is running in {folder}", exit_codes.UNAVAILABLE)
+    try:
+        state = arm_by_word(folder, armed, PATIENCE_S)
+    except TopicTakenError as error:
+        raise ended(f"{error}: only one program may arm an arm; stop that one first", exit_codes.TEMPORARY) from error
+    except BusFolderError as error:
+        raise ended(str(error), exit_codes.UNAVAILABLE) from error
+    if state is None:
+        raise ended(
+            f"no safety gate is heard within {PATIENCE_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
+        )
+    return state
+
+
+def _is(state: SafetyState, armed: bool) -> bool:
+    from paramove.safety.terminal_arming import obeyed
+
+    return obeyed(state, armed)
+
+
+def _reasons(state: SafetyState) -> str:
+    return "; ".join(fault.sentence for fault in state.faults) or "no reason is given"
+
+
+def _name(state: SafetyState) -> str:
+    from paramove.msgs.safety_state_pb2 import SafetyState as State
+
+    name: str = State.State.Name(state.state)
+    return name.removeprefix("STATE_").lower()

@@ -1,0 +1,81 @@
+"""`paramove arm enable` and `disable`: what they ask, what they say, and their exit codes."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from paramove.bus.endpoint import TopicTakenError
+from paramove.cli.main import build
+from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
+
+FAULTS = [SafetyFault(code=str(number), sentence=f"reason {number}") for number in (1, 2)]
+ANSWERS = {
+    "armed": SafetyState(state=SafetyState.STATE_ARMED),
+    "disarmed": SafetyState(state=SafetyState.STATE_DISARMED),
+    "refused": SafetyState(state=SafetyState.STATE_HOLD, faults=FAULTS),
+    "silent": None,
+}
+
+
+@pytest.fixture
+def words(tmp_path, monkeypatch):
+    """What the gate answers by the name of ANSWERS, and the words that it was told."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
+    (tmp_path / "paramove" / "default").mkdir(parents=True)
+    told = {"answer": "armed", "words": []}
+
+    def arm_by_word(folder, armed, patience_s):
+        told["words"].append(armed)
+        if told["answer"] == "taken":
+            raise TopicTakenError("operator says operator/arm already")
+        return ANSWERS[told["answer"]]
+
+    monkeypatch.setattr("paramove.safety.terminal_arming.arm_by_word", arm_by_word)
+    return told
+
+
+def said(*typed, line=""):
+    return CliRunner().invoke(build("arm"), ["arm", *typed], input=line)
+
+
+@pytest.mark.parametrize(("line", "code", "heard"), [("y\n", 0, [True]), ("n\n", 1, []), ("", 1, [])])
+def test_arming_asks_first(words, line, code, heard):
+    done = said("enable", line=line)
+    assert (done.exit_code, words["words"]) == (code, heard)
+    assert "out of the arm's reach" in done.stdout
+    assert ("ARMED: the arm may move" in done.stdout) == (code == 0)
+
+
+@pytest.mark.parametrize(
+    ("answer", "code", "sentence"),
+    [
+        ("refused", 3, "hold, not armed: reason 1; reason 2"),
+        ("disarmed", 69, "disarmed, not armed: the arm's driver does not answer"),
+        ("silent", 69, "no safety gate is heard within 5 s"),
+        ("taken", 75, "operator says operator/arm already: only one program may arm"),
+    ],
+)
+def test_what_keeps_it_from_arming_is_told(words, answer, code, sentence):
+    words["answer"] = answer
+    done = said("enable", "--yes")
+    assert done.exit_code == code
+    assert sentence in done.stderr
+    assert "ARMED" not in done.stdout
+
+
+@pytest.mark.parametrize(("answer", "code"), [("disarmed", 0), ("refused", 3), ("silent", 69)])
+def test_disarming_asks_nothing(words, answer, code):
+    words["answer"] = answer
+    done = said("disable")
+    assert (done.exit_code, words["words"]) == (code, [False])
+    assert ("DISARMED" in done.stdout) == (code == 0)
+    assert ("reason 1; reason 2" in done.stderr) == (answer == "refused")
+
+
+def test_where_nothing_runs_it_is_told(words):
+    for name in ("enable", "disable"):
+        done = said(name, "--domain", "other", *(["--yes"] if name == "enable" else []))
+        assert done.exit_code == 69
+        assert "nothing is running in" in done.stderr
