@@ -12,10 +12,11 @@ from paramove.cli.arm_jog import jog
 from paramove.cli.arm_reboot import reboot
 from paramove.cli.arm_scan import scan
 from paramove.cli.arm_setup import setup
+from paramove.cli.arm_teach import teach
 from paramove.cli.arm_verify import verify
 
 app = typer.Typer(
-    name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, move and stop an arm of servos."
+    name="arm", no_args_is_help=True, help="Find, set up, calibrate, check, teach, move and stop an arm of servos."
 )
-for command in (scan, setup, calibrate, verify, reboot, bench, enable, disable, jog, estop):
+for command in (scan, setup, calibrate, verify, reboot, bench, enable, disable, teach, jog, estop):
     app.command()(command)

@@ -78,7 +78,7 @@ def train(
         make: dict[str, Make] = {
             name: partial(
                 untrained, str(model), description=examples.description(name), n_states=states, d_min=d_min,
-                d_max=d_max, frames=frames, residuals=residuals,
+                d_max=d_max, frames=frames, residuals=residuals, floor_deviation=examples.floor_deviation,
             )
             for name in examples.actions
         }  # fmt: skip

@@ -13,6 +13,7 @@ from paramove.imitation.conversion import RobotMovement
 from paramove.imitation.modelled_movement import robot_movement
 from paramove.imitation.reaching_movement import ReachingMovement
 from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParametricHMM
+from paramove.robots.arm_points import ARM_BASE
 
 REMEDY = (
     "train it again: leave out synthesizer.movement.file to have a model trained from synthetic demonstrations, or "
@@ -20,10 +21,12 @@ REMEDY = (
 )
 ARM_LENGTHS = (0.3, 1.2)
 """m; from shoulder to elbow to knuckles of a child to that of a tall person. Millimetres or degrees lie far outside."""
+SERVO_ARM_LENGTHS = (0.15, 1.2)
+"""m; the same of an arm that was led by hand."""
 MOST_MISSED = 0.05
 FINGER = 0.10
 """m; so far the middle of knuckle, index and thumb may stay behind what the index touches."""
-FRAMES = (FRAME, BODY)
+FRAMES = (FRAME, BODY, ARM_BASE)
 
 
 def load_reaching_model(path: Path) -> ParametricHMM:
@@ -55,8 +58,9 @@ def check_reaching_model(model: ParametricHMM) -> None:
     _check_sizes(model, description)
     movement = robot_movement(model, 1.0)  # checks the points and the moments of arrival and grasp
     arm_length = 1.0 / movement.scale
-    if not ARM_LENGTHS[0] <= arm_length <= ARM_LENGTHS[1]:
-        raise ValueError(f"expected an arm of {ARM_LENGTHS[0]} to {ARM_LENGTHS[1]} m, found {arm_length:.3g} m")
+    shortest, longest = SERVO_ARM_LENGTHS if description.frame == ARM_BASE else ARM_LENGTHS
+    if not shortest <= arm_length <= longest:
+        raise ValueError(f"expected an arm of {shortest} to {longest} m, found {arm_length:.3g} m")
     if isinstance(movement, RobotMovement) and not movement.o_max > movement.o_min:
         raise ValueError("expected a hand that opens and closes, found a constant distance of finger and thumb")
     missed = _missed(movement) * arm_length

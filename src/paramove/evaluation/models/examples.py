@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.movement import AXIS_ENDINGS
 from paramove.phmm import MovementDescription
+from paramove.robots.arm_points import ARM_BASE
 from paramove.supervision.names import nearest
 
 Floats = NDArray[np.float64]
 
 VARIES = 0.1
 """A coordinate of a place whose range is a smaller share of the widest coordinate's is taken for constant."""
+ARM_FLOOR_M = 5e-4
+"""How exactly a servo arm's points are known: of a hand 0.3 m from a joint to a step of its encoder of 4096 a turn. The
+arm's base does not move at all, and without a floor nothing could be learned of a point that never moves."""
 PERSONS_FOR_GROUPS = 3
 """From so many persons on, what training chooses by leaving out is chosen by leaving out persons."""
 
@@ -56,6 +60,11 @@ class Examples:
     def actions(self) -> tuple[str, ...]:
         """Names of the actions, sorted."""
         return tuple(sorted(set(self.labels)))
+
+    @property
+    def floor_deviation(self) -> float:
+        """How exactly the points are known at best, m; 0 where their variation tells."""
+        return ARM_FLOOR_M if self.frame == ARM_BASE else 0.0
 
     @property
     def groups(self) -> list[str] | None:

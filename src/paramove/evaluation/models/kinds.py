@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from paramove import phmm
+from paramove.hmm import TrainingOptions
 from paramove.phmm import MovementDescription, ParametricHMM
 
 CLASSES = {
@@ -29,6 +30,7 @@ def untrained(
     d_max: int | None = None,
     frames: int = 100,
     residuals: str | None = None,
+    floor_deviation: float = 0.0,
 ) -> ParametricHMM:
     """A model of one of the CLASSES, to be trained.
 
@@ -38,6 +40,7 @@ def untrained(
         n_states: number of states.
         d_min, d_max: frames in a state; None: one less and one more than the mean, `frames / n_states`.
         frames: every movement is brought to so many.
+        floor_deviation: how exactly points are known at best, m; 0: their variation tells.
         residuals: "correlated" or "independent" of polynomial models; None: their default.
 
     Raises ValueError for a kind that is unknown or has no such residuals, and for states that do not fit the frames.
@@ -56,9 +59,11 @@ def untrained(
             "the mean lies between them"
         )
     kind_class: Any = getattr(phmm, CLASSES[kind])
-    more = {} if residuals is None else {"residuals": residuals}
+    more: dict[str, Any] = {} if residuals is None else {"residuals": residuals}
     if more and "residuals" not in kind_class._parameter_names():
         raise ValueError(f"a model '{kind}' has no choice of residuals; linear, quadratic and cubic ones have")
+    if floor_deviation:
+        more["options"] = TrainingOptions(floor_deviation=floor_deviation)
     made: ParametricHMM = kind_class(n_states, least, most, resampled_frames=frames, description=description, **more)
     return made
 

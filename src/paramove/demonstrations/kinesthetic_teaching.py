@@ -1,0 +1,175 @@
+"""A person leads a servo arm by hand: each segment becomes a movement of a demonstration set. Without a clock.
+
+The points are those of `robots/arm_points.py`, and theta is the place where the end effector is at the end.
+"""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+
+from paramove.demonstrations.labelling import next_repetition
+from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
+from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.writing import Label, Take, write_set
+from paramove.robots.arm_points import ARM_BASE, POINT_NAMES, arm_points
+from paramove.robots.description import DescriptionError, RobotDescription
+
+PARAMETERS = ("target_x", "target_y", "target_z")
+RESTS_WITHIN_M = 0.002
+"""The hand rests while it is so near to where the segment began, and from when on it stays so near to where it ends."""
+RECORDING = "taught_{:03d}.mcap"
+NANO = 1e-9
+
+
+class KinestheticTeacher:
+    """`hear` where the arm is; `begin`, `end` and `drop` as the person says.
+
+    A segment is written as soon as it has ended, so nothing that has ended is lost, whatever happens.
+
+    Args:
+        description: Of an arm with a chain.
+        folder: Of the set.
+        action: What is shown, such as reaching.
+        subject: Who shows it.
+        append: Whether the set may be there already.
+
+    Attributes:
+        written: Recordings of the segments that have ended, the newest last.
+
+    Raises:
+        DescriptionError: The robot has no such arm.
+        DemonstrationError: There is a set and `append` is not given, or it has other parameters.
+    """
+
+    def __init__(
+        self, description: RobotDescription, folder: Path, action: str, subject: str = "", *, append: bool = False
+    ) -> None:
+        if description.chain is None:
+            raise DescriptionError(f"{description.name} has no chain in its robot.yaml: it is not a servo arm")
+        self._chain, self._robot = description.chain, description.name
+        self._folder, self._action, self._subject = folder, action, subject
+        self._labels = folder / FILE_NAME
+        self._before: list[bytes | None] = []
+        self._samples: list[tuple[int, Floats]] | None = None
+        self.written: list[str] = []
+        if self._labels.exists():
+            self._refuse(append)
+
+    def _refuse(self, append: bool) -> None:
+        if not append:
+            raise DemonstrationError(
+                f"{self._folder} holds a demonstration set already; choose another folder, or --append to it"
+            )
+        has = tuple(load_labels(self._labels).file.parameters)
+        if has != PARAMETERS:
+            raise DemonstrationError(
+                f"{self._labels} has the parameters ({', '.join(has)}), teaching gives ({', '.join(PARAMETERS)}); "
+                "choose another folder"
+            )
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a segment has begun."""
+        return self._samples is not None
+
+    def hear(self, at_ns: int, angles: Floats) -> None:
+        """Where all joints of the robot are, [J] in its order, rad."""
+        if self._samples is not None and (not self._samples or at_ns > self._samples[-1][0]):
+            self._samples.append((at_ns, angles))
+
+    def begin(self) -> None:
+        """A segment begins; one that has begun is forgotten."""
+        self._samples = []
+
+    def end(self) -> Floats:
+        """The segment ends, and is written.
+
+        Returns:
+            Where the end effector was at the end, [3], m, frame of the arm's base.
+
+        Raises:
+            DemonstrationError: None has begun, the arm was not moved, or it cannot be written; it is forgotten.
+        """
+        samples, self._samples = self._samples, None
+        if samples is None:
+            raise DemonstrationError("no segment has begun")
+        take = self._take(samples)
+        before = self._labels.read_bytes() if self._labels.exists() else None
+        description = f"{self._robot} led by hand; theta is where its end effector ends"
+        write_set(self._folder, [take], PARAMETERS, description, add=True)
+        self._before.append(before)
+        self.written.append(take.recording)
+        return np.array(take.labels[0].theta)
+
+    def drop(self) -> str:
+        """Take back the newest segment of this session that has ended, its recording and its label.
+
+        Returns:
+            The name of its recording.
+
+        Raises:
+            DemonstrationError: There is none, or labels.yaml was changed since.
+        """
+        if not self.written:
+            raise DemonstrationError("no segment of this session is left to drop")
+        name = self.written[-1]
+        segments = load_labels(self._labels).file.segments
+        if not segments or segments[-1].recording != name:
+            raise DemonstrationError(f"{self._labels} was changed meanwhile; take {name} out of it by hand")
+        self.written.pop()
+        before = self._before.pop()
+        if before is None:
+            self._labels.unlink()
+        else:
+            unfinished = self._labels.with_name(f"{self._labels.name}.new")
+            unfinished.write_bytes(before)
+            unfinished.replace(self._labels)
+        (self._folder / name).unlink()
+        return name
+
+    def _take(self, samples: list[tuple[int, Floats]]) -> Take:
+        if len(samples) < 2:
+            raise DemonstrationError("the segment has no frames: let the arm be heard before it ends; it is left out")
+        time_ns = np.array([at_ns for at_ns, _ in samples], dtype=np.int64)
+        angles = np.array([row for _, row in samples])
+        joints = angles[:, self._chain.indices]
+        hand = self._chain.kinematics.forward(joints).position
+        first, end = moved_part(hand)
+        theta = tuple(hand[end - 1].tolist())
+        label = Label(first, end, self._action, theta, self._subject, self._repetition(theta))
+        positions = arm_points(self._chain, joints, angles[:, self._chain.gripper_index])
+        time = NANO * (time_ns - time_ns[0])
+        return Take(self._free_name(), time, positions, POINT_NAMES, ARM_BASE, (label,))
+
+    def _repetition(self, theta: tuple[float, ...]) -> int:
+        there = load_labels(self._labels).file.segments if self._labels.exists() else []
+        like = Segment(
+            recording="any", start=0.0, end=1.0, action=self._action, theta=list(theta), subject=self._subject
+        )
+        return next_repetition(there, like)
+
+    def _free_name(self) -> str:
+        names = (RECORDING.format(number) for number in itertools.count(1))
+        return next(name for name in names if not any(self._folder.glob(f"{name}*")))  # nor an unfinished one
+
+
+def moved_part(hand: Floats) -> tuple[int, int]:
+    """First frame, and one past the last, of a movement between the rests before and after it.
+
+    Args:
+        hand: Path, shape [T, 3], m.
+
+    Raises:
+        DemonstrationError: It stays where it is.
+    """
+    away = np.flatnonzero(np.linalg.norm(hand - hand[0], axis=1) > RESTS_WITHIN_M)
+    on_the_way = np.flatnonzero(np.linalg.norm(hand - hand[-1], axis=1) > RESTS_WITHIN_M)
+    if not away.size or not on_the_way.size:
+        raise DemonstrationError(
+            f"the hand was moved by less than {1e3 * RESTS_WITHIN_M:g} mm, or brought back to where it was; the "
+            "segment is left out"
+        )
+    return max(0, int(away[0]) - 1), int(on_the_way[-1]) + 2
