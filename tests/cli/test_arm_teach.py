@@ -167,3 +167,11 @@ def test_a_servo_that_falls_silent_ends_it_and_loses_nothing(desk, monkeypatch):
     assert "servo 6 no longer answers" in done.stderr
     assert "1 new" in done.stdout
     assert len(DemonstrationSet.load(desk.folder / "set")) == 1
+
+
+def test_an_arm_that_cannot_float_is_told_before_anything_is_asked(desk):
+    desk.calibrate()
+    done = desk.teach([], "--float")
+    assert done.exit_code == 78
+    assert "has no current mode: lead this arm without --float" in done.stderr
+    assert "Hold the arm" not in done.stdout

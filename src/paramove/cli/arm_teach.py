@@ -38,6 +38,9 @@ def teach(
     robot: RobotOption,
     action: Annotated[str, typer.Option("--action", metavar="NAME", help="what is shown, such as reaching")],
     subject: Annotated[str, typer.Option("--subject", help="who shows it")] = "",
+    floats: Annotated[
+        bool, typer.Option("--float/--limp", help="its servos carry its own weight, or nothing (default)")
+    ] = False,
     append: Annotated[bool, typer.Option("--append", help="to a set that is there already")] = False,
     serial: SerialOption = "",
     by_id: ByIdOption = None,
@@ -45,14 +48,15 @@ def teach(
 ) -> None:
     """Record demonstrations: you lead the arm by hand from its rest to a place, again and again.
 
-    Torque goes off: hold the arm. Keys: space begins and ends a segment, d drops the last one, q ends. Each segment is
-    written as soon as it has ended; theta is where the end effector is then, frame of the arm's base.
+    Torque goes off: hold the arm, at the end too. Keys: space begins and ends a segment, d drops the last one, q ends.
+    Each segment is written as soon as it has ended; theta is where the end effector is then, frame of the arm's base.
 
     Exit codes: 0 ended by q; 1 no segment was recorded; 66 no calibration; 69 no adapter, or a servo does not answer;
     78 there is a set already, or it has other parameters; 130 Ctrl-C, segments that have ended are kept.
     """
     from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
     from paramove.robots.description import RobotDescription
+    from paramove.robots.dynamixel.floating_arm import FloatingArm
     from paramove.robots.dynamixel.limp_arm import LimpArm
 
     with explained():
@@ -62,13 +66,15 @@ def teach(
     person = TerminalPerson()
     try:
         with open_arm(by_id, serial, data, baud_rate) as arm:
-            limp = LimpArm(arm.chain, _of_this_arm(description, arm))
+            limp = (FloatingArm if floats else LimpArm)(arm.chain, _of_this_arm(description, arm))
             person.until_done("Hold the arm, it becomes limp.", list)
-            limp.release()
-            person.tell(KEYS)
             try:
+                limp.release()
+                person.tell(KEYS)
                 _lead(limp, teacher, person)
             finally:
+                for failed in limp.put_down():
+                    typer.echo(printable(f"not switched off: {failed}"), err=True)
                 _tell_end(teacher, folder)
     except QuitError:
         raise typer.Exit(exit_codes.OK if teacher.written else exit_codes.FAILURE) from None

@@ -20,12 +20,12 @@ class LimpArm:
         chain: At the arm's baud rate.
         description: Of an arm with servos; its units are those of this very arm.
 
-    All methods raise PortLostError and ServoError.
+    `release` and `measured` raise PortLostError and ServoError.
     """
 
     def __init__(self, chain: ServoChain, description: RobotDescription) -> None:
         self._chain = chain
-        self._numbers = description.servo_ids
+        self._joints, self._numbers = description.joint_names, description.servo_ids
         self._models = [model_named(motor) for motor in description.motors]
         self._units = description.units
         middle = 0.5 * (description.units.lower + description.units.upper)
@@ -36,6 +36,14 @@ class LimpArm:
         """Torque off; who holds the arm carries its weight from now on."""
         for number, model in zip(self._numbers, self._models, strict=True):
             self._chain.write(number, model.registers["Torque Enable"], 0)
+
+    def put_down(self) -> tuple[str, ...]:
+        """The last word to the servos; without torque there is none.
+
+        Returns:
+            What did not work, in words.
+        """
+        return ()
 
     def measured(self) -> tuple[int, NDArray[np.float64]] | None:
         """When, ns of the monotonic clock, and the angles of all joints, [J], rad; None while an answer is missing.
