@@ -94,7 +94,7 @@ def test_a_voltage_outside_of_the_limits_is_told(findings):
 
 def test_errors_are_told_in_words(findings):
     (four,) = about(findings, "servo 4", Level.PROBLEM)
-    assert four.sentence == "has stopped: overheated; overloaded (Hardware Error Status 0x24)"
+    assert four.sentence == "has stopped: overheated, overloaded (Hardware Error Status 0x24)"
 
 
 def test_heat_is_told(findings):
@@ -187,7 +187,7 @@ def test_a_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
         (FoundServo(1, "xl430_w250", 45, FAST, failed=3), "Status Return Level"),
         (FoundServo(1, "model 9", 45, FAST), "has no table"),
         (FoundServo(1, "x", 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
-        (FoundServo(1, "x", 45, FAST, values={"Hardware Error Status": 0x80}), "without a name"),
+        (FoundServo(1, "x", 45, FAST, values={"Hardware Error Status": 0x80}), "unknown error, bit 7"),
     ],
 )
 def test_what_else_can_be_wrong(tmp_path, servo, sentence):

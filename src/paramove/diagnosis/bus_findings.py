@@ -12,18 +12,10 @@ from paramove.diagnosis.bus_scan import ALL_IDS, READS, USUAL_BAUD_RATES, FoundS
 from paramove.diagnosis.finding import Finding, Level, Machine
 from paramove.diagnosis.serial_ports import usable_ports
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.hardware_error import hardware_errors, in_words
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, MODELS
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 
-HARDWARE_ERRORS = {
-    0: ("input voltage outside its limits", "check the supply and the plugs"),
-    1: ("hall sensor of the motor failed", "the servo needs repair"),
-    2: ("overheated", "let it cool, and lessen its load"),
-    3: ("encoder of the motor failed", "the servo needs repair"),
-    4: ("electrical shock, or too weak a supply to move the motor", "check supply and wires"),
-    5: ("overloaded", "free what blocks the joint, and lessen its load"),
-}
-"""Bits of Hardware Error Status (70), and what to do (ROBOTIS e-Manual, X series; bit 1 of the P series only)."""
 NEAR_LIMIT_C = 10
 """A servo so near its temperature limit is told of; chosen."""
 NOBODY = (
@@ -164,12 +156,14 @@ def _hardware_errors(port: Path, servo: FoundServo) -> Iterator[Wrong]:
     status = servo.values.get("Hardware Error Status", 0)
     if not status:
         return
-    unknown = ("an error without a name", "see its manual")
-    found = [HARDWARE_ERRORS.get(bit, unknown) for bit in range(8) if status >> bit & 1]
-    words, remedies = zip(*found, strict=True)
-    sentence = f"has stopped: {'; '.join(words)} (Hardware Error Status {status:#04x})"
+    found = hardware_errors(status)
+    sentence = f"has stopped: {in_words(status)} (Hardware Error Status {status:#04x})"
     restart = "then hold the arm, as its torque goes off, and restart the servo:"
-    yield Level.PROBLEM, sentence, (*remedies, restart, _command(port, servo, f"reboot(p, {servo.number})"))
+    yield (
+        Level.PROBLEM,
+        sentence,
+        (*(one.remedy for one in found), restart, _command(port, servo, f"reboot(p, {servo.number})")),
+    )
 
 
 def _setting(port: Path, servo: FoundServo, register: str, value: str, words: str) -> tuple[str, ...]:

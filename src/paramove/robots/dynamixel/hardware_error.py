@@ -20,12 +20,13 @@ class HardwareError:
 
 HARDWARE_ERRORS = {
     0: HardwareError("input voltage out of its limits", "check the power supply and the cables' plugs"),
+    1: HardwareError("hall sensor of the motor failed", "the servo must be repaired"),
     2: HardwareError("overheated", "let it cool, and give it less to carry or more pauses"),
     3: HardwareError("motor encoder failed", "the servo must be repaired"),
     4: HardwareError("electrical shock, or too little power to the motor", "check the power supply; then the servo"),
     5: HardwareError("overloaded", "take the load off; look for what blocked the joint"),
 }
-"""By the number of the bit."""
+"""By the number of the bit; bit 1 of the P series only."""
 
 
 def hardware_errors(status: int) -> tuple[HardwareError, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -232,32 +232,28 @@ class ServoArm:
 
     def look_after(self) -> Fault | None:
         """Read torque and errors of all servos; the first thing that is wrong with one that should hold."""
-        names = ("Torque Enable", "Hardware Error Status")
-        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
         found = None
-        for servo in self.servos:
-            if (answer := answers.get(servo.number)) is None:
-                continue
-            health = self.health[servo.joint]
-            health.torque = bool(answer.values["Torque Enable"])
-            health.hardware_error = answer.values["Hardware Error Status"]
+        for servo, health, (torque, error) in self._told("Torque Enable", "Hardware Error Status"):
+            health.torque, health.hardware_error = bool(torque), error
             found = found or self._fault_of_health(servo, health)
         return found
 
     def look_after_supply(self) -> Fault | None:
         """Read voltage and temperature of all servos; a voltage outside of what a model allows is a fault."""
-        names = ("Present Input Voltage", "Present Temperature")
-        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
         found = None
-        for servo in self.servos:
-            if (answer := answers.get(servo.number)) is None:
-                continue
-            health = self.health[servo.joint]
-            health.voltage = 0.1 * answer.values["Present Input Voltage"]
-            health.temperature = answer.values["Present Temperature"]
+        for servo, health, (tenths, temperature) in self._told("Present Input Voltage", "Present Temperature"):
+            health.voltage, health.temperature = 0.1 * tenths, temperature
             low, high = (0.1 * servo.model.registers[f"{end} Voltage Limit"].initial for end in ENDS)
             found = found or voltage_fault(servo, health.voltage, low, high)
         return found
+
+    def _told(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
+        """Of each servo that answers, its health so far and these registers."""
+        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
+        for servo in self.servos:
+            if servo.number in answers:
+                values = answers[servo.number].values
+                yield servo, self.health[servo.joint], [values[name] for name in names]
 
     def warnings(self) -> tuple[str, ...]:
         """What is not yet a fault, in words."""
