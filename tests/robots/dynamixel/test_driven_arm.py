@@ -13,7 +13,7 @@ from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_models import XL430_W250
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.wire_faults import WireFaults
@@ -215,6 +215,14 @@ def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(e
         with emulator.lock:
             emulator.bus.servos[0].memory["ID"] = 99
     assert person.memory("Torque Enable") == [1, 0, 0, 0, 0]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_loop_that_fails_is_told(person, monkeypatch):
+    person.waits_for("DISARMED")
+    monkeypatch.setattr(ServoArm, "measured", lambda arm: 1 / 0)
+    with pytest.raises(RuntimeError, match="rest by their watchdog"):
+        person.hears_until(lambda: person.arm.trouble)
 
 
 def test_a_missing_port_is_told_with_the_remedy():

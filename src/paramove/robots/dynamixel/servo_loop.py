@@ -78,7 +78,7 @@ class ServoLoop:
         self._reader: StreamReader | None = None
         self._says: list[DriverSays] = []
         self._step = 0
-        self._urgent = False
+        self._urgent = self._ended = False
         self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
         self._stopped = threading.Event()
@@ -112,16 +112,26 @@ class ServoLoop:
         with self.lock:
             self._tick(time.monotonic_ns())
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the loop has ended though nobody asked it to; its thread has written why."""
+        return self._ended and not self._stopped.is_set()
+
     def _run(self) -> None:
-        due_s = time.monotonic()
-        while not self._stopped.is_set():
-            due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)  # a late period is not made up for
+        try:
+            due_s = time.monotonic()
+            while not self._stopped.is_set():
+                due_s = max(
+                    due_s + self._period_s, time.monotonic() - self._period_s
+                )  # what is late is not made up for
+                with self.lock:
+                    self._one_period()
+                self._said()
+                self._stopped.wait(max(0.0, due_s - time.monotonic()))
             with self.lock:
-                self._one_period()
-            self._said()
-            self._stopped.wait(max(0.0, due_s - time.monotonic()))
-        with self.lock:
-            self._end()
+                self._end()
+        finally:
+            self._ended = True
 
     def _one_period(self) -> None:
         try:
