@@ -43,7 +43,7 @@ class LivePicture:
         robot: Its shape, joints and base pose.
         title: Of the page.
         surface: The working surface and the objects on it.
-        side: Arm in whose shoulder's frame the nodes speak of places.
+        side: Arm in whose shoulder's frame the nodes speak of places; with a servo arm it is the base's.
         wall_s: Monotonic clock on the wall; the nodes say their status by it.
     """
 
@@ -55,7 +55,7 @@ class LivePicture:
         side: str = "right",
         wall_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._sites = robot.arm(side).sites
+        origin, self._gripper = _sites_of(robot, side)
         self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
         self._beliefs = Beliefs((surface.x, surface.y))
         self._nodes = NodeTable()
@@ -68,7 +68,7 @@ class LivePicture:
         self._world = {
             "title": title,
             "parts": self._shape.parts(),
-            "shoulder": [round(float(value), 5) for value in self._shape.site(self._sites.shoulder)],
+            "shoulder": [round(float(value), 5) for value in self._shape.site(origin)],
             "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
             "object": {"radius": surface.object_radius, "height": surface.object_height},
         }
@@ -113,7 +113,7 @@ class LivePicture:
             "world": self._world,
             "clock": round(now_ns * 1e-9, 1),
             **self._beliefs.sections(now_ns * 1e-9),
-            "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._sites.gripper))},
+            "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._gripper))},
             "arm": self._arm,
             "safety": self._safety,
             "stop": stop,
@@ -128,6 +128,14 @@ class LivePicture:
         """The newest image if there is one that was not given yet, JPEG."""
         image, self._image = self._image, None
         return image
+
+
+def _sites_of(robot: RobotDescription, side: str) -> tuple[str, str]:
+    """Where the frame of places has its origin, and the gripper's site."""
+    if robot.chain is not None:
+        return robot.chain.sites.base, robot.chain.sites.end_effector
+    sites = robot.arm(side).sites
+    return sites.shoulder, sites.gripper
 
 
 def _safety(message: SafetyState) -> dict[str, Any]:
