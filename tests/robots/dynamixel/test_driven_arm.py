@@ -128,6 +128,25 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     person.waits_for("ARMED")
 
 
+def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulator, tmp_path):
+    button = tmp_path / "estop"
+    arm = DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), patience=PATIENCE, stop_file=button)
+    with arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        person.moves()
+        button.touch()
+        person.waits_for("ESTOP")
+        person.hears_until(lambda: np.ptp(person.angles[-30:], axis=0).max() < 1e-3)
+        rested = person.goals()
+        person.arms()
+        button.unlink()
+        person.waits_for("DISARMED")
+        assert person.goals() == rested
+        person.arms()
+        person.waits_for("ARMED")
+
+
 @pytest.mark.parametrize(
     ("name", "value", "code"), [("Torque Enable", 0, "torque_lost"), ("Hardware Error Status", 0x04, "hardware_error")]
 )

@@ -31,6 +31,7 @@ class ServoArmSetup(BaseModel):
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         patience: With silence.
         calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
+        stop_file: The emergency stop is pressed while there is a file of this name, for programs that watch a button.
         nominal: Whether they are even for an arm that everybody assembles differently, as in simulation.
     """
 
@@ -40,6 +41,7 @@ class ServoArmSetup(BaseModel):
     patience: Patience = Patience()
     calibration: Path | None = None
     nominal: bool = False
+    stop_file: Path | None = None
 
     def driven_arm(self, run_folder: Path) -> DrivenArm:
         """The arm, not yet driven.
@@ -55,7 +57,7 @@ class ServoArmSetup(BaseModel):
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         port = servo_port(description, str(run_folder / self.port))
-        return DrivenArm(description, servos, port, self.torque_off, self.patience, faults)
+        return DrivenArm(description, servos, port, self.torque_off, self.patience, faults, self.stop_file)
 
 
 def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:

@@ -6,6 +6,7 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -28,6 +29,7 @@ from paramove.safety.self_collision import SelfCollision
 
 FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from where it is commanded: more means that somebody or something holds it."""
+EMERGENCY_MS = 500.0
 SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
 
 
@@ -41,6 +43,7 @@ class DrivenArm:
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         patience: With silence.
         standing_faults: That keep the arm from being armed, whatever its servos say.
+        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
 
     Raises:
         InputError: On entering: the port is missing, forbidden or in use.
@@ -57,15 +60,20 @@ class DrivenArm:
         torque_off: bool = False,
         patience: Patience | None = None,
         standing_faults: tuple[Fault, ...] = (),
+        stop_file: Path | None = None,
     ) -> None:
         patience = patience or Patience()
         following = np.full(description.n_joints, FOLLOWING)
         following[list(description.gripper_indices)] = np.inf
-        settings = SafetySettings(measured_timeout_ms=1e3 * patience.silent_s, following=following)
+        settings = SafetySettings(
+            measured_timeout_ms=1e3 * patience.silent_s,
+            following=following,
+            emergency_timeout_ms=None if stop_file is None else EMERGENCY_MS,
+        )
         self._driver = ArmDriver(description, settings, self_collision(description))
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(
-            self._driver, description, servos, port, torque_off, patience, standing_faults, self._wake
+            self._driver, description, servos, port, torque_off, patience, standing_faults, stop_file, self._wake
         )
         self._slow_ns = self._motors_ns = 0
         self._state: State | None = None

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -26,7 +27,7 @@ from paramove.safety.gate_io import Fault, State
 _log = logging.getLogger(__name__)
 
 MOVING = (State.ARMED, State.STOPPING)
-HOLDING = (*MOVING, State.HOLD)
+HOLDING = (*MOVING, State.HOLD, State.ESTOP)
 HEALTH_STEPS, SUPPLY_STEPS = 10, 100
 REOPEN_S = 0.5
 TICK_S = 0.02
@@ -44,6 +45,7 @@ class ServoLoop:
         torque_off: Whether the arm goes limp when it is disarmed and when the loop ends; by default it holds.
         patience: With silence.
         standing_faults: That keep the arm from being armed, whatever its servos say.
+        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
         said: Called in the loop's thread when `take` has something.
 
     Raises:
@@ -59,6 +61,7 @@ class ServoLoop:
         torque_off: bool = False,
         patience: Patience | None = None,
         standing_faults: tuple[Fault, ...] = (),
+        stop_file: Path | None = None,
         said: Callable[[], None] = lambda: None,
     ) -> None:
         self.driver = driver
@@ -73,6 +76,7 @@ class ServoLoop:
         self._torque_off = torque_off
         self._patience = patience
         self._standing_faults = standing_faults
+        self._stop_file = stop_file
         self._said = said
         self._arm = ServoArm(servos, ServoChain(port), self._period_s, patience)
         self._reader: StreamReader | None = None
@@ -134,6 +138,7 @@ class ServoLoop:
             self._ended = True
 
     def _one_period(self) -> None:
+        self._look_at_emergency_stop()
         try:
             if self.lost:
                 self._reopen()
@@ -149,6 +154,13 @@ class ServoLoop:
         if self._urgent or self._step % self._tick_steps == 0:
             self._tick(time.monotonic_ns())
         self._step += 1
+
+    def _look_at_emergency_stop(self) -> None:
+        if self._stop_file is None:
+            return
+        pressed = self._stop_file.exists()
+        self.driver.on_emergency(pressed)
+        self._urgent |= pressed and self.driver.state is not State.ESTOP
 
     def _move_and_read(self) -> None:
         reader = self._reader
