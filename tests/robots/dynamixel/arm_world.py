@@ -3,7 +3,7 @@
 import math
 
 from paramove.robots.dynamixel.emulated_bus import EmulatedBus
-from paramove.robots.dynamixel.emulated_mechanics import MujocoMechanics, ServoJoint
+from paramove.robots.dynamixel.emulated_mechanics import DrivenJoint, MujocoMechanics
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.packets import Instruction, Packet, encoded
 
@@ -35,7 +35,7 @@ class Arm:
     def __init__(self, folder, model, mass=0.1, damping=0.02, counts=(COUNTS_PER_RAD, -COUNTS_PER_RAD), posture=None):
         path = folder / "arm.xml"
         path.write_text(WORLD.format(mass=mass, damping=damping))
-        joints = [ServoJoint("shoulder", counts[0]), ServoJoint("elbow", counts[1])]
+        joints = [DrivenJoint("shoulder", counts[0]), DrivenJoint("elbow", counts[1])]
         self.mechanics = MujocoMechanics(path, joints, posture)
         self.bus = EmulatedBus([EmulatedServo(model, number) for number in (1, 2)], self.mechanics)
         self.servos = self.bus.servos

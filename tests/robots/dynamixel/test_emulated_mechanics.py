@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_body import OVERLOAD_S, HardwareError
-from paramove.robots.dynamixel.emulated_mechanics import MujocoMechanics, ServoJoint
+from paramove.robots.dynamixel.emulated_mechanics import DrivenJoint, MujocoMechanics
 from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
 from paramove.robots.dynamixel.servo_models import (
     MODELS,
@@ -298,7 +298,7 @@ def test_what_is_wrong_with_a_world_is_told(tmp_path):
     path = tmp_path / "arm.xml"
     path.write_text(WORLD.format(mass=0.1, damping=0.02))
     with pytest.raises(InputError, match="no hinge or slide 'sholder' for a servo; it has shoulder"):
-        MujocoMechanics(path, [ServoJoint("sholder", COUNTS_PER_RAD)])
+        MujocoMechanics(path, [DrivenJoint("sholder", COUNTS_PER_RAD)])
     path.write_text("<mujoco><wordbody/></mujoco>")
     with pytest.raises(InputError, match="is no world that MuJoCo reads"):
         MujocoMechanics(path, [])

@@ -15,7 +15,7 @@ from paramove.input_error import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.emulated_control import ControlSocket
-from paramove.robots.dynamixel.emulated_mechanics import MujocoMechanics, ServoJoint
+from paramove.robots.dynamixel.emulated_mechanics import DrivenJoint, MujocoMechanics
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulated_verbs import EmulatorVerbs
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
@@ -52,7 +52,7 @@ class EmulatedArm:
             pose[robot.joint_names[robot.index(name)]] = float(np.deg2rad(degrees))
         units = robot.units
         joints = [
-            ServoJoint(name, counts, zero)
+            DrivenJoint(name, counts, zero)
             for name, counts, zero in zip(
                 robot.joint_names, units.counts_per_rad.tolist(), units.zero_counts.tolist(), strict=True
             )

@@ -31,7 +31,7 @@ class Mechanics(Protocol):
 
 
 @dataclass(frozen=True)
-class ServoJoint:
+class DrivenJoint:
     """A joint of a model and the servo that drives it.
 
     Attributes:
@@ -59,7 +59,7 @@ class MujocoMechanics:
     """
 
     def __init__(
-        self, model_path: Path, joints: Sequence[ServoJoint], posture: Mapping[str, float] | None = None
+        self, model_path: Path, joints: Sequence[DrivenJoint], posture: Mapping[str, float] | None = None
     ) -> None:
         try:
             self.model = mujoco.MjModel.from_xml_path(str(model_path))
