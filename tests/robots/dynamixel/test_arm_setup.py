@@ -39,6 +39,14 @@ def test_grippers_hold_with_a_limited_current_and_other_joints_by_position():
     assert joint_servos(KOCH)[-1].grip_current == 400
 
 
+def test_no_servo_turns_faster_than_its_joint_may_whatever_it_is_told():
+    for robot in (OPEN, KOCH):
+        rev_per_minute = np.array([0.229 * servo.profile_velocity for servo in joint_servos(robot)])
+        allowed = robot.velocity * 60.0 / (2.0 * np.pi)
+        assert (rev_per_minute >= allowed).all()  # a movement that is allowed is not held up
+        assert (rev_per_minute < allowed + 0.23).all()
+
+
 def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(tmp_path):
     assert uncalibrated(OPEN) == ()
     link = tmp_path / "usb-FTDI_0001-if00-port0"

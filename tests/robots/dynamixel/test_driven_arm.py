@@ -77,6 +77,7 @@ def test_it_moves_as_it_is_told(person):
     person.sends(person.away())
     person.is_told("SUCCEEDED")
     np.testing.assert_array_equal(person.goals(), ROBOT.units.to_counts(person.away()))
+    assert person.memory("Profile Velocity") == [servo.profile_velocity for servo in joint_servos(ROBOT)]
     steps = np.abs(np.diff(person.angles, axis=0)).max(axis=0)
     assert (steps < 0.1).all()  # it began where it stood and jumped nowhere
     person.hears_until(lambda: person.motors is not None)

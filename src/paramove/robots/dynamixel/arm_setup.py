@@ -90,10 +90,12 @@ def joint_servos(description: RobotDescription, calibration: ArmCalibration | No
     """The servos of a described arm, in the order of its joint vector."""
     d = description
     calibrated = {} if calibration is None else calibration.joints
-    rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, strict=True)
+    rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, d.velocity.tolist(), strict=True)
     return tuple(
-        JointServo(name, number, model_named(motor), calibrated.get(name), _grip_current(d, name, motor), gains)
-        for name, number, motor, gains in rows
+        JointServo(
+            name, number, model_named(motor), calibrated.get(name), _grip_current(d, name, motor), gains, velocity
+        )
+        for name, number, motor, gains, velocity in rows
     )
 
 

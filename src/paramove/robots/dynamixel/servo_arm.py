@@ -142,8 +142,9 @@ class ServoArm:
         self._chain.write(number, registers["Goal Position"], goal)
         if (found := self._chain.read(number, registers["Goal Position"])) != goal:
             raise ServoError(number, f"servo {number} was told the goal {goal} and has {found}: reboot it")
-        for name, gain in zip(GAINS, servo.gains or (), strict=False):
-            self._chain.write(number, registers[name], gain)
+        fence = {"Profile Velocity": servo.profile_velocity, "Profile Acceleration": 0}
+        for name, value in {**fence, **dict(zip(GAINS, servo.gains or (), strict=False))}.items():
+            self._chain.write(number, registers[name], value)
         if servo.grip_current is not None:
             self._chain.write(number, servo.model.registers["Goal Current"], servo.grip_current)
         self._chain.write(number, registers["Torque Enable"], 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from paramove.safety.gate_io import Fault
 POSITION_MODE, GRIP_MODE = 3, 5
 OLDEST_FIRMWARE = 42
 """Bus Watchdog (98) is known from this version on (e-Manual, "Bus Watchdog")."""
+VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
+"""rad/s of one unit, 0.229 rev/min (e-Manual, "Profile Velocity")."""
 ROUND_TRIPS = 20
 ENDS = ("Min", "Max")
 
@@ -32,6 +35,7 @@ class JointServo:
         calibration: Of the joint; None: it is set as it came, and counts within one turn.
         grip_current: Of a gripper that holds with a limited current, in the servo's units; None: position mode.
         gains: P, I and D of the servo's position loop, in its units; None: those that it has.
+        velocity: That the servo never exceeds, whatever goal it is told, rad/s; None: what it can.
     """
 
     joint: str
@@ -40,6 +44,7 @@ class JointServo:
     calibration: JointCalibration | None = None
     grip_current: int | None = None
     gains: tuple[int, int, int] | None = None
+    velocity: float | None = None
 
     @property
     def mode(self) -> int:
@@ -47,6 +52,11 @@ class JointServo:
         if self.grip_current is not None:
             return GRIP_MODE
         return POSITION_MODE if self.calibration is None else self.calibration.operating_mode
+
+    @property
+    def profile_velocity(self) -> int:
+        """Profile Velocity (112) that it must have; 0 for none."""
+        return 0 if self.velocity is None else math.ceil(self.velocity / VELOCITY_UNIT)
 
     @property
     def homing_offset(self) -> int:
