@@ -247,5 +247,5 @@ def test_a_loop_that_fails_is_told(person, monkeypatch):
 
 def test_a_missing_port_is_told_with_the_remedy():
     arm = DrivenArm(ROBOT, joint_servos(ROBOT), servo_port(ROBOT, "/dev/ttyUSB77"))
-    with pytest.raises(InputError, match="by-id"), arm:
+    with pytest.raises(InputError, match=r"no serial port /dev/ttyUSB77, found are: .*`paramove arm scan`"), arm:
         pass

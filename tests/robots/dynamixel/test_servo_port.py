@@ -73,8 +73,10 @@ def test_a_second_program_is_refused(emulator):
         pass
 
 
-def test_a_port_that_is_not_there_or_none_is_told(tmp_path):
-    with pytest.raises(InputError, match="by-id") as missing:
+def test_a_port_that_is_not_there_or_none_is_told_with_those_that_are(tmp_path, monkeypatch):
+    (tmp_path / "usb-FTDI_0001-if00-port0").touch()
+    monkeypatch.setenv("PARAMOVE_SERIAL_BY_ID", str(tmp_path))
+    with pytest.raises(InputError, match=r"found are: .*usb-FTDI_0001-if00-port0") as missing:
         ServoPort(str(tmp_path / "ttyUSB7")).open()
     assert missing.value.missing
     file = tmp_path / "file"

@@ -21,6 +21,7 @@ import serial
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, HEADER, Packet, encoded
+from paramove.robots.dynamixel.serial_adapters import default_by_id, serial_adapters
 
 BITS_PER_BYTE = 10
 LATENCY_S = 0.004
@@ -155,7 +156,8 @@ class ServoPort:
 
 def _reason(name: str, error: serial.SerialException) -> str:
     if error.errno == errno.ENOENT:
-        return f"no serial port {name}: plug in the adapter, and look for its name in /dev/serial/by-id"
+        found = ", ".join(str(one.link) for one in serial_adapters()) or f"none in {default_by_id()}"
+        return f"no serial port {name}, found are: {found}. Plug in the adapter; `paramove arm scan` lists all of them"
     if error.errno == errno.EACCES:
         return f"{name} may not be opened by this user: sudo usermod -aG dialout $USER, then log in again"
     if error.errno in (errno.EAGAIN, errno.EBUSY):
