@@ -210,7 +210,7 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
             person.moves()
             linked.unplug()
             person.waits_for("DISCONNECTED")
-            assert "cable" in arm.trouble or "plug in" in arm.trouble
+            assert "cable" in arm.trouble or "Plug in" in arm.trouble
             linked.plug_in()
             person.waits_for("DISARMED")
             assert arm.trouble == ""

@@ -125,9 +125,8 @@ class ServoLoop:
         try:
             due_s = time.monotonic()
             while not self._stopped.is_set():
-                due_s = max(
-                    due_s + self._period_s, time.monotonic() - self._period_s
-                )  # what is late is not made up for
+                # What is late is not made up for.
+                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
                 with self.lock:
                     self._one_period()
                 self._said()
@@ -148,9 +147,7 @@ class ServoLoop:
             self.lost = str(error)
             self._reopen_s = time.monotonic() + REOPEN_S
             self._reader = None
-            self.driver.on_fault(
-                Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again")
-            )
+            self._tell(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
         if self._urgent or self._step % self._tick_steps == 0:
             self._tick(time.monotonic_ns())
         self._step += 1
@@ -178,8 +175,8 @@ class ServoLoop:
             reading = self._prepare() or reading  # the checks took longer than a reading counts
             self._urgent = True
             reader = self._reader = StreamReader(self._description, reading.counts)
-        elif self._arm.holds and self.driver.state not in HOLDING:
-            self._let_go()
+        elif self._arm.holds and self.driver.state not in HOLDING and reader.at_rest:
+            self._let_go()  # not before the stop ramp is over
         self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
 
     def _prepare(self) -> ArmReading | None:
