@@ -90,10 +90,11 @@ def test_what_is_wrong_is_the_exit_code_also_on_a_terminal_without_unicode(emula
     words = ["doctor", "--only", "servos", "--by-id", str(here / "by-id"), "--baud", str(FAST)]
     done = CliRunner(charset="ascii").invoke(build("doctor"), words)
     assert done.exit_code == 3
-    _, told, wrong, remedy = done.output.splitlines()
+    _, told, wrong, remedy, stopped, *_ = done.output.splitlines()
     assert told == "+ servo 7          xl430_w250, firmware 45, 1000000 bit/s, 15.0 V, 30 ?C"
     assert wrong == "x servo 7          measures 15.0 V, its limits are 6.0 to 14.0 V"
     assert remedy == "      switch off, and give it a supply of 11.1 V"
+    assert stopped.startswith("x servo 7          has stopped: input voltage out of its limits")
 
 
 def test_the_whole_machine_is_looked_at(here):
