@@ -49,6 +49,7 @@ def test_what_is_not_finite_is_told_first_and_where(value: float) -> None:
     found = LIMITS.first_violation(rows, REST)
     assert found is not None
     assert (found.code, found.row, found.joint, found.allowed) == ("not_finite", 2, "shoulder", "a finite number")
+    assert found.unit == ""
     assert found.sentence.startswith("joint shoulder is not a finite number at row 2: asked ")
 
 
@@ -78,6 +79,15 @@ def test_outside_its_range_a_joint_may_stay_or_come_back_slowly_but_not_go_on() 
     assert code(rows_of([1.6 + 1e-6]), outside, limits) == "joint_limit"
     assert code(rows_of([1.59, 1.595]), outside, only()) == "joint_limit"
     assert code(rows_of([1.49, 1.46]), rows_of([1.5]), limits) == ""
+    back_inside = rows_of([1.505, 1.4995, 1.475, 1.45])
+    assert code(back_inside, rows_of([1.51]), limits) == "", "as fast as usual once it is inside"
+
+
+def test_a_billionth_of_a_radian_outside_is_still_inside() -> None:
+    limits = replace(only(velocity=3.0), lower=np.full(3, -1.0), upper=np.zeros(3))
+    assert code(rows_of([1e-9]), REST, limits) == ""
+    assert code(rows_of([1.1e-9]), REST, limits) == "joint_limit"
+    assert code(rows_of([-0.029]), rows_of([1e-9]), limits) == "", "so it need not come back slowly"
 
 
 @pytest.mark.parametrize(
@@ -98,6 +108,28 @@ def test_each_limit_passes_what_is_at_it_and_refuses_a_thousandth_more(kind: str
         assert found.asked > np.rad2deg(2.0)
 
 
+@pytest.mark.parametrize(
+    ("kind", "order", "allowed"),
+    [("velocity", 1, "114.7 deg/s"), ("acceleration", 2, "114.7 deg/s²"), ("jerk", 3, "343.9 deg/s³")],
+)
+def test_what_was_found_and_the_limit_with_its_slack_are_told(kind: str, order: int, allowed: str) -> None:
+    t = 0.01 * np.arange(1, 5)
+    rows = rows_of(9.0 * t**order / [0, 1, 2, 6][order])
+    found = only(**{kind: 2.0}).first_violation(rows, np.zeros((3, 3)))
+    assert found is not None
+    assert (found.code, found.allowed) == (kind, allowed)
+    first = rows[found.row :: -1, 0].copy()
+    first.resize(4)  # the rows before are zero
+    value = [first @ [1, -1, 0, 0], first @ [1, -2, 1, 0], first @ [1, -3, 3, -1]][order - 1] / 0.01**order
+    np.testing.assert_allclose(found.asked, np.rad2deg(value), rtol=1e-9)
+
+
+def test_a_jerk_at_its_limit_passes_where_rounding_is_nothing_beside_it() -> None:
+    t = LIMITS.dt_s * np.arange(1, 5)
+    for share, expected in ((1.0, ""), (1.0009, ""), (1.0012, "jerk")):
+        assert code(rows_of(share * 1e5 * t**3 / 6), np.zeros((3, 3)), only(jerk=1e5)) == expected
+
+
 def test_the_jerk_allows_for_angles_rounded_to_six_decimals() -> None:
     for dt_s in (0.01, 0.001):
         limits = replace(only(jerk=1e-3), dt_s=dt_s)
@@ -107,11 +139,11 @@ def test_the_jerk_allows_for_angles_rounded_to_six_decimals() -> None:
 
 
 def test_a_jump_is_more_than_one_and_a_half_times_what_motors_can() -> None:
-    limits = only(motor_velocity=4.0)
-    assert code(rows_of([0.0599]), REST, limits) == ""
-    found = limits.first_violation(rows_of([0.0, 0.0601]), REST)
+    limits = replace(only(motor_velocity=4.0), dt_s=0.125)
+    assert code(rows_of([0.75]), REST, limits) == ""
+    found = limits.first_violation(rows_of([0.0, 0.751]), REST)
     assert found is not None
-    assert (found.code, found.row, found.unit) == ("jump", 1, "deg/s")
+    assert (found.code, found.row, found.allowed, found.unit) == ("jump", 1, "343.8 deg/s", "deg/s")
 
 
 def test_what_lies_before_a_short_history_is_rest() -> None:
@@ -119,6 +151,13 @@ def test_what_lies_before_a_short_history_is_rest() -> None:
     moving = rows_of(0.01 * np.arange(20))
     assert code(moving[10:], moving[:10], limits) == ""
     assert code(moving[10:], moving[9:10], limits) == "acceleration"
+
+
+@pytest.mark.parametrize("known", [1, 2, 3, 4])
+def test_rows_are_counted_from_the_first_that_is_judged(known: int) -> None:
+    found = only().first_violation(rows_of([0.0, 1.6]), np.zeros((known, 3)))
+    assert found is not None
+    assert (found.code, found.row) == ("joint_limit", 1)
 
 
 def test_rest_at_the_end_is_judged_where_it_is_asked_for() -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.safety_steps import limits_at
 from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import CheckedPath, TrajectoryRefusedError, check_trajectory
 from tests.robots.hoap3.movements import HOAP3
@@ -91,6 +92,83 @@ def test_refused_with_the_point_and_the_joint(
     assert refusal.value.index == index
     assert refusal.value.asked
     assert refusal.value.allowed
+
+
+@pytest.mark.parametrize(
+    ("times", "offsets", "joints", "asked", "allowed"),
+    [
+        ([0, 1], [[], []], (), "no joints", "at least one"),
+        (
+            [0, 1],
+            [[0, 0]] * 2,
+            ("right_shoulder_pitch", "tail"),
+            "an unknown joint",
+            ", ".join(HOAP3.joint_names),
+        ),
+        ([0, 1], [[0, 0]] * 2, ("right_elbow", "right_elbow"), "the joint twice", "once"),
+        ([0], [[0, 0]], JOINTS, "1 points", "at least 2"),
+        ([0, 1], [[0, 0], [0]], JOINTS, "1 angles", "2"),
+        ([0, 1], [[0, 0], [0, float("nan")]], JOINTS, "nan", "finite angles"),
+        ([0, 1], [[0, 0]] * 3, JOINTS, "2 times", "3, one a point"),
+        ([0, 1, float("nan")], [[0, 0]] * 3, JOINTS, "time nan s", "finite times"),
+        ([0.5, 1], [[0, 0]] * 2, JOINTS, "0.5 s", "0 s at the first point"),
+        ([0, 2, 1], [[0, 0]] * 3, JOINTS, "1 s after 2 s", "times that increase strictly"),
+        ([0, 60, 500], [[0, 0]] * 3, JOINTS, "500 s", "up to 120 s"),
+    ],
+)
+def test_what_was_asked_and_what_is_allowed_is_said(
+    times: list[float], offsets: list[list[float]], joints: tuple[str, ...], asked: str, allowed: str
+) -> None:
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check(times, offsets, joints)
+    assert (refusal.value.asked, refusal.value.allowed) == (asked, allowed)
+
+
+SMALL = limits_at(0.02)  # three joints, each from -1.5 to 1.5 rad
+
+
+def check_small(
+    times: np.ndarray | list[float],
+    positions: np.ndarray | list[list[float]],
+    tolerance: float | list[float] = 0.0,
+    joints: tuple[str, ...] = ("shoulder", "elbow"),
+) -> CheckedPath:
+    """From rest at zero."""
+    return check_trajectory(joints, times, positions, np.zeros(3), SMALL, tolerance)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("side", "asked"), [(1, "86.23 deg"), (-1, "-86.23 deg")])
+def test_a_point_at_its_limit_passes_and_one_beyond_is_told_as_it_was_given(side: int, asked: str) -> None:
+    path = check_small([0, 3], [[0, 0], [0, 1.5 * side]])
+    np.testing.assert_allclose(path.rows[-1], [0, 1.5 * side, 0], rtol=0, atol=1e-12)
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check_small([0, 3, 6], [[0, 0], [0, 0], [0, 1.505 * side]])
+    assert (refusal.value.code, refusal.value.index, refusal.value.joint) == ("joint_limit", 2, "elbow")
+    assert (refusal.value.asked, refusal.value.allowed) == (asked, "-85.94 to 85.94 deg")
+
+
+def test_what_lies_exactly_at_the_tolerance_may_begin() -> None:
+    assert check_small([0, 3], [[0, 0], [1, 0]]).duration_s == pytest.approx(3.0, abs=1e-9)
+    assert check_small([0, 3], [[0.5, 0], [1, 0]], 0.5).rows[0].tolist() == [0, 0, 0]
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check_small([0, 3], [[0.5, 0.25], [1, 1]], [0.5, 0.125, 0.0])
+    assert (refusal.value.code, refusal.value.index, refusal.value.joint) == ("start", 0, "elbow")
+    assert (refusal.value.asked, refusal.value.allowed) == ("14.32 deg", "within 7.16 deg of the commanded 0 deg")
+
+
+def test_two_minutes_pass_and_not_a_moment_more() -> None:
+    assert check_small([0, 120], [[0, 0], [1, 0]]).duration_s == pytest.approx(120.0, abs=1e-9)
+    with pytest.raises(TrajectoryRefusedError) as refusal:
+        check_small([0, 120.001], [[0, 0], [1, 0]])
+    assert (refusal.value.asked, refusal.value.allowed) == ("120.001 s", "up to 120 s")
+
+
+def test_numbers_of_single_precision_become_the_same_movement_as_their_doubles() -> None:
+    times = np.array([0, 0.73, 1.61], dtype=np.float32)
+    positions = np.array([[0, 0], [0.11, -0.77], [0.32, 0.13]], dtype=np.float32)
+    single = check_small(times, positions)
+    double = check_small(times.astype(np.float64), positions.astype(np.float64))
+    np.testing.assert_array_equal(single.rows, double.rows)
 
 
 def test_a_joint_that_is_held_outside_its_range_may_begin_there_and_come_in_slowly() -> None:
