@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,9 @@ def test_rows_are_looked_at_every_20_ms_and_at_the_end() -> None:
     gap = Gap()
     assert clearance_fault(gap, np.zeros(3) + 0.5, rows[:1], FAST, 1) is None
     assert gap.asked == [0.5, 1.0]
+    gap = Gap()
+    assert clearance_fault(gap, np.zeros(3) + 0.5, rows[:3], limits_at(0.02), 3) is None
+    assert gap.asked == [0.5, 1.0, 2.0, 3.0]
 
 
 @pytest.mark.parametrize(
@@ -57,6 +62,7 @@ def test_rows_are_looked_at_every_20_ms_and_at_the_end() -> None:
         (-0.0100, -0.0090, True),
         (-0.0100, 0.0030, False),  # apart, but at 0.65 rad/s, allowed 0.6
         (-0.0080, 0.0030, True),
+        (-0.0100, 0.0050, True),  # at 5 mm any speed apart will do
         (-0.0100, 0.0060, True),
         (float("nan"), 0.0100, False),
         (0.0100, float("nan"), False),
@@ -67,6 +73,28 @@ def test_two_rows_of_20_ms(start: float, end: float, passes: bool) -> None:
     assert (found is None) is passes
     if found is not None:
         assert (found.code, found.joint) == ("clearance", "")
+
+
+def test_exactly_as_fast_as_allowed_passes() -> None:
+    limits = replace(limits_at(0.125), velocity=np.full(3, 5.0))
+    assert fault([0.0], -0.125, limits) is None  # apart at a fifth of 5 rad/s
+    assert fault([0.001], -0.125, limits) is not None
+    limits = limits_at(1.0)
+    assert fault([0.0], 1e-4, limits) is None  # 0.1 mm/s may be none
+    assert fault([0.0], 1.1e-4, limits) is not None
+
+
+@pytest.mark.parametrize(
+    ("distance", "said"),
+    [
+        (0.01794, "within 17.9 mm at row 0, at 24103 mm/s, allowed 65 mm/s there"),
+        (0.017874, "within 17.9 mm at row 0, at 24106 mm/s, allowed 64 mm/s there"),
+    ],
+)
+def test_millimetres_are_thousandths_of_metres(distance: float, said: str) -> None:
+    found = fault([distance], 0.5, limits_at(0.02))
+    assert found is not None
+    assert said in found.sentence
 
 
 def test_the_sentence_names_the_two_the_place_and_what_is_allowed() -> None:

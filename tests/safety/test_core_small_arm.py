@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.safety_steps import MS
 from paramove.safety.gate_io import ArmWord, Fault, SafetySettings, State
-from paramove.safety.stop_ramp import straight_move
+from paramove.safety.stop_ramp import stop_ramp, straight_move
 from tests.safety.small_arm import HOME, LIMITS, PATH, SmallArm
 
 VOLTAGE, MODEL = Fault("voltage", "", "9.1 V, allowed 11 to 13 V"), Fault("model", "wrist", "XL430, allowed XM430")
@@ -52,6 +52,29 @@ def test_the_pose_may_lie_half_a_degree_outside_the_mechanical_range(offset: flo
             "joint shoulder is measured at 115.14 deg, allowed -114.59 to 114.59 deg; move it inside by hand"
         )
         assert faults == ("arming_pose_outside", "arming_pose_outside")
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_pose_exactly_at_the_tolerance_arms(side: int) -> None:
+    for offset, state in ((0.5, State.ARMED), (0.50001, State.DISARMED)):
+        arm = SmallArm(SafetySettings(pose_tolerance=0.5))
+        arm.stream = np.array([[0.0, side * (2.0 + offset), 0.0]])
+        assert arm.arm()[1] is state
+
+
+@pytest.mark.parametrize(("age_ms", "faults"), [(1000, ()), (1001, ("arming_stale",))])
+def test_a_word_to_arm_may_be_a_second_old(age_ms: int, faults: tuple[str, ...]) -> None:
+    arm = SmallArm()
+    for _ in range(4):
+        arm.step(ms=300)
+    assert arm.step(word=ArmWord(arm.now + (10 - age_ms) * MS, "a person", True))[2] == faults
+
+
+def test_an_arm_that_is_moved_by_hand_while_held_is_disarmed_at_once() -> None:
+    arm = SmallArm()
+    assert arm.step(stop=VOLTAGE)[1] is State.HOLD
+    moved = replace(arm.measured(), captured_ns=arm.now + 10 * MS, at_rest=False)
+    assert arm.step(measured=moved, word=ArmWord(arm.now + 10 * MS, "a person", False))[1] is State.DISARMED
 
 
 def test_outside_its_soft_range_an_arm_comes_back_slowly() -> None:
@@ -257,7 +280,8 @@ def test_disarmed_in_motion_it_stops_first_and_is_not_held(while_stopping: bool)
     assert arm.core.state is State.DISARMED
 
 
-def test_rows_that_were_lost_are_not_waited_for_longer_than_half_a_second() -> None:
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_rows_that_were_lost_are_waited_for_half_a_second_and_until_the_robot_rests(at_rest: bool) -> None:
     arm = SmallArm()
     arm.arm()
     arm.step(proposal=arm.proposal)
@@ -265,7 +289,7 @@ def test_rows_that_were_lost_are_not_waited_for_longer_than_half_a_second() -> N
     arm.step(stop=VOLTAGE, measured=replace(robot, captured_ns=arm.now + 10 * MS, at_rest=True, next_index=0))
     for k in range(50):
         assert arm.core.state is State.STOPPING, k
-        arm.step(measured=replace(robot, captured_ns=arm.now + 10 * MS, at_rest=k == 49, next_index=0))
+        arm.step(measured=replace(robot, captured_ns=arm.now + 10 * MS, at_rest=at_rest or k == 49, next_index=0))
     assert arm.core.state is State.HOLD
 
 
@@ -285,6 +309,7 @@ def test_rows_whose_stop_would_leave_the_range_are_refused_in_time() -> None:
     arm.arm()
     arm.follow(inside, len(inside))
     assert [fault.code for fault in arm.core.faults] == ["joint_limit"]
+    assert arm.core.faults[0].joint == "shoulder"
     assert arm.core.faults[0].sentence.startswith("in the stop after these rows: joint shoulder leaves its range at")
     for _ in range(100):
         arm.step()
@@ -409,6 +434,32 @@ def test_what_the_faults_of_proposals_say(fields: dict, code: str, sentence: str
     arm.arm()
     arm.step(proposal=lambda: replace(arm.proposal(), **fields))
     assert [(f.code, f.joint, f.sentence) for f in arm.core.faults] == [(code, "", sentence)]
+
+
+def test_rows_that_break_a_limit_are_told_with_their_joint() -> None:
+    arm = SmallArm()
+    arm.arm()
+    rows = PATH[:4] + np.array([0.0, 1.0, 0.0])
+    arm.step(proposal=lambda: replace(arm.proposal(), rows=rows))
+    assert [(fault.code, fault.joint) for fault in arm.core.faults] == [("jump", "elbow")]
+
+
+def test_rows_with_nothing_after_them_must_end_at_rest() -> None:
+    arm = SmallArm()
+    arm.arm()
+    targets, _, faults = arm.step(proposal=lambda: replace(arm.proposal(), ahead=PATH[:0]))
+    assert (targets, faults) == (None, ("acceleration",))
+
+
+def test_what_is_sent_is_what_was_proposed_and_the_stop_along_what_would_follow() -> None:
+    arm = SmallArm()
+    arm.arm()
+    for n_rows in (30, 1):
+        targets = arm.step(ms=0, proposal=lambda n_rows=n_rows: arm.proposal(rows=n_rows))[0]
+        assert targets is not None
+        ramp = stop_ramp(PATH[n_rows - 1], PATH[n_rows : n_rows + 60], LIMITS)
+        np.testing.assert_array_equal(targets.rows, np.concatenate([PATH[:n_rows], ramp]))
+        assert targets.ramp_rows == len(ramp) > 0
 
 
 @pytest.mark.parametrize(("age_ms", "passes"), [(0, True), (250, True), (251, False), (-1, False)])

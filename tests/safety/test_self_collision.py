@@ -23,7 +23,7 @@ ARM = """<mujoco><worldbody>
       <geom type="box" size="1 1 1" contype="0" conaffinity="0"/></body>
   </body></body></body></body>
  <body name="ring"><geom type="sphere" size="0.06" pos="0.1 0 0"/></body>
- <body name="wall" pos="-0.64 0 0"><geom type="plane" size="0 0 1" zaxis="1 0 0"/></body>
+ <body name="wall" pos="-0.64 7 0"><geom type="plane" size="0 0 1" zaxis="1 0 0"/></body>
  <body name="loose"><freejoint name="free"/>
   <geom type="sphere" size="0.01" pos="5 5 5" contype="2" conaffinity="4"/></body>
 </worldbody></mujoco>"""

@@ -100,6 +100,9 @@ def test_one_more_than_the_allowed_within_a_quarter_second_is_too_many(per_s: fl
     late = RateWatch(per_s)
     assert not any(late.exceeded(i) for i in range(allowed))
     assert not late.exceeded(250 * MS)
+    after_a_pause = RateWatch(per_s)
+    assert not after_a_pause.exceeded(0)
+    assert [after_a_pause.exceeded(9000 * MS) for _ in range(allowed + 1)] == [False] * allowed + [True]
 
 
 def test_the_nominal_rate_passes_for_ever_and_time_that_goes_back_breaks_no_rate() -> None:
