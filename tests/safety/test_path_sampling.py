@@ -51,6 +51,10 @@ def test_via_points_leave_the_straight_line_nowhere() -> None:
     assert largest_detour(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.0], [1.0, -1.0], [0.0, 3.0]]))[2] < 1e-12
 
 
+def test_where_nothing_moves_the_first_segment_and_joint_are_named_with_no_detour() -> None:
+    assert largest_detour(np.array([0.0, 1.0, 2.0]), np.zeros((3, 2))) == (0, 0, 0.0)
+
+
 def test_the_largest_detour_is_named_by_its_segment_and_joint() -> None:
     times = np.concatenate([[0.0], np.cumsum([1.0, 0.02, 0.02, 0.02, 0.02, 0.02, 1.0])])
     points = np.zeros((8, 3))

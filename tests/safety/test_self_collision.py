@@ -92,6 +92,15 @@ def test_only_what_touches_in_every_random_pose_is_left_out() -> None:
         assert ("fore", "ring") in bodies(some)
 
 
+def test_the_same_seed_leaves_out_the_same_pairs() -> None:
+    def left(seed: int) -> list[list[int]]:
+        return SelfCollision(MODEL, JOINTS, np.zeros(3), LOWER, UPPER, n_samples=1, seed=seed).pairs.tolist()
+
+    found = [left(seed) for seed in range(40)]
+    assert found == [left(seed) for seed in range(40)]
+    assert any(pairs != found[0] for pairs in found), "by one pose, which the seed draws"
+
+
 def test_a_joint_the_model_does_not_have_or_that_has_no_angle_is_named() -> None:
     with pytest.raises(InputError, match=r"'hip' is not in the model.*shoulder, elbow, wrist"):
         SelfCollision(MODEL, ("shoulder", "hip"), np.zeros(2), LOWER[:2], UPPER[:2])

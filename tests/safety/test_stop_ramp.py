@@ -101,7 +101,7 @@ def test_a_stop_keeps_what_is_left_of_acceleration_and_jerk_and_takes_no_longer_
 
 
 def test_joints_that_do_not_move_make_no_stop_longer() -> None:
-    slow = replace(LIMITS, jerk=np.where(np.arange(28) == 0, 1e-3, LIMITS.jerk))
+    slow = replace(LIMITS, jerk=np.where(np.arange(28) == 0, 0.1, 1.0) * LIMITS.jerk)
     still = PATH.copy()
     still[:, 0] = still[0, 0]
     np.testing.assert_array_equal(stop_ramp(still[500], still[501:], slow), stop_ramp(still[500], still[501:], LIMITS))

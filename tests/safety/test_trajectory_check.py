@@ -164,8 +164,8 @@ def test_two_minutes_pass_and_not_a_moment_more() -> None:
 
 
 def test_numbers_of_single_precision_become_the_same_movement_as_their_doubles() -> None:
-    times = np.array([0, 0.73, 1.61], dtype=np.float32)
-    positions = np.array([[0, 0], [0.11, -0.77], [0.32, 0.13]], dtype=np.float32)
+    times = np.array([0, 0.3, 1.7, 3.2], dtype=np.float32)
+    positions = np.array([[0, 0], [0.013, -0.017], [0.9, 0.771], [-0.1237, 0.6]], dtype=np.float32)
     single = check_small(times, positions)
     double = check_small(times.astype(np.float64), positions.astype(np.float64))
     np.testing.assert_array_equal(single.rows, double.rows)

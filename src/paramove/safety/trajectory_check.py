@@ -88,7 +88,7 @@ def check_trajectory(
     moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[places] - points[0])
     rows = np.repeat(commanded[None], len(moving), axis=0)
     rows[:, places] = moving
-    _check_rows(rows, places, times, commanded, limits)
+    _check_rows(rows, times, commanded, limits)
     return CheckedPath(rows, limits.dt_s)
 
 
@@ -161,9 +161,7 @@ def _check_points(
         raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 
-def _check_rows(
-    rows: FloatArray, places: NDArray[np.intp], times: FloatArray, commanded: FloatArray, limits: MotionLimits
-) -> None:
+def _check_rows(rows: FloatArray, times: FloatArray, commanded: FloatArray, limits: MotionLimits) -> None:
     found = limits.first_violation(rows, commanded[None], rest_at_end=True)
     if found is None:
         return
