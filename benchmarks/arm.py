@@ -48,7 +48,7 @@ MOVEMENT_S = 4.0
 UNDER_WAY_S = 1.0
 PATIENT_S = 10.0
 LOOP_S = 10.0
-BUSY = Patience(silent_s=0.25)
+BUSY = Patience(silent_s=0.25, read_s=0.1)
 """For what does not measure silence: other programs may take the processors for a while."""
 
 

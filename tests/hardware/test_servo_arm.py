@@ -9,7 +9,7 @@ from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from tests.robots.dynamixel.person import Person
 
-PATIENCE = Patience(silent_s=1.0, watchdog_s=2.0)
+PATIENCE = Patience(silent_s=1.0, watchdog_s=2.0, read_s=1.0)
 A_LITTLE = np.deg2rad(3.0)
 
 

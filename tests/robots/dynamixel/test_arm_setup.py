@@ -18,7 +18,7 @@ from tests.robots.dynamixel.small_arm import calibration
 
 FOLDER = Path("robot_description")
 KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
-PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
+PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0)
 
 
 def one_of(place: int) -> JointCalibration:

@@ -19,7 +19,7 @@ from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 
-PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54)
+PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0)
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
@@ -204,7 +204,9 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
     with DynamixelEmulator(emulator.bus.servos, link) as linked:
         port = servo_port(ROBOT, str(link))
         port.latency_s = LATENCY_S
-        with DrivenArm(ROBOT, joint_servos(ROBOT), port, patience=Patience(silent_s=0.5, watchdog_s=2.54)) as arm:
+        with DrivenArm(
+            ROBOT, joint_servos(ROBOT), port, patience=Patience(silent_s=0.5, watchdog_s=2.54, read_s=1.0)
+        ) as arm:
             person = PersonAtEmulator(arm, linked)
             person.arms_and_waits()
             person.moves()

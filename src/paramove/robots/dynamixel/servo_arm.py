@@ -36,15 +36,17 @@ LOW_VOLTAGE_SHARE = 0.10
 
 @dataclass(frozen=True)
 class Patience:
-    """How long silence is borne.
+    """How long silence and slowness are borne.
 
     Attributes:
         silent_s: By the loop, of a servo.
         watchdog_s: By a servo, of the bus; then it stops by itself. 0.02 to 2.54 s.
+        read_s: By the checks before arming, for reading all servos once; None: a period of the loop.
     """
 
     silent_s: float = 0.050
     watchdog_s: float = 0.100
+    read_s: float | None = None
 
     def __post_init__(self) -> None:
         """Raises InputError for times that no loop or servo has."""
@@ -112,7 +114,7 @@ class ServoArm:
         faults = arming_faults(self.servos, self._chain)
         if faults:
             return faults
-        fault = bus_fault(self.measured, self._period_s)
+        fault = bus_fault(self.measured, self._patience.read_s or self._period_s)
         return () if fault is None else (fault,)
 
     def take_hold(self) -> tuple[Fault, ...]:
