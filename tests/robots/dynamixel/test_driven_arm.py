@@ -1,15 +1,17 @@
 """A driven arm, with all of its threads, on an emulated bus: it moves as told, and rests when something is wrong."""
 
+import select
 import time
 
 import numpy as np
 import pytest
 
+from paramove.bus import topics
 from paramove.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
-from paramove.robots.dynamixel.driven_arm import DrivenArm
+from paramove.robots.dynamixel.driven_arm import SLOW_NS, DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
@@ -111,6 +113,17 @@ def test_torque_that_was_on_at_the_start_does_not_make_it_jump(person):
     before = person.memory("Present Position")
     person.arms_and_waits()
     assert person.goals() == before
+
+
+def test_an_arm_that_is_not_heard_says_its_safety_no_oftener_than_the_topic_allows(person, emulator):
+    person.waits_for("DISARMED")
+    emulator.unplug()
+    person.waits_for("DISCONNECTED")
+    stamps = []
+    while len(stamps) < 6:
+        select.select([person.arm.readable], [], [], 0.1)
+        stamps += [now_ns for topic, _, now_ns in person.arm.said() if topic is topics.ARM_SAFETY]
+    assert min(np.diff(stamps)) >= SLOW_NS
 
 
 def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):

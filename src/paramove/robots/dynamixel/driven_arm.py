@@ -75,7 +75,7 @@ class DrivenArm:
         self._loop = ServoLoop(
             self._driver, description, servos, port, torque_off, patience, standing_faults, stop_file, self._wake
         )
-        self._slow_ns = self._motors_ns = 0
+        self._slow_ns = self._safety_ns = self._motors_ns = 0
         self._state: State | None = None
 
     def __enter__(self) -> Self:
@@ -127,11 +127,11 @@ class DrivenArm:
         states = [one.joint_states for one in says if one.joint_states is not None]
         yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
         yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in says for status in one.statuses)
-        slow = now_ns - self._slow_ns >= SLOW_NS
-        if says and (slow or self._driver.state is not self._state):
-            self._state = self._driver.state
+        due = now_ns - self._safety_ns >= SLOW_NS
+        if says and (due or self._driver.state is not self._state):
+            self._state, self._safety_ns = self._driver.state, now_ns
             yield topics.ARM_SAFETY, says[-1].safety, now_ns
-        if states and slow:
+        if states and now_ns - self._slow_ns >= SLOW_NS:
             self._slow_ns = now_ns
             yield topics.ARM_JOINT_STATES, states[-1], states[-1].timestamp.ToNanoseconds()
         if now_ns - self._motors_ns >= MOTORS_NS:
