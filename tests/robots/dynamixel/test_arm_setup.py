@@ -90,6 +90,8 @@ def test_a_calibrated_arm_has_its_own_zeros_and_keeps_to_the_travel_that_was_sho
 def test_a_robot_without_a_servo_bus_is_refused():
     with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
         servo_port(RobotDescription.load(FOLDER / "hoap3"), "/dev/null")
+    with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
+        ServoArmSetup(robot=FOLDER / "hoap3", port=Path("/dev/null")).driven_arm(Path("/"))
 
 
 @pytest.mark.parametrize("wrong", [{"silent_s": 0.0}, {"watchdog_s": 3.0}, {"watchdog_s": 0.001}])

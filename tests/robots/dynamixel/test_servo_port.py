@@ -53,7 +53,7 @@ def test_a_pulled_plug_is_told_and_leaves_nothing_busy(emulator, handler):
     port.open()
     assert handler.ping(port, 1)[1] == COMM_SUCCESS
     emulator.unplug()
-    with pytest.raises(PortLostError, match="cable"):
+    with pytest.raises(PortLostError, match=r"went away \([A-Z][a-z/ ]+\): is its cable plugged in"):
         handler.ping(port, 1)
     assert not port.is_using
     with pytest.raises(PortLostError, match="not open"):
@@ -81,5 +81,7 @@ def test_a_port_that_is_not_there_or_none_is_told_with_those_that_are(tmp_path, 
     assert missing.value.missing
     file = tmp_path / "file"
     file.touch()
-    with pytest.raises(InputError, match="cannot be opened as a serial port"):
+    with pytest.raises(InputError, match="file is no serial port but something else: name a link in"):
         ServoPort(str(file)).open()
+    with pytest.raises(InputError, match="is no serial port but something else"):
+        ServoPort(str(tmp_path)).open()

@@ -50,13 +50,13 @@ class ServoArmSetup(BaseModel):
             InputError: Its description or calibration is missing or wrong, or is another arm's.
         """
         description = RobotDescription.load(self.robot)
+        port = servo_port(description, str(run_folder / self.port))
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
             description = calibrated(description, calibration)
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
-        port = servo_port(description, str(run_folder / self.port))
         return DrivenArm(description, servos, port, self.torque_off, self.patience, faults, self.stop_file)
 
 

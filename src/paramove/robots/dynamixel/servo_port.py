@@ -151,7 +151,7 @@ class ServoPort:
             return work(self._serial)
         except (OSError, termios.error, TypeError) as error:  # pyserial has all of them for a port that went away
             self.close()
-            raise PortLostError(f"{self.name} went away: {error}. Is its cable plugged in?") from error
+            raise PortLostError(f"{self.name} went away ({_words(error)}): is its cable plugged in?") from error
 
 
 def _reason(name: str, error: serial.SerialException) -> str:
@@ -162,4 +162,11 @@ def _reason(name: str, error: serial.SerialException) -> str:
         return f"{name} may not be opened by this user: sudo usermod -aG dialout $USER, then log in again"
     if error.errno in (errno.EAGAIN, errno.EBUSY):
         return f"{name} is in use by another program: close it (lsof {name} names it)"
+    if error.errno == errno.EISDIR or "Could not configure port" in str(error):
+        return f"{name} is no serial port but something else: name a link in /dev/serial/by-id"
     return f"{name} cannot be opened as a serial port: {error}"
+
+
+def _words(error: Exception) -> str:
+    """Without the number; termios and the system give number and words as two arguments."""
+    return str(error.args[-1]) if error.args else type(error).__name__
