@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from pydantic import ValidationError
 
 from paramove.imitation.reach_task import ReachStep, ReachTask
@@ -53,6 +55,14 @@ def test_begins_where_the_arm_rests_and_not_before() -> None:
     rested = cell.angles
     cell.run()
     np.testing.assert_allclose(cell.sent[0].points[0].position_rad, rested, rtol=0, atol=1e-12)
+
+
+def test_another_arm_than_the_planned_one_ends_the_tasks_with_what_helps() -> None:
+    cell = ServoCell()
+    cell.task.on_joint_states(JointStates(joints=[JointState(name="elbow_flex", position=0.1)]))
+    cell.task.tick(1)
+    assert "the arm has no joint joint1, joint2, joint3, joint4, gripper" in cell.task.failure
+    assert "the same `robot` as the arm's driver" in cell.task.failure
 
 
 def test_a_joint_a_little_outside_its_range_is_taken_in() -> None:

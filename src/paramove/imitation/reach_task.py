@@ -187,6 +187,10 @@ class ReachTask:
         self._done = 0
 
     def _begin(self) -> None:
+        if self._joints.missing:
+            absent = ", ".join(self._joints.missing)
+            self._fail(f"the arm has no joint {absent}: give the reacher the same `robot` as the arm's driver")
+            return
         if not self._armed:
             return
         if self._at is None:

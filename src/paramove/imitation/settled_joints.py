@@ -22,15 +22,20 @@ class SettledJoints:
 
     Args:
         joints: Names, in the order that is wanted.
+
+    Attributes:
+        missing: Of these names, those that the newest message did not have.
     """
 
     def __init__(self, joints: Sequence[str]) -> None:
         self._joints = tuple(joints)
         self._heard: deque[tuple[int, FloatArray]] = deque()
+        self.missing: tuple[str, ...] = ()
 
     def hear(self, message: JointStates, now_ns: int) -> None:
         """Take in measured joints; a message in which one is missing, or no angle, counts for nothing."""
         measured = {joint.name: joint.position for joint in message.joints}
+        self.missing = tuple(name for name in self._joints if name not in measured)
         angles = np.array([measured.get(name, np.nan) for name in self._joints])
         if not (np.abs(angles) <= MOST).all():  # NaN is not below either
             return
