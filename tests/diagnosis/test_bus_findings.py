@@ -80,6 +80,12 @@ def test_every_servo_is_listed_with_what_it_tells(findings):
     assert sorted(listed) == [1, 2, 3, 4, 5]
 
 
+def test_rates_at_which_nobody_answered_are_not_told_as_found(tmp_path):
+    with DynamixelEmulator([EmulatedServo(XL430_W250, 1, FAST)], tmp_path / "usb"):
+        found = bus_findings(tmp_path / "usb", [57600, FAST], PATIENT_S)
+    assert found[0].sentence == f"usb: 1 servo found at {FAST} bit/s"
+
+
 def test_a_double_id_is_told(findings):
     (one,) = about(findings, "servo 1", Level.PROBLEM)
     assert one.sentence == "2 servos have the ID 1: they talk at once"

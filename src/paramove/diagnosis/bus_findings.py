@@ -101,7 +101,8 @@ def _overview(port: Path, scanned: Sequence[ScannedRate], servos: Sequence[Found
     if not servos:
         return Finding("bus", Level.WARNING, f"{port.name}: no servo answers at {asked} bit/s", NOBODY, facts=facts)
     plural = "s" * (len(servos) > 1)
-    return Finding("bus", Level.OK, f"{port.name}: {len(servos)} servo{plural} found at {asked} bit/s", facts=facts)
+    rates = " and ".join(map(str, sorted({servo.baud_rate for servo in servos})))
+    return Finding("bus", Level.OK, f"{port.name}: {len(servos)} servo{plural} found at {rates} bit/s", facts=facts)
 
 
 def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
