@@ -108,6 +108,7 @@ def test_scan_lists_the_servos(desk):
     assert done.exit_code == 0, done.output
     (adapter,) = json.loads(done.stdout)
     assert (adapter["serial"], adapter["findings"]) == (SERIAL, [])
+    assert adapter["link"] == str(desk.by_id / LINK)
     assert [row["id"] for row in adapter["servos"]] == [1, 2, 3, 4, 5, 6]
     assert adapter["servos"][1] == {
         "id": 2,
@@ -122,6 +123,7 @@ def test_scan_lists_the_servos(desk):
     }
     done = desk.arm("scan", "--baud", RATE)
     assert f"adapter {SERIAL} (/dev/" in done.stdout
+    assert f"port {desk.by_id / LINK}\n" in done.stdout
     assert "overloaded" in done.stdout
 
 

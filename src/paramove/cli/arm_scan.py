@@ -51,7 +51,8 @@ def scan(
         sentences = found.findings(configured_baud_rate(arm.path))
         count += len(found.servos)
         findings += sentences
-        told.append({"serial": adapter.serial, "device": adapter.device, "servos": _rows(found), "findings": sentences})
+        names = {"serial": adapter.serial, "link": str(adapter.link), "device": adapter.device}
+        told.append({**names, "servos": _rows(found), "findings": sentences})
         if not as_json:
             _tell(told[-1], [rate for rate in rates if rate not in found.impossible])
     if as_json:
@@ -64,6 +65,7 @@ def scan(
 
 def _tell(adapter: dict[str, Any], rates: list[int]) -> None:
     typer.echo(f"adapter {adapter['serial']} ({adapter['device']}), asked at {', '.join(map(str, rates))}")
+    typer.echo(f"port {adapter['link']}")
     show(adapter["servos"], as_json=False)
     for sentence in adapter["findings"]:
         typer.echo(sentence)
