@@ -142,13 +142,16 @@ def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState
     for ax, (across, up), title in zip(axes, ((1, 0), (0, 2)), ("from above", "from the side"), strict=True):
         ax.plot(gripper[:, across], gripper[:, up], color="0.6", linewidth=1, label="hand")
         for name, way in ways.items():
-            ax.plot(way[:, across], way[:, up], linewidth=2, color=name.split("_")[0], label=name.replace("_", " "))
+            colour = name.split("_")[0]
+            ax.plot(way[:, across], way[:, up], linewidth=2, color=colour, label=name.replace("_", " "))
+            ax.plot(way[-1, across], way[-1, up], "s", color=colour, markersize=5)  # what did not move has no way
         for one in results:
             ax.plot(one.wanted[across], one.wanted[up], "x", color="black", markersize=9)
         ax.set_xlabel(f"{'xyz'[across]}, m")
         ax.set_ylabel(f"{'xyz'[up]}, m")
         ax.set_title(title)
         ax.set_aspect("equal")
+        ax.locator_params(nbins=5)
     axes[0].invert_xaxis()  # y grows to the left
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
     figure.savefig(path, dpi=110)
