@@ -171,3 +171,10 @@ def test_a_tab_waits_for_no_heavy_library():
     loaded = set(answer.stderr.split())
     assert "--seed" in answer.stdout
     assert not loaded & {"numpy", "cv2", "mujoco", "zmq", "google.protobuf", "psutil", "ruamel.yaml"}
+
+
+def test_a_stop_of_the_arm_waits_for_no_heavy_library():
+    """All commands about the arm are imported before `estop` is done, and a person who stops an arm is in a hurry."""
+    code = "import sys, paramove.cli.arm; print(' '.join(sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert not set(loaded.stdout.split()) & {"numpy", "scipy", "cv2", "mujoco", "zmq"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +20,6 @@ from paramove.cli.arm_options import (
     explained,
     open_arm,
 )
-from paramove.cli.model_options import INTERRUPTED
 from paramove.cli.terminal_person import QuitError, TerminalPerson
 from paramove.supervision import exit_codes
 from paramove.supervision.processes import printable
@@ -79,7 +79,7 @@ def teach(
     except QuitError:
         raise typer.Exit(exit_codes.OK if teacher.written else exit_codes.FAILURE) from None
     except KeyboardInterrupt:
-        raise ended("interrupted", INTERRUPTED) from None
+        raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
 
 
 def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescription:
