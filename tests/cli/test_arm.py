@@ -297,6 +297,7 @@ def test_estop_without_a_run_names_the_real_one(desk, monkeypatch):
 @pytest.mark.parametrize(("answer", "code"), [(None, 69), (SafetyState.STATE_HOLD, 0)])
 def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(desk.data.parent))
+    monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
     fault = SafetyFault(code=PERSON_STOP, sentence="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
