@@ -54,7 +54,7 @@ def test_json_has_every_number(emulator, here):
 
 
 def test_the_folder_of_ports_may_come_from_the_environment(emulator, here, monkeypatch):
-    monkeypatch.setenv("PARAMOVE_BY_ID", str(here / "by-id"))
+    monkeypatch.setenv("PARAMOVE_SERIAL_BY_ID", str(here / "by-id"))
     assert "usb-adapter" in call("doctor", "--only", "serial").output
 
 

@@ -15,6 +15,7 @@ MODULES = [
     "sim.judge",
     "sim.pointing_simulator",
     "sim.arm_judge",
+    "sim.dynamixel_emulator",
 ]
 INTERFACES = {module.partition(".")[2]: read_interface(module, ROOT) for module in MODULES}
 

@@ -12,6 +12,7 @@ import typer
 
 from paramove.diagnosis.finding import Finding, Level, Machine, Part
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.serial_adapters import VARIABLE
 from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def doctor(
         typer.Option(
             "--by-id",
             metavar="FOLDER",
-            envvar="PARAMOVE_BY_ID",
+            envvar=VARIABLE,
             help="look at the serial ports alone to which links in it lead; default: those of all USB adapters",
         ),
     ] = None,

@@ -252,6 +252,15 @@ def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(e
     assert person.memory("Torque Enable") == [1, 0, 0, 0, 0]
 
 
+def test_servos_that_never_answer_are_named_with_the_remedy(emulator):
+    with emulator.lock:
+        emulator.bus.servos[1].powered = False
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), patience=PATIENCE) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.hears_until(lambda: "servo 12 (joint2)" in arm.trouble and "servo 11" not in arm.trouble)
+        assert "check the motors' power" in arm.trouble
+
+
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_loop_that_fails_is_told(person, monkeypatch):
     person.waits_for("DISARMED")

@@ -94,14 +94,14 @@ class DrivenArm:
 
     @property
     def trouble(self) -> str:
-        """What is wrong though the gate has no fault: a lost port, a low battery; "" if nothing is.
+        """What is wrong though the gate has no fault: a lost port, silent servos, low voltage; "" if nothing is.
 
         Raises:
             RuntimeError: The loop has failed; the servos rest by their own watchdog.
         """
         if self._loop.has_failed:
             raise RuntimeError("the arm's loop has failed, the lines above say why; its servos rest by their watchdog")
-        return self._loop.lost or "; ".join(self._loop.arm.warnings())
+        return self._loop.lost or self._loop.arm.unheard() or "; ".join(self._loop.arm.warnings())
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Hear a trajectory; the loop accepts or refuses it within a period."""

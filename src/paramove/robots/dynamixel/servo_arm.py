@@ -258,6 +258,16 @@ class ServoArm:
                 values = answers[servo.number].values
                 yield servo, self.health[servo.joint], [values[name] for name in names]
 
+    def unheard(self) -> str:
+        """Which servos have never answered, in words; "" if all have."""
+        silent = [servo for servo in self.servos if self.health[servo.joint].answers is None]
+        if not silent or not self._chain.counts.exchanges:
+            return ""
+        return (
+            f"no answer yet from {', '.join(map(str, silent))} at {self._chain.port.baud_rate} bit/s: check the motors' "
+            "power, cables, IDs and baud rate; `paramove arm scan` looks for them, once this driver has ended"
+        )
+
     def warnings(self) -> tuple[str, ...]:
         """What is not yet a fault, in words."""
         said = []

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from nodes import dynamixel_emulator
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.turns import Tick
 from paramove.input_error import InputError
+from sim import dynamixel_emulator
 
 ROBOTS = Path(__file__).parents[2] / "robot_description"
 PERIOD_NS = 66_666_667
