@@ -263,9 +263,10 @@ class ServoArm:
         silent = [servo for servo in self.servos if self.health[servo.joint].answers is None]
         if not silent or not self._chain.counts.exchanges:
             return ""
+        names, rate = ", ".join(map(str, silent)), self._chain.port.baud_rate
         return (
-            f"no answer yet from {', '.join(map(str, silent))} at {self._chain.port.baud_rate} bit/s: check the motors' "
-            "power, cables, IDs and baud rate; `paramove arm scan` looks for them, once this driver has ended"
+            f"no answer yet from {names} at {rate} bit/s: check the motors' power, cables, IDs and baud rate; "
+            "`paramove arm scan` looks for them, once this driver has ended"
         )
 
     def warnings(self) -> tuple[str, ...]:
