@@ -182,6 +182,10 @@ def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_some
     person.waits_for("HOLD")
     assert person.codes()[0] in (("torque_lost", "joint2"), ("joint_silent", "joint2"))
     assert person.memory("Torque Enable") == [1, 0, 1, 1, 1]
+    person.hears_until(lambda: person.emulator.bus.servos[1].listens)
+    person.arms()  # one word is enough
+    person.waits_for("ARMED")
+    assert person.memory("Torque Enable") == [1] * 5
 
 
 def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):

@@ -169,7 +169,7 @@ class ServoLoop:
         if reader is None or not self._arm.holds:
             reader = self._reader = StreamReader(self._description, reading.counts)
         fault = self._fault(reading)
-        if fault is not None and self._arm.holds:
+        if fault is not None and self.driver.state in MOVING:  # else it is looked for before arming
             self._tell(fault)
         if self.driver.wants_to_arm and self.driver.state not in MOVING:
             reading = self._prepare() or reading  # the checks took longer than a reading counts
