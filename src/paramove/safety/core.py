@@ -212,14 +212,14 @@ class SafetyCore:
     def _armed(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
         proposal = inputs.proposal
         fault = inputs.stop or self._report_fault(measured) or self._following.fault(measured)
-        if fault is None and proposal is not None:
-            fault = self._gate.fault(now_ns, proposal, measured, self._accepted)
         if fault is not None:
             return self._stop(now_ns, fault, proposal, measured)
         if proposal is None:
             return None
-        ramp = self._gate.ramp_after(proposal)
-        return self._accepted.accept(proposal.first_index, proposal.rows, ramp, measured)
+        judged = self._gate.judged(now_ns, proposal, measured, self._accepted)
+        if isinstance(judged, Fault):
+            return self._stop(now_ns, judged, proposal, measured)
+        return self._accepted.accept(proposal.first_index, proposal.rows, judged, measured)
 
     def _report_fault(self, measured: Measured) -> Fault | None:
         """A report that cannot be true."""

@@ -1,4 +1,4 @@
-"""What a proposal must keep to before its rows are let pass; the order is that of `ProposalGate.fault`."""
+"""What a proposal must keep to before its rows are let pass; the order is that of `ProposalGate.judged`."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ class ProposalGate:
         self._rate = RateWatch(settings.proposals_per_s)
         self._counted_ns: int | None = None
 
-    def fault(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | None:
-        """The first gate that refuses: form, age, rate, place, movement, the stop after it, clearance."""
-        return (
+    def judged(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | FloatArray:
+        """The first gate that refuses: form, age, rate, place, movement, the stop after it, clearance.
+
+        Returns:
+            Without a refusal, the stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest.
+        """
+        fault = (
             self._form(proposal)
             or self._time(now_ns, proposal)
             or self._place(proposal, accepted.allowed_from(measured))
-            or self._movement(proposal, accepted.before(proposal.first_index, measured))
         )
-
-    def ramp_after(self, proposal: Proposal) -> FloatArray:
-        """The stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest."""
-        return stop_ramp(proposal.rows[-1], proposal.ahead, self._limits) if len(proposal.ahead) else proposal.ahead
+        return fault or self._movement(proposal, accepted.before(proposal.first_index, measured))
 
     def _form(self, proposal: Proposal) -> Fault | None:
         names, n_joints = self._limits.names, len(self._limits.names)
@@ -72,19 +72,20 @@ class ProposalGate:
             return Fault("played", "", f"rows from index {index}, allowed from {first}: earlier ones are played")
         return Fault("gap", "", f"rows from index {index}, allowed up to {last}: no gap") if index > last else None
 
-    def _movement(self, proposal: Proposal, before: FloatArray) -> Fault | None:
+    def _movement(self, proposal: Proposal, before: FloatArray) -> Fault | FloatArray:
         # The rows ahead are judged too: the stop ramp will run over them.
         rows = np.concatenate([proposal.rows, proposal.ahead])
         violation = self._limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
         if violation is not None:
             return Fault(violation.code, violation.joint, violation.sentence)
-        ramp = self.ramp_after(proposal)
+        ahead = proposal.ahead
+        ramp = stop_ramp(proposal.rows[-1], ahead, self._limits) if len(ahead) else ahead
         if len(ramp):
             until = np.concatenate([before, proposal.rows])
             violation = self._limits.first_violation(ramp, until, stopping=True)
             if violation is not None:
                 return Fault(violation.code, violation.joint, f"in the stop after these rows: {violation.sentence}")
         if self._clearance is None:
-            return None
+            return ramp
         given = np.concatenate([proposal.rows, ramp])
-        return clearance_fault(self._clearance, before[-1], given, self._limits, len(proposal.rows))
+        return clearance_fault(self._clearance, before[-1], given, self._limits, len(proposal.rows)) or ramp

@@ -161,13 +161,10 @@ class ServoArm:
             What did not work, in words.
         """
         self.holds = False
-        return self._release(self.servos) if torque_off else self._watch_no_more()
+        return self._release(self.servos) if torque_off else self._write_each(self.servos, {"Bus Watchdog": 0})
 
     def _release(self, servos: Iterable[JointServo]) -> tuple[str, ...]:
         return self._write_each(servos, {"Torque Enable": 0, "Bus Watchdog": 0})
-
-    def _watch_no_more(self) -> tuple[str, ...]:
-        return self._write_each(self.servos, {"Bus Watchdog": 0})
 
     def _write_each(self, servos: Iterable[JointServo], values: dict[str, int]) -> tuple[str, ...]:
         failed = []
@@ -187,8 +184,7 @@ class ServoArm:
 
     def measured(self) -> ArmReading | None:
         """Where the joints are; None until all were heard once. One that does not answer keeps its last position."""
-        names = ("Realtime Tick", "Present Velocity", "Present Position")
-        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
+        answers = self._chain.sync_read(self._numbers, [self._registers["Present Position"]])
         for servo in self.servos:
             if servo.number in answers:
                 self.health[servo.joint].answers = answers[servo.number]
@@ -208,7 +204,7 @@ class ServoArm:
         )
 
     def fault_of_answers(self, reading: ArmReading) -> Fault | None:
-        """A joint that is silent for too long, has an alert, or a wire that loses too much."""
+        """A joint that is silent for too long, or a wire that damages too much."""
         late, allowed_s = int(np.argmax(reading.ages_s)), self._patience.silent_s
         if reading.ages_s[late] > allowed_s:
             servo = self.servos[late]
