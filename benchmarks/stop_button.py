@@ -2,9 +2,9 @@
 
 python benchmarks/stop_button.py [--presses 20]
 
-A robot that only plays its stream (tests/robots/hoap3/fake_robot.py) is moved by the real driver; at some moment of the
-movement the stop is sent through the page's socket. Measured on the wall clock, each time with new processes: until the
-gate says "stopping", and until the robot has the batch with the stop ramp.
+A robot that only plays its stream (tests/robots/streaming/fake_robot.py) is moved by the real driver; at some moment of
+the movement the stop is sent through the page's socket. Measured on the wall clock, each time with new processes: until
+the gate says "stopping", and until the robot has the batch with the stop ramp.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from paramove.bus.turns import Tick  # noqa: E402
 from paramove.dashboard.link_file import NAME, link_in  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
 from tests.dashboard.conftest import Visitor  # noqa: E402
-from tests.robots.hoap3.fake_robot import FakeRobot, trajectory  # noqa: E402
 from tests.robots.hoap3.movements import HOAP3  # noqa: E402
+from tests.robots.streaming.fake_robot import FakeRobot, trajectory  # noqa: E402
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0}
 HEARS = (topics.ARM_SAFETY, topics.WIRE_HOAP3_STREAM)

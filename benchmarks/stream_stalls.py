@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.stream import StreamReader, StreamWriter
+from paramove.robots.streaming.stream import StreamReader, StreamWriter
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s, stop_ramp
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.driver import ArmDriver
+from paramove.robots.streaming.driver import ArmDriver
 
 HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS, topics.WIRE_HOAP3_STATE)
 SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)

@@ -15,7 +15,7 @@ from paramove.bus.subscriber import Heard
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.firmware import Firmware
-from paramove.robots.hoap3.stream import StreamReader
+from paramove.robots.streaming.stream import StreamReader
 from sim import looks, scene
 from sim.camera import Eye, Image, Sensor
 from sim.instructor import Instructor

@@ -11,8 +11,8 @@ from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 from tests.imitation.reaching import ROBOT_FOLDER
-from tests.robots.hoap3.fake_robot import TICK_NS, FakeRobot, trajectory
 from tests.robots.hoap3.movements import HOAP3
+from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 
 CONFIG = arm_driver.Config(robot=ROBOT_FOLDER)
 

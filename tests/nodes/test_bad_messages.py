@@ -46,8 +46,8 @@ from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 from tests.imitation.servo_cell import ServoCell
 from tests.nodes.bad_messages import first_not_finite, variants
 from tests.nodes.test_reacher import ARM_FOLDER, TASKS
-from tests.robots.hoap3.fake_robot import FakeRobot, trajectory
 from tests.robots.hoap3.movements import HOAP3
+from tests.robots.streaming.fake_robot import FakeRobot, trajectory
 from tests.rules.pointing_story import PointingStory
 from tests.rules.story import Story
 from tests.vision.persons import performed, poses

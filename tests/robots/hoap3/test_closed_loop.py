@@ -8,11 +8,11 @@ import pytest
 
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.robots.hoap3.driver import DriverSays
 from paramove.robots.hoap3.firmware import Firmware
-from tests.robots.hoap3.fake_robot import FakeRobot, Rig
+from paramove.robots.streaming.driver import DriverSays
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.hoap3.test_firmware import MODEL, QPOS, QVEL
+from tests.robots.streaming.fake_robot import FakeRobot, Rig
 
 GOAL = {"right_shoulder_pitch": 30.0, "right_shoulder_roll": -30.0, "right_elbow": -60.0, "right_fingers": 20.0}
 

@@ -23,7 +23,7 @@ from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_loop import ServoLoop
 from paramove.robots.dynamixel.servo_port import ServoPort
-from paramove.robots.hoap3.driver import ArmDriver
+from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import Fault, SafetySettings, State
 from paramove.safety.self_collision import SelfCollision
 

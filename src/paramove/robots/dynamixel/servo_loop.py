@@ -20,8 +20,8 @@ from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
-from paramove.robots.hoap3.driver import ArmDriver, DriverSays
-from paramove.robots.hoap3.stream import StreamReader
+from paramove.robots.streaming.driver import ArmDriver, DriverSays
+from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import Fault, State
 
 _log = logging.getLogger(__name__)

@@ -1,4 +1,4 @@
-"""One trajectory while HOAP-3 plays it: which rows come next, whether the stream fares well, when it is done."""
+"""One trajectory while the robot plays it: which rows come next, whether the stream fares well, when it is done."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.robot_report import RobotReport
+from paramove.robots.streaming.robot_report import RobotReport
 from paramove.safety.gate_io import Fault
 
 FloatArray = NDArray[np.float64]

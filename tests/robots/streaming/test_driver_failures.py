@@ -8,11 +8,11 @@ import pytest
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
-from paramove.robots.hoap3.driver import ArmDriver
+from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import State
-from tests.robots.hoap3.fake_robot import Rig, trajectory
 from tests.robots.hoap3.movements import HOAP3
-from tests.robots.hoap3.test_driver import GOAL, armed, expect_within_limits
+from tests.robots.streaming.fake_robot import Rig, trajectory
+from tests.robots.streaming.test_driver import GOAL, armed, expect_within_limits
 
 NAN = float("nan")
 SUCCEEDED, STOPPED, REFUSED = (

@@ -9,12 +9,12 @@ import pytest
 
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
-from paramove.robots.hoap3.driver import SAFETY_STATES, ArmDriver
-from paramove.robots.hoap3.stream import StreamReader
+from paramove.robots.streaming.driver import SAFETY_STATES, ArmDriver
+from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import Fault, SafetySettings, State
-from tests.robots.hoap3.fake_robot import Rig, armed, trajectory
 from tests.robots.hoap3.movements import HOAP3
-from tests.robots.hoap3.test_driver import GOAL, expect_within_limits
+from tests.robots.streaming.fake_robot import Rig, armed, trajectory
+from tests.robots.streaming.test_driver import GOAL, expect_within_limits
 
 
 def in_motion() -> Rig:

@@ -1,4 +1,4 @@
-"""The arm driver's logic: accepted trajectories to batches for HOAP-3's stream, through the safety gate.
+"""The arm driver's logic: accepted trajectories to batches of the robot's stream, through the safety gate.
 
 One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it is heard (thesis 5.2.1:
 the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the newest
@@ -18,9 +18,9 @@ from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.execution import Execution
-from paramove.robots.hoap3.robot_report import RobotReport
-from paramove.robots.hoap3.stream import StreamWriter
+from paramove.robots.streaming.execution import Execution
+from paramove.robots.streaming.robot_report import RobotReport
+from paramove.robots.streaming.stream import StreamWriter
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
 from paramove.safety.limits import MotionLimits
@@ -58,7 +58,9 @@ class DriverSays:
 
 
 class ArmDriver:
-    """Drives all joints of a robot, such as HOAP-3. Hear messages with the `on_…` methods, then call `tick`.
+    """Drives all joints of a robot that plays a stream of rows: HOAP-3, or a servo arm by its loop.
+
+    Hear messages with the `on_…` methods, then call `tick`.
 
     Args:
         description: Of the robot.

@@ -1,4 +1,4 @@
-"""What HOAP-3 says of itself, in radians."""
+"""What the robot says of its stream and joints, in radians."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The wire to HOAP-3: batches of target frames at 1 kHz, each of which ends in its own stop ramp.
+"""The stream to a robot, at 1 kHz to HOAP-3: batches of target frames, each of which ends in its own stop ramp.
 
 The next batch replaces the ramp from an index that is not yet played. So nothing has to be decided when batches stop
 coming: the robot plays the ramp that it already has. `StreamReader` is the robot's side (the simulator uses it); it

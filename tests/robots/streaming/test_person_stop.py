@@ -8,7 +8,7 @@ import pytest
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.safety.gate_io import PERSON_STOP, State
-from tests.robots.hoap3.fake_robot import Rig, armed
+from tests.robots.streaming.fake_robot import Rig, armed
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0}
 PRESSED = StopRequest(source="page")

@@ -16,7 +16,7 @@ from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.safety.operator import Operator
-from tests.robots.hoap3.fake_robot import TICK_NS, FakeRobot, trajectory
+from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 
 WORKSPACE = Path(__file__).parents[3]
 

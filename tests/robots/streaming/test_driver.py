@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
-from paramove.robots.hoap3.driver import ArmDriver
+from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import State
-from tests.robots.hoap3.fake_robot import Rig, armed, trajectory
 from tests.robots.hoap3.movements import HOAP3
+from tests.robots.streaming.fake_robot import Rig, armed, trajectory
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0, "right_wrist": 30.0, "right_fingers": 20.0}
 ACCEPTED, EXECUTING, SUCCEEDED, STOPPED, REFUSED = range(1, 6)

@@ -7,8 +7,8 @@ import numpy as np
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest
-from paramove.robots.hoap3.driver import ArmDriver, DriverSays
-from paramove.robots.hoap3.stream import StreamReader
+from paramove.robots.streaming.driver import ArmDriver, DriverSays
+from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
 
