@@ -8,7 +8,7 @@ from pydantic import field_validator
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
-from paramove.safety.operator import REAL_ROBOT, Operator
+from paramove.operator.arming_at_start import REAL_ROBOT, Operator
 
 HEARS = (topics.ARM_SAFETY,)
 SAYS = (topics.OPERATOR_ARM,)

@@ -32,7 +32,7 @@ def words(tmp_path, monkeypatch):
             raise TopicTakenError("operator says operator/arm already")
         return ANSWERS[told["answer"]]
 
-    monkeypatch.setattr("paramove.safety.terminal_arming.arm_by_word", arm_by_word)
+    monkeypatch.setattr("paramove.operator.terminal_arming.arm_by_word", arm_by_word)
     return told
 
 

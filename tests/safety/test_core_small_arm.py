@@ -186,6 +186,17 @@ def test_no_report_for_half_a_second_is_silence_too() -> None:
     assert arm.step(measured=None)[2] == ("robot_silent",)
 
 
+def test_what_was_found_before_the_silence_stays_and_refusals_to_arm_do_not() -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    arm.step(stop=VOLTAGE)
+    assert arm.step(ms=501, measured=None)[1:] == (State.DISCONNECTED, (VOLTAGE.code, "robot_silent"))
+    assert arm.step()[1:] == (State.DISARMED, (VOLTAGE.code, "robot_silent"))
+    arm.arm(arming_faults=(MODEL,))
+    assert arm.core.faults == (MODEL,)
+    assert arm.step(ms=501, measured=None)[1:] == (State.DISCONNECTED, ("robot_silent",))
+
+
 def test_a_joint_that_is_held_is_given_way_to_in_motion() -> None:
     arm = SmallArm(SafetySettings(following=np.full(3, 0.1)))
     arm.in_motion()

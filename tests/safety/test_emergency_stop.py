@@ -132,5 +132,5 @@ def test_released_without_a_robot_it_is_disconnected() -> None:
     arm.arm()
     arm.step(emergency=True)
     assert arm.step(emergency=False, measured=None, ms=300)[1] is State.STOPPING
-    assert arm.step(measured=None, ms=300)[1:] == (State.DISCONNECTED, ("robot_silent",))
+    assert arm.step(measured=None, ms=300)[1:] == (State.DISCONNECTED, ("emergency_stop", "robot_silent"))
     assert arm.step()[1] is State.DISARMED

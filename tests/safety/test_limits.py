@@ -49,8 +49,8 @@ def test_what_is_not_finite_is_told_first_and_where(value: float) -> None:
     found = LIMITS.first_violation(rows, REST)
     assert found is not None
     assert (found.code, found.row, found.joint, found.allowed) == ("not_finite", 2, "shoulder", "a finite number")
-    assert found.unit == ""
-    assert found.sentence.startswith("joint shoulder is not a finite number at row 2: asked ")
+    allowed = "deg, allowed a finite number"
+    assert found.sentence == f"joint shoulder is not a finite number at row 2: asked {value} {allowed}"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -22,8 +22,8 @@ def estop(domain: DomainOption = None) -> None:
     from paramove.bus.endpoint import BusFolderError, TopicTakenError
     from paramove.bus.settings import default_folder
     from paramove.msgs.safety_state_pb2 import SafetyState
+    from paramove.operator.terminal_stop import stop_arm
     from paramove.safety.gate_io import PERSON_STOP
-    from paramove.safety.terminal_stop import stop_arm
 
     folder = default_folder(domain)
     if not folder.is_dir():

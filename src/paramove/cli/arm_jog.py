@@ -93,8 +93,8 @@ class _Link:
     def press(self, key: str) -> None:
         """Does what a key stands for."""
         from paramove.bus.visitor import say_now
-        from paramove.safety.terminal_arming import TERMINAL
-        from paramove.safety.terminal_stop import stop_arm
+        from paramove.operator.terminal_arming import TERMINAL
+        from paramove.operator.terminal_stop import stop_arm
 
         if key.isdecimal():
             self.jogging.choose(int(key) - 1)
@@ -140,7 +140,7 @@ class _Link:
         from paramove.bus.endpoint import TopicTakenError
         from paramove.bus.visitor import say_now
         from paramove.msgs.safety_state_pb2 import ArmRequest
-        from paramove.safety.terminal_arming import TERMINAL
+        from paramove.operator.terminal_arming import TERMINAL
 
         try:
             self._arms = self._arms or self._bus.says(self._topics.OPERATOR_ARM)

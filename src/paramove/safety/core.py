@@ -132,20 +132,22 @@ class SafetyCore:
         age_ms = abs(now_ns - self._measured_ns) * 1e-6
         if age_ms > self.settings.measured_timeout_ms:
             if self.state is not State.DISCONNECTED:
-                allowed = f"{self.settings.measured_timeout_ms:.0f} ms"
-                sentence = (
-                    f"the robot was last heard {age_ms:.0f} ms ago, allowed {allowed}; it comes to rest by itself; "
-                    "arm again once it is back"
-                )
-                self._disconnect(Fault("robot_silent", "", sentence))
+                self._disconnect(age_ms)
             return False
         if self.state is State.DISCONNECTED and measured is not None:
             self.state = State.DISARMED
         return True
 
-    def _disconnect(self, fault: Fault) -> None:
+    def _disconnect(self, age_ms: float) -> None:
+        """What was latched stays: a fault that was found first, such as a lost port, is why the robot is silent."""
+        if self.state is State.DISARMED:
+            self.faults = ()
+        sentence = (
+            f"the robot was last heard {age_ms:.0f} ms ago, allowed {self.settings.measured_timeout_ms:.0f} ms; it "
+            "comes to rest by itself; arm again once it is back"
+        )
+        self._add(Fault("robot_silent", "", sentence))
         self.state = State.DISCONNECTED
-        self.faults = (fault,)
         self._disarm_after_stop = False
         self._accepted.clear()
 
@@ -163,36 +165,31 @@ class SafetyCore:
             else:
                 self.state = State.DISARMED
         elif self.state in (State.DISARMED, State.HOLD):
-            refusals = (*self._age_fault(now_ns, word), *inputs.arming_faults, *self.arming_faults(word, measured))
+            self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, word, measured))
             if too_often:
-                allowed = f"{self._words.allowed} within 250 ms"
-                refusals = (*refusals, Fault("arming_rate", "", f"more arm words than allowed: {allowed}; wait"))
-            self.faults = refusals
-            if not refusals:
+                sentence = f"more arm words than allowed: {self._words.allowed} within 250 ms; wait"
+                self._add(Fault("arming_rate", "", sentence))
+            if not self.faults:
                 self.state = State.ARMED
                 self._accepted.clear()
                 self._played = max(0, measured.next_index)
         return None
 
-    def _age_fault(self, now_ns: int, word: ArmWord) -> tuple[Fault, ...]:
-        """A word to arm counts only while the person who said it still looks; one to disarm always counts."""
-        age_ms, allowed_ms = (now_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
-        if abs(age_ms) <= allowed_ms:
-            return ()
-        sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
-        return (Fault("arming_stale", "", sentence),)
-
-    def arming_faults(self, word: ArmWord, measured: Measured) -> tuple[Fault, ...]:
+    def _arming_faults(self, now_ns: int, word: ArmWord, measured: Measured) -> list[Fault]:
         """Every check that fails; none means that the gate may be armed."""
         faults = []
+        # A word to arm counts only while the person who said it still looks; one to disarm always counts.
+        age_ms, allowed_ms = (now_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
+        if abs(age_ms) > allowed_ms:
+            sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
+            faults.append(Fault("arming_stale", "", sentence))
         if not word.source:
             faults.append(Fault("arming_source", "", "the arm word names no source; say who arms"))
         if not measured.at_rest:
             faults.append(Fault("arming_moving", "", "the robot is moving; arm it at rest"))
         lower, upper = self._mechanical
         tolerance = self.settings.pose_tolerance
-        pairs = (("measured", measured.positions), ("commanded", measured.commanded))
-        for what, pose in pairs:
+        for what, pose in (("measured", measured.positions), ("commanded", measured.commanded)):
             if pose.shape != lower.shape or not np.isfinite(pose).all():
                 faults.append(Fault("arming_pose_unknown", "", f"the {what} pose is not known: {pose}"))
                 continue
@@ -207,7 +204,7 @@ class SafetyCore:
             if away:
                 sentence = f"{', '.join(away)} not where commanded; see what holds them or command where they are"
                 faults.append(Fault("arming_following", away[0], sentence))
-        return tuple(faults)
+        return faults
 
     def _armed(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
         proposal = inputs.proposal

@@ -117,7 +117,7 @@ class MotionLimits:
             stopping: Judge by what a controlled stop may use, with rest at the end.
         """
         for known in (before, rows):
-            found = self._first("not_finite", ~np.isfinite(known), known, "a finite number", 1.0, "")
+            found = self._first("not_finite", ~np.isfinite(known), known)
             if found is not None:
                 return found
         history = self.history
@@ -127,8 +127,7 @@ class MotionLimits:
         whole = np.concatenate(parts)
         excess = np.maximum(np.maximum(self.lower - whole, whole - self.upper), 0.0)[history - 1 :]
         outward = (excess[1:] > 1e-9) & ~(excess[1:] <= excess[:-1])
-        values = whole[history:]
-        found = self._first("joint_limit", outward, values, "{low:.4g} to {high:.4g} deg", 180 / np.pi, "deg")
+        found = self._first("joint_limit", outward, whole[history:])
         return found or self._first_too_fast(whole, excess[:-1] > 1e-9, stopping)
 
     def _first_too_fast(self, whole: FloatArray, outside: NDArray[np.bool_], stopping: bool) -> Violation | None:
@@ -152,11 +151,8 @@ class MotionLimits:
             ("acceleration", bends, SLACK * acceleration, "deg/s²"),
             ("jerk", jerks, jerk, "deg/s³"),
         ):
-            values, limits = np.abs(found), np.broadcast_to(limit, found.shape)
             # Written so that a NaN would be a violation too.
-            violation = self._first(
-                code, ~(values <= limits), values, f"{{limit:.4g}} {unit}", 180 / np.pi, unit, limits
-            )
+            violation = self._first(code, ~(np.abs(found) <= limit), np.abs(found), unit, limit)
             if violation is not None:
                 return violation
         return None
@@ -166,17 +162,13 @@ class MotionLimits:
         code: str,
         bad: NDArray[np.bool_],
         values: FloatArray,
-        allowed: str,
-        scale: float,
-        unit: str,
-        limit: FloatArray | None = None,
+        unit: str = "deg",
+        limit: FloatArray | float = np.nan,
     ) -> Violation | None:
         if not bad.any():
             return None
         row, joint = (int(i) for i in np.argwhere(bad)[0])
-        text = allowed.format(
-            low=scale * self.lower[joint],
-            high=scale * self.upper[joint],
-            limit=scale * limit[row, joint] if limit is not None else np.nan,
-        )
-        return Violation(code, row, self.names[joint], float(scale * values[row, joint]), text, unit)
+        most = np.broadcast_to(limit, bad.shape)[row, joint]
+        low, high, most, asked = np.rad2deg([self.lower[joint], self.upper[joint], most, values[row, joint]])
+        texts = {"not_finite": "a finite number", "joint_limit": f"{low:.4g} to {high:.4g} deg"}
+        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{most:.4g} {unit}"), unit)

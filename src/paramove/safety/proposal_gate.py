@@ -34,19 +34,15 @@ class ProposalGate:
         Returns:
             Without a refusal, the stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest.
         """
-        fault = (
-            self._form(proposal)
-            or self._time(now_ns, proposal)
-            or self._place(proposal, accepted.allowed_from(measured))
-        )
+        fault = self._form(proposal) or self._time(now_ns, proposal)
+        fault = fault or self._place(proposal, accepted.allowed_from(measured))
         return fault or self._movement(proposal, accepted.before(proposal.first_index, measured))
 
     def _form(self, proposal: Proposal) -> Fault | None:
         names, n_joints = self._limits.names, len(self._limits.names)
         if proposal.joint_names != names:
-            return Fault(
-                "names", "", f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
-            )
+            sentence = f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
+            return Fault("names", "", sentence)
         for rows in (proposal.rows, proposal.ahead):
             if rows.ndim != 2 or rows.shape[1] != n_joints or len(rows) > MAX_ROWS:
                 return Fault("length", "", f"rows have shape {rows.shape}, allowed [up to {MAX_ROWS}, {n_joints}]")
@@ -78,8 +74,9 @@ class ProposalGate:
         violation = self._limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
         if violation is not None:
             return Fault(violation.code, violation.joint, violation.sentence)
-        ahead = proposal.ahead
-        ramp = stop_ramp(proposal.rows[-1], ahead, self._limits) if len(ahead) else ahead
+        ramp = proposal.ahead
+        if len(ramp):
+            ramp = stop_ramp(proposal.rows[-1], ramp, self._limits)
         if len(ramp):
             until = np.concatenate([before, proposal.rows])
             violation = self._limits.first_violation(ramp, until, stopping=True)

@@ -15,7 +15,7 @@ from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.safety.operator import Operator
+from paramove.operator.arming_at_start import Operator
 from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 
 WORKSPACE = Path(__file__).parents[3]

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from nodes.operator import Config
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.safety.operator import Operator
+from paramove.operator.arming_at_start import Operator
 
 SECOND = 1_000_000_000
 

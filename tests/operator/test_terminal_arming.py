@@ -14,7 +14,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.settings import BusSettings
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.safety.terminal_arming import arm_by_word
+from paramove.operator.terminal_arming import arm_by_word
 
 FAULT = SafetyFault(code="not_calibrated", sentence="this one is not calibrated")
 OTHER = SafetyFault(code="person_stop", sentence="stopped from the page by a person")

@@ -14,8 +14,8 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.settings import BusSettings
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
+from paramove.operator.terminal_stop import stop_arm
 from paramove.safety.gate_io import PERSON_STOP
-from paramove.safety.terminal_stop import stop_arm
 
 
 @pytest.fixture
