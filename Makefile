@@ -8,7 +8,7 @@ BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
 
-.PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds mutation bare clean
+.PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds coverage mutation bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -41,6 +41,10 @@ format: setup ## puts the code into its standard form
 
 benchmark-seeds: setup ## the demo with many worlds: make benchmark-seeds SEEDS=0-29
 	@$(BIN)/paramove evaluate rule_learning --seeds $(SEEDS) $(ARGS)
+
+coverage: setup ## is every line and branch of the safety gate tested? ends with 1 if not
+	@$(BIN)/python -m coverage run -m pytest -q --durations=0 --durations-min=60 tests/safety $(ARGS)
+	@$(BIN)/python -m coverage report
 
 mutation: setup ## changes the safety gate in thousands of ways: do the tests notice? (build/mutation, an hour)
 	rm -rf build/mutation && mkdir -p build/mutation

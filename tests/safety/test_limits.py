@@ -118,8 +118,7 @@ def test_what_was_found_and_the_limit_with_its_slack_are_told(kind: str, order: 
     found = only(**{kind: 2.0}).first_violation(rows, np.zeros((3, 3)))
     assert found is not None
     assert (found.code, found.allowed) == (kind, allowed)
-    first = rows[found.row :: -1, 0].copy()
-    first.resize(4)  # the rows before are zero
+    first = np.concatenate([rows[found.row :: -1, 0], np.zeros(3)])[:4]  # the rows before are zero
     value = [first @ [1, -1, 0, 0], first @ [1, -2, 1, 0], first @ [1, -3, 3, -1]][order - 1] / 0.01**order
     np.testing.assert_allclose(found.asked, np.rad2deg(value), rtol=1e-9)
 
