@@ -1,5 +1,6 @@
 """To the unmodified dynamixel-sdk the emulated port is a bus of servos, in all that its sample programs do."""
 
+import fcntl
 import time
 
 import pytest
@@ -17,13 +18,14 @@ from dynamixel_sdk import (
 
 from paramove.robots.dynamixel import emulated_servo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulator import TCGETS2, TERMIOS2, DynamixelEmulator
 from paramove.robots.dynamixel.packets import StatusError
-from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250, XM430_W350
+from paramove.robots.dynamixel.servo_models import BAUD_RATES, XL330_M288, XL430_W250, XM430_W350
 
 TORQUE, LED, GOAL, PRESENT, MODE, WATCHDOG, ERROR_STATUS = 64, 65, 116, 132, 11, 98, 70
 ID, BAUD, LEVEL, PROFILE_VELOCITY, REGISTERED, MOVING = 7, 8, 68, 112, 69, 122
 INDIRECT_ADDRESS, INDIRECT_DATA = 168, 224
+TCSETS2, RATE_BITS, RATE_IS_A_NUMBER = 0x402C542B, 0o10017, 0o10000  # asm-generic: CBAUD, BOTHER
 
 
 class Client:
@@ -227,6 +229,19 @@ def test_a_servo_at_another_baud_rate_hears_nothing(client):
     client.port.setBaudRate(1_000_000)
     assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
     assert client.handler.ping(client.port, 2)[1] == COMM_RX_TIMEOUT
+
+
+@pytest.mark.parametrize("baud_rate", [57_600, 1_000_000])
+def test_a_rate_that_is_set_as_a_number_and_not_by_its_name_is_the_same_rate(client, baud_rate):
+    """As programs in Rust do, and those that want a rate without a name."""
+    client.servo(1).memory["Baud Rate"] = BAUD_RATES.index(baud_rate)
+    settings = bytearray(fcntl.ioctl(client.port.ser.fileno(), TCGETS2, bytes(TERMIOS2.size)))
+    modes = list(TERMIOS2.unpack(settings))
+    modes[2] = modes[2] & ~RATE_BITS | RATE_IS_A_NUMBER
+    modes[-2:] = [baud_rate, baud_rate]
+    fcntl.ioctl(client.port.ser.fileno(), TCSETS2, TERMIOS2.pack(*modes))
+    assert client.emulator.baud_rate == baud_rate
+    assert client.handler.ping(client.port, 1) == (XL430_W250.number, COMM_SUCCESS, 0)
 
 
 def test_status_return_level(client):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import select
-import termios
+import struct
 import threading
 import time
 import tty
@@ -23,7 +24,11 @@ BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
 IDLE_S = 0.005
 MOST_BYTES = 4096
-BAUD_CODES = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[:1] == "B" and name[1:].isdigit()}
+TCGETS2 = 0x802C542A
+"""Settings of a line with its rates as numbers (Linux, asm-generic/ioctls.h). Python's `termios` reads only rates that
+have a name; pyserial sets those, programs in Rust set numbers."""
+TERMIOS2 = struct.Struct("4I B 19s 2I")
+"""Input, output, control and local modes, line discipline, control characters, input and output speed."""
 
 
 class DynamixelEmulator:
@@ -109,8 +114,9 @@ class DynamixelEmulator:
 
     @property
     def baud_rate(self) -> int:
-        """To which the client has set the line, bit/s; 0 for one that the system has no name for."""
-        return BAUD_CODES.get(termios.tcgetattr(self._theirs)[5], 0)
+        """To which the client has set the line, bit/s."""
+        speed: int = TERMIOS2.unpack(fcntl.ioctl(self._theirs, TCGETS2, bytes(TERMIOS2.size)))[-1]
+        return speed
 
     def _now_s(self) -> float:
         return time.monotonic() - self._began_s
