@@ -1,0 +1,96 @@
+"""Programs that others wrote, unchanged, at the emulated servos: do they find what they would find on a real bus?
+
+    python benchmarks/foreign_clients [--link /tmp/paramove_servos]
+
+Installs them into build/foreign_clients (once), starts three emulated servos in a process of their own for each, and
+prints what each has done. They wait 34 ms or so for an answer and do not ask again, which on a busy machine is too
+little, so each has three tries. The exit code is 1 if one was never satisfied.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+HERE = Path(__file__).parent
+ENVIRONMENT = HERE.parents[1] / "build" / "foreign_clients"
+PYTHON = ENVIRONMENT / "bin" / "python"
+ALONE = ("lerobot==0.4.4",)  # installed without what it asks for: a deep learning framework
+PACKAGES = (
+    "rustypot==1.13.1",
+    "pypot==5.0.2",
+    "dynamixel_api==1.0.3",
+    "dynamixel-sdk==4.1.0",
+    "numpy<2",
+    "deepdiff",
+    "tqdm",
+)
+CLIENTS = {
+    "rustypot 1.13.1": "with_rustypot.py",
+    "LeRobot 0.4.4": "with_lerobot.py",
+    "pypot 5.0.2": "with_pypot.py",
+    "dynamixel_api 1.0.3": "with_dynamixel_api.py",
+}
+TIMEOUT_S = 60.0
+TRIES = 3
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--link", type=Path, default=Path("/tmp/paramove_servos"), help="name of the emulated port")
+    link: Path = parser.parse_args().link
+    console = Console()
+    install(console)
+    table = Table("program", "what it has done", "satisfied", "tries")
+    satisfied = True
+    for name, script in CLIENTS.items():
+        with console.status(name):
+            done, said, n_tries = False, "", 0
+            while not done and n_tries < TRIES:
+                done, said = tried(script, link)
+                n_tries += 1
+        table.add_row(name, said, "yes" if done else "[red]no[/]", str(n_tries))
+        satisfied &= done
+    console.print(table)
+    return 0 if satisfied else 1
+
+
+def install(console: Console) -> None:
+    stamp = ENVIRONMENT / "installed"
+    wanted = " ".join((*PACKAGES, *ALONE))
+    if stamp.exists() and stamp.read_text() == wanted:
+        return
+    with console.status("installs other people's programs into build/foreign_clients"):
+        venv.create(ENVIRONMENT, with_pip=True)
+        for packages in (PACKAGES, ("--no-deps", *ALONE)):
+            subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", *packages], check=True)
+    stamp.write_text(wanted)
+
+
+def tried(script: str, link: Path) -> tuple[bool, str]:
+    """Whether a client is satisfied with fresh servos, and its last line."""
+    servos = subprocess.Popen([sys.executable, HERE / "servos.py", link], stdout=subprocess.PIPE, text=True)
+    try:
+        assert servos.stdout is not None
+        servos.stdout.readline()
+        ran = subprocess.run(
+            [PYTHON, HERE / script, link], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return False, f"was not ready after {TIMEOUT_S:g} s"
+    finally:
+        servos.send_signal(signal.SIGTERM)
+        servos.wait()
+    said = ran.stdout if ran.returncode == 0 else ran.stderr
+    return ran.returncode == 0, (said.strip() or "nothing").splitlines()[-1]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,16 @@
+"""Three emulated servos at 1 Mbit/s behind a pseudo-terminal, until this program is told to end."""
+
+import signal
+import sys
+from pathlib import Path
+
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
+
+chain = [EmulatedServo(model, 1 + i, 1_000_000) for i, model in enumerate((XL430_W250, XL330_M288, XL330_M288))]
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+with DynamixelEmulator(chain, Path(sys.argv[1])) as emulator:
+    sys.stdout.write(f"{emulator.port}\n")
+    sys.stdout.flush()
+    signal.sigwait({signal.SIGTERM})
