@@ -40,6 +40,7 @@ from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.safety.gate_io import State
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -134,7 +135,7 @@ def rig(description: RobotDescription, folder: Path, patience: Patience = BUSY) 
         link = Path(place) / "usb-emulated_0001-if00-port0"
         emulation = Emulation(folder, description.bus.baud_rate, link)
         port = servo_port(description, str(link))
-        with DrivenArm(description, joint_servos(description), port, patience=patience) as arm:
+        with DrivenArm(description, joint_servos(description), port, LoopSettings(patience=patience)) as arm:
             yield Rig(arm, emulation, description)
         emulation.end()
 
@@ -215,7 +216,8 @@ def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[
 
 def drive(description: RobotDescription, port: str) -> None:
     """What is killed: moves the arm, and says so."""
-    with DrivenArm(description, joint_servos(description), servo_port(description, port), patience=BUSY) as arm:
+    settings = LoopSettings(patience=BUSY)
+    with DrivenArm(description, joint_servos(description), servo_port(description, port), settings) as arm:
         wait(lambda: arm._loop.driver.state is State.DISARMED)
         arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
         wait(lambda: arm._loop.driver.state is State.ARMED)

@@ -7,16 +7,17 @@ from paramove.robots.dynamixel.arm_setup import joint_servos
 from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_loop import LoopSettings
 from tests.robots.dynamixel.person import Person
 
-PATIENCE = Patience(silent_s=1.0, watchdog_s=2.0, read_s=1.0)
+SETTINGS = LoopSettings(torque_off=True, patience=Patience(silent_s=1.0, watchdog_s=2.0, read_s=1.0))
 A_LITTLE = np.deg2rad(3.0)
 
 
 @pytest.fixture
 def arm(robot, port):
     with port:
-        yield ServoArm(joint_servos(robot), ServoChain(port), 1e-6 * robot.stream.period_us, PATIENCE)
+        yield ServoArm(joint_servos(robot), ServoChain(port), 1e-6 * robot.stream.period_us, SETTINGS.patience)
 
 
 def test_every_servo_of_the_description_answers_as_the_model_that_it_is(robot, port):
@@ -48,7 +49,7 @@ def test_it_holds_without_a_jump(arm):
 def test_it_moves_its_last_joint_a_little_and_back(robot, port):
     place = robot.chain.indices[-1]
     joint = robot.joint_names[place]
-    with DrivenArm(robot, joint_servos(robot), port, torque_off=True, patience=PATIENCE) as driven:
+    with DrivenArm(robot, joint_servos(robot), port, SETTINGS) as driven:
         person = Person(driven)
         person.hears_until(lambda: person.angles)
         person.arms_and_waits()

@@ -2,6 +2,7 @@
 
 import select
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,12 +17,13 @@ from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.robots.dynamixel.servo_models import XL430_W250
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 
-PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0)
+SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
@@ -70,7 +72,7 @@ def port(emulator, latency_s: float = LATENCY_S):
 @pytest.fixture
 def person(emulator):
     closed = port(emulator)
-    with DrivenArm(ROBOT, joint_servos(ROBOT), closed, patience=PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), closed, SETTINGS) as arm:
         yield PersonAtEmulator(arm, emulator, closed)
 
 
@@ -144,7 +146,7 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
 
 def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulator, tmp_path):
     button = tmp_path / "estop"
-    arm = DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), patience=PATIENCE, stop_file=button)
+    arm = DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, stop_file=button))
     with arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
@@ -221,9 +223,8 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
     with DynamixelEmulator(emulator.bus.servos, link) as linked:
         port = servo_port(ROBOT, str(link))
         port.latency_s = LATENCY_S
-        with DrivenArm(
-            ROBOT, joint_servos(ROBOT), port, patience=Patience(silent_s=0.5, watchdog_s=2.54, read_s=1.0)
-        ) as arm:
+        settings = LoopSettings(patience=Patience(silent_s=0.5, watchdog_s=2.54, read_s=1.0))
+        with DrivenArm(ROBOT, joint_servos(ROBOT), port, settings) as arm:
             person = PersonAtEmulator(arm, linked)
             person.arms_and_waits()
             person.moves()
@@ -239,7 +240,7 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
 
 @pytest.mark.parametrize(("torque_off", "torque"), [(False, [1] * 5), (True, [0] * 5)])
 def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque):
-    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), torque_off, PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, torque_off=torque_off)) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
         person.moves()
@@ -248,7 +249,7 @@ def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque
 
 
 def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(emulator):
-    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), True, PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), replace(SETTINGS, torque_off=True)) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
         with emulator.lock:
@@ -259,7 +260,7 @@ def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(e
 def test_servos_that_never_answer_are_named_with_the_remedy(emulator):
     with emulator.lock:
         emulator.bus.servos[1].powered = False
-    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), patience=PATIENCE) as arm:
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), SETTINGS) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.hears_until(lambda: "servo 12 (joint2)" in arm.trouble and "servo 11" not in arm.trouble)
         assert "check the motors' power" in arm.trouble
@@ -274,6 +275,6 @@ def test_a_loop_that_fails_is_told(person, monkeypatch):
 
 
 def test_a_missing_port_is_told_with_the_remedy():
-    arm = DrivenArm(ROBOT, joint_servos(ROBOT), servo_port(ROBOT, "/dev/ttyUSB77"))
+    arm = DrivenArm(ROBOT, joint_servos(ROBOT), servo_port(ROBOT, "/dev/ttyUSB77"), SETTINGS)
     with pytest.raises(InputError, match=r"no serial port /dev/ttyUSB77, found are: .*`paramove arm scan`"), arm:
         pass

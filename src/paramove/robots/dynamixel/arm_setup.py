@@ -14,6 +14,7 @@ from paramove.robots.dynamixel.driven_arm import DrivenArm
 from paramove.robots.dynamixel.serial_adapters import serial_of
 from paramove.robots.dynamixel.servo_arm import Patience
 from paramove.robots.dynamixel.servo_checks import JointServo
+from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.safety.gate_io import Fault
@@ -57,7 +58,8 @@ class ServoArmSetup(BaseModel):
             description = calibrated(description, calibration)
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
-        return DrivenArm(description, servos, port, self.torque_off, self.patience, faults, self.stop_file)
+        settings = LoopSettings(self.torque_off, self.patience, faults, self.stop_file)
+        return DrivenArm(description, servos, port, settings)
 
 
 def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:

@@ -6,7 +6,6 @@ import contextlib
 import os
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -19,12 +18,12 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.servo_arm import ServoArm
 from paramove.robots.dynamixel.servo_checks import JointServo
-from paramove.robots.dynamixel.servo_loop import ServoLoop
+from paramove.robots.dynamixel.servo_loop import LoopSettings, ServoLoop
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.streaming.driver import ArmDriver
-from paramove.safety.gate_io import Fault, SafetySettings, State
+from paramove.safety.gate_io import SafetySettings, State
 from paramove.safety.self_collision import SelfCollision
 
 FOLLOWING = float(np.deg2rad(10.0))
@@ -40,10 +39,7 @@ class DrivenArm:
         description: Of an arm with servos; its units are those of this very arm.
         servos: In the order of its joints.
         port: Of its bus, closed.
-        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
-        patience: With silence.
-        standing_faults: That keep the arm from being armed, whatever its servos say.
-        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
+        settings: How it is driven.
 
     Raises:
         InputError: On entering: the port is missing, forbidden or in use.
@@ -53,28 +49,18 @@ class DrivenArm:
     """
 
     def __init__(
-        self,
-        description: RobotDescription,
-        servos: tuple[JointServo, ...],
-        port: ServoPort,
-        torque_off: bool = False,
-        patience: Patience | None = None,
-        standing_faults: tuple[Fault, ...] = (),
-        stop_file: Path | None = None,
+        self, description: RobotDescription, servos: tuple[JointServo, ...], port: ServoPort, settings: LoopSettings
     ) -> None:
-        patience = patience or Patience()
         following = np.full(description.n_joints, FOLLOWING)
         following[list(description.gripper_indices)] = np.inf
-        settings = SafetySettings(
-            measured_timeout_ms=1e3 * patience.silent_s,
+        safety = SafetySettings(
+            measured_timeout_ms=1e3 * settings.patience.silent_s,
             following=following,
-            emergency_timeout_ms=None if stop_file is None else EMERGENCY_MS,
+            emergency_timeout_ms=None if settings.stop_file is None else EMERGENCY_MS,
         )
-        self._driver = ArmDriver(description, settings, self_collision(description))
+        self._driver = ArmDriver(description, safety, self_collision(description))
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
-        self._loop = ServoLoop(
-            self._driver, description, servos, port, torque_off, patience, standing_faults, stop_file, self._wake
-        )
+        self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
         self._state: State | None = None
 

@@ -10,6 +10,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -34,6 +35,23 @@ TICK_S = 0.02
 """The driver's logic is asked so often; at once where something is wrong."""
 
 
+@dataclass(frozen=True)
+class LoopSettings:
+    """How a servo arm is driven.
+
+    Attributes:
+        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
+        patience: With silence.
+        standing_faults: That keep the arm from being armed, whatever its servos say.
+        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
+    """
+
+    torque_off: bool = False
+    patience: Patience = field(default_factory=Patience)
+    standing_faults: tuple[Fault, ...] = ()
+    stop_file: Path | None = None
+
+
 class ServoLoop:
     """An arm that is driven while this is a context.
 
@@ -42,10 +60,7 @@ class ServoLoop:
         description: Of the arm.
         servos: Its servos, in the order of the robot's joint vector.
         port: Closed; it is opened here, and again after it was lost.
-        torque_off: Whether the arm goes limp when it is disarmed and when the loop ends; by default it holds.
-        patience: With silence.
-        standing_faults: That keep the arm from being armed, whatever its servos say.
-        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
+        settings: How it is driven.
         said: Called in the loop's thread when `take` has something.
 
     Raises:
@@ -58,11 +73,8 @@ class ServoLoop:
         description: RobotDescription,
         servos: tuple[JointServo, ...],
         port: ServoPort,
-        torque_off: bool = False,
-        patience: Patience | None = None,
-        standing_faults: tuple[Fault, ...] = (),
-        stop_file: Path | None = None,
-        said: Callable[[], None] = lambda: None,
+        settings: LoopSettings,
+        said: Callable[[], None],
     ) -> None:
         self.driver = driver
         self.lost = ""
@@ -73,12 +85,9 @@ class ServoLoop:
         self._period_s = 1e-6 * description.stream.period_us
         self._port = port
         self._servos = servos
-        self._torque_off = torque_off
-        self._patience = patience
-        self._standing_faults = standing_faults
-        self._stop_file = stop_file
+        self._settings = settings
         self._said = said
-        self._arm = ServoArm(servos, ServoChain(port), self._period_s, patience)
+        self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.patience)
         self._reader: StreamReader | None = None
         self._says: list[DriverSays] = []
         self._step = 0
@@ -153,9 +162,9 @@ class ServoLoop:
         self._step += 1
 
     def _look_at_emergency_stop(self) -> None:
-        if self._stop_file is None:
+        if self._settings.stop_file is None:
             return
-        pressed = self._stop_file.exists()
+        pressed = self._settings.stop_file.exists()
         self.driver.on_emergency(pressed)
         self._urgent |= pressed and self.driver.state is not State.ESTOP
 
@@ -181,7 +190,7 @@ class ServoLoop:
 
     def _prepare(self) -> ArmReading | None:
         """Check the servos and let them hold where they are, before the gate hears the word to arm."""
-        self.driver.on_arming_checks(self._standing_faults or self._arm.check() or self._arm.take_hold())
+        self.driver.on_arming_checks(self._settings.standing_faults or self._arm.check() or self._arm.take_hold())
         return self._arm.measured()
 
     def _fault(self, reading: ArmReading) -> Fault | None:
@@ -214,10 +223,10 @@ class ServoLoop:
             self._reopen_s = time.monotonic() + REOPEN_S
             return
         self.lost = ""
-        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._patience)
+        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.patience)
 
     def _let_go(self) -> None:
-        for failed in self._arm.let_go(self._torque_off):
+        for failed in self._arm.let_go(self._settings.torque_off):
             _log.warning("a servo did not hear the last word: %s", failed)
 
     def _end(self) -> None:
