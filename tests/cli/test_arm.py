@@ -79,6 +79,7 @@ class Bench:
         app = build("arm")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("paramove.robots.dynamixel.servo_setup.only_servo", few_rates)
+            patch.setattr("paramove.robots.dynamixel.servo_chain.TURN_S", 0.0)  # emulated servos answer at once
             for module in ("arm_setup", "arm_calibrate"):
                 patch.setattr(f"paramove.cli.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
             return CliRunner().invoke(app, texts)
@@ -96,9 +97,9 @@ def desk(tmp_path):
         yield bench
 
 
-def few_rates(chain):
+def few_rates(chain, baud_rates=(RATE, 2_000_000)):
     """To be quick; that all are asked, the tests of scans show."""
-    return only_servo(chain, (RATE, 2_000_000))
+    return only_servo(chain, baud_rates)
 
 
 def test_scan_lists_the_servos(desk):

@@ -1,6 +1,5 @@
 """Servos behind a pseudo-terminal, with most that can be wrong with them; what mends it is run too."""
 
-import os
 import shlex
 import subprocess
 import threading
@@ -9,8 +8,8 @@ import time
 import pytest
 
 from paramove.diagnosis.bus_findings import bus_findings, servo_findings
-from paramove.diagnosis.bus_scan import FoundServo, scan
 from paramove.diagnosis.finding import Level
+from paramove.robots.dynamixel.bus_scan import FoundServo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.packets import Instruction, PacketReader
@@ -47,6 +46,14 @@ class Overheard:
     def __call__(self, data, baud_rate, now_s):
         self.instructions |= {packet.instruction for packet in self._reader.feed(data)}
         return self._receive(data, baud_rate, now_s)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_turns():
+    """Emulated servos answer to a ping of all at once; real ones take turns, which are waited for."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("paramove.robots.dynamixel.servo_chain.TURN_S", 0.0)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +95,9 @@ def test_rates_at_which_nobody_answered_are_not_told_as_found(tmp_path):
 
 def test_a_double_id_is_told(findings):
     (one,) = about(findings, "servo 1", Level.PROBLEM)
-    assert one.sentence == "2 servos have the ID 1: they talk at once"
-    assert "unplug all of them but one" in one.remedy[0]
+    assert one.sentence == "answers with damaged bytes: probably two servos have this ID; else a cable is bad"
+    assert "connect one of them alone" in one.remedy[0]
+    assert "set ID of servo 1 to one that no other servo has" in one.remedy[1]
 
 
 def test_a_voltage_outside_of_the_limits_is_told(findings):
@@ -141,9 +149,9 @@ def test_the_command_for_a_restart_mends_it(wrong, findings):
 def test_damaged_answers_are_told(tmp_path):
     with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
         emulator.faults.damaged = 1.0
-        (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
-    assert finding.level is Level.PROBLEM
-    assert "damaged" in finding.sentence
+        bus, _, seven = bus_findings(tmp_path / "usb", [FAST], PATIENT_S, range(6, 9))
+    assert (bus.level, "damaged" in bus.sentence) == (Level.PROBLEM, True)
+    assert (seven.subject, "a cable is bad" in seven.sentence) == ("servo 7", True)
 
 
 def test_an_echo_is_no_answer(tmp_path):
@@ -174,26 +182,28 @@ def test_a_port_that_cannot_be_opened_is_told(tmp_path):
     assert "no serial port" in finding.sentence
 
 
-def test_a_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
-    def refuse(*_):
-        raise ValueError("Failed to set custom baud rate")
+def test_a_rate_that_the_adapter_does_not_have_is_passed_over(tmp_path, monkeypatch):
+    set_rate = ServoPort.setBaudRate
 
-    ours, theirs = os.openpty()
-    with ServoPort(os.ttyname(theirs)) as port:
-        monkeypatch.setattr(port, "setBaudRate", refuse)
-        assert [(rate.baud_rate, rate.possible) for rate in scan(port, [4_500_000])] == [(4_500_000, False)]
-    os.close(ours)
-    os.close(theirs)
+    def refuse(port, rate):
+        if rate == 4_500_000:
+            raise ValueError("Failed to set custom baud rate")
+        return set_rate(port, rate)
+
+    monkeypatch.setattr(ServoPort, "setBaudRate", refuse)
+    with DynamixelEmulator([], tmp_path / "usb"):
+        (finding,) = bus_findings(tmp_path / "usb", [FAST, 4_500_000], PATIENT_S)
+    assert finding.sentence == f"usb: no servo answers at {FAST} bit/s"
 
 
 @pytest.mark.parametrize(
     ("servo", "sentence"),
     [
-        (FoundServo(1, "xl430_w250", 45, FAST, failed=1, values={"Baud Rate": 3}), "1 of 3 reads failed"),
-        (FoundServo(1, "xl430_w250", 45, FAST, failed=3), "Status Return Level"),
-        (FoundServo(1, "model 9", 45, FAST), "has no table"),
-        (FoundServo(1, "x", 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
-        (FoundServo(1, "x", 45, FAST, values={"Hardware Error Status": 0x80}), "unknown error, bit 7"),
+        (FoundServo(1, "xl430_w250", 1060, 45, FAST, failed=1, values={"Torque Enable": 0}), "failed in 1 of 3 reads"),
+        (FoundServo(1, "xl430_w250", 1060, 45, FAST, failed=3), "Status Return Level"),
+        (FoundServo(1, "", 9, 45, FAST), "model 9 has no table"),
+        (FoundServo(1, "x", 8, 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
+        (FoundServo(1, "x", 8, 45, FAST, values={"Hardware Error Status": 0x80}), "unknown error, bit 7"),
     ],
 )
 def test_what_else_can_be_wrong(tmp_path, servo, sentence):
@@ -201,5 +211,5 @@ def test_what_else_can_be_wrong(tmp_path, servo, sentence):
 
 
 def test_registers_of_a_model_without_table_are_left_to_other_programs(tmp_path):
-    twice = FoundServo(1, "xl320", 45, FAST, at_once=2)
+    twice = FoundServo(1, "xl320", 350, 45, FAST, at_once=2)
     assert "Wizard" in servo_findings(tmp_path / "usb", twice)[1].remedy[-1]

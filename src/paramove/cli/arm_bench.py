@@ -35,7 +35,7 @@ def bench(
     from paramove.robots.dynamixel.bus_bench import bench_bus, latency_timer_ms, slow_timer
 
     with open_arm(by_id, serial, data, baud_rate) as arm:
-        numbers = [servo.number for servo in arm.chain.ping_all()]
+        numbers = sorted({servo.number for servo in arm.chain.ping_all()})
         if not numbers:
             where = f"no servo answers at {arm.chain.port.baud_rate}; `paramove arm scan` asks at other baud rates"
             raise ended(where, exit_codes.UNAVAILABLE)

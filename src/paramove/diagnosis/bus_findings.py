@@ -8,12 +8,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from paramove.diagnosis.bus_scan import ALL_IDS, READS, USUAL_BAUD_RATES, FoundServo, ScannedRate, scan
 from paramove.diagnosis.finding import Finding, Level, Machine
 from paramove.diagnosis.serial_ports import usable_ports
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.bus_scan import ALL_IDS, USUAL_BAUD_RATES, BusScan, FoundServo, listed, scan_bus
 from paramove.robots.dynamixel.hardware_error import hardware_errors, in_words
-from paramove.robots.dynamixel.servo_models import BAUD_RATES, MODELS
+from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_models import BAUD_RATES
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 
 NEAR_LIMIT_C = 10
@@ -23,7 +24,7 @@ NOBODY = (
     "the adapter is one for Dynamixel (half duplex, TTL or RS-485 as the servos are)",
     "the servos speak Protocol 2.0 at one of these rates (--baud names another)",
 )
-
+CLEAN = ("unplug the last servo of the chain and look again, until the answers are clean",)
 
 Wrong = tuple[Level, str, tuple[str, ...]]
 """How bad, what, and what mends it."""
@@ -53,13 +54,12 @@ def bus_findings(
         ids: That are asked one by one where servos answer and something disturbs them.
     """
     try:
-        with ServoPort(str(port), baud_rates[0]) as opened:
-            scanned = list(scan(opened, baud_rates, patience_s, ids))
+        with ServoPort(str(port), baud_rates[0], patience_s) as opened:
+            scan = scan_bus(ServoChain(opened), baud_rates, ids)
     except (InputError, PortLostError) as error:
         return [Finding("bus", Level.PROBLEM, str(error), facts={"port": str(port)})]
-    servos = [servo for rate in scanned for servo in rate.servos]
-    findings = [_overview(port, scanned, servos), *_mixed_rates(port, servos)]
-    for servo in servos:
+    findings = [_overview(port, scan), *_mixed_rates(port, scan.servos)]
+    for servo in scan.servos:
         findings += servo_findings(port, servo)
     return findings
 
@@ -67,42 +67,34 @@ def bus_findings(
 def servo_findings(port: Path, servo: FoundServo) -> list[Finding]:
     """Of one servo: first what it tells, then what is wrong with it."""
     about = f"servo {servo.number}"
-    told = [servo.model, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
-    facts: dict[str, object] = {"port": str(port), "id": servo.number, "model": servo.model}
+    told = [servo.name, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
+    facts: dict[str, object] = {"port": str(port), "id": servo.number, "model": servo.name}
     facts |= {"firmware": servo.firmware, "baud_rate": servo.baud_rate}
-    if (tenths := servo.values.get("Present Input Voltage")) is not None:
-        facts["voltage"] = tenths / 10
-        told.append(f"{tenths / 10:.1f} V")
-    if (temperature := servo.values.get("Present Temperature")) is not None:
-        facts["temperature_c"] = temperature
-        told.append(f"{temperature} °C")
-    if (errors := servo.values.get("Hardware Error Status")) is not None:
-        facts["hardware_error"] = errors
+    if servo.voltage is not None:
+        facts["voltage"] = servo.voltage
+        told.append(f"{servo.voltage:.1f} V")
+    if servo.temperature is not None:
+        facts["temperature_c"] = servo.temperature
+        told.append(f"{servo.temperature} °C")
+    if servo.hardware_error is not None:
+        facts["hardware_error"] = servo.hardware_error
     wrong = [*_identity(port, servo), *_voltage(servo), *_temperature(servo), *_hardware_errors(port, servo)]
     return [Finding(about, Level.OK, ", ".join(told), facts=facts), *(Finding(about, *one) for one in wrong)]
 
 
-def _overview(port: Path, scanned: Sequence[ScannedRate], servos: Sequence[FoundServo]) -> Finding:
-    facts = {"port": str(port), "servos": len(servos)}
-    damaged = [rate.baud_rate for rate in scanned if rate.damaged]
-    foreign = [rate.baud_rate for rate in scanned if rate.foreign]
-    asked = ", ".join(str(rate.baud_rate) for rate in scanned if rate.possible)
-    if damaged:
-        shown = ", ".join(map(str, damaged))
-        sentence = f"{port.name}: answers at {shown} bit/s are damaged: several servos have the same ID, or a bad cable"
-        remedy = ("unplug the last servo of the chain and look again, until the answers are clean",)
-        return Finding("bus", Level.PROBLEM, sentence, remedy, facts=facts)
-    if foreign and not servos:
-        shown = ", ".join(map(str, foreign))
-        sentence = (
-            f"{port.name}: what comes in at {shown} bit/s is no answer of a servo: another device, or a bad cable"
-        )
+def _overview(port: Path, scan: BusScan) -> Finding:
+    facts = {"port": str(port), "servos": len(scan.servos)}
+    if scan.faults and (scan.damaged or not scan.servos):
+        level, remedy = (Level.PROBLEM, CLEAN) if scan.damaged else (Level.WARNING, NOBODY)
+        return Finding("bus", level, f"{port.name}: {'; '.join(scan.faults)}", remedy, facts=facts)
+    if not scan.servos:
+        sentence = f"{port.name}: no servo answers at {listed(scan.asked)} bit/s"
         return Finding("bus", Level.WARNING, sentence, NOBODY, facts=facts)
-    if not servos:
-        return Finding("bus", Level.WARNING, f"{port.name}: no servo answers at {asked} bit/s", NOBODY, facts=facts)
-    plural = "s" * (len(servos) > 1)
-    rates = " and ".join(map(str, sorted({servo.baud_rate for servo in servos})))
-    return Finding("bus", Level.OK, f"{port.name}: {len(servos)} servo{plural} found at {rates} bit/s", facts=facts)
+    plural = "s" * (len(scan.servos) > 1)
+    rates = " and ".join(map(str, sorted({servo.baud_rate for servo in scan.servos})))
+    return Finding(
+        "bus", Level.OK, f"{port.name}: {len(scan.servos)} servo{plural} found at {rates} bit/s", facts=facts
+    )
 
 
 def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
@@ -122,16 +114,13 @@ def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
 
 
 def _identity(port: Path, servo: FoundServo) -> Iterator[Wrong]:
-    if servo.at_once > 1:
-        sentence = f"{servo.at_once} servos have the ID {servo.number}: they talk at once"
+    if servo.is_shared:
         change = _setting(port, servo, "ID", "NEW_ID", "one that no other servo has")
-        yield Level.PROBLEM, sentence, ("unplug all of them but one, then", *change)
-    elif servo.failed:
-        sentence = f"{servo.failed} of {READS} reads failed: another servo with this ID, or a bad cable"
-        sentence += ", or Status Return Level (68) is 0" if servo.failed == READS else ""
-        yield Level.PROBLEM, sentence, ("plug in this servo alone and look again, then with another cable",)
-    elif not servo.values:
-        yield Level.WARNING, f"{servo.model} has no table in dynamixel-sdk: its state cannot be read", ()
+        yield Level.PROBLEM, servo.fault, (f"{servo.remedy}, or", *change)
+    elif servo.fault:
+        yield Level.PROBLEM, servo.fault, (servo.remedy,)
+    elif not servo.model:
+        yield Level.WARNING, f"{servo.name} has no table in dynamixel-sdk: its state cannot be read", ()
 
 
 def _voltage(servo: FoundServo) -> Iterator[Wrong]:
@@ -140,13 +129,12 @@ def _voltage(servo: FoundServo) -> Iterator[Wrong]:
     if present is None or least is None or most is None or least <= present <= most:
         return
     sentence = f"measures {present / 10:.1f} V, its limits are {least / 10:.1f} to {most / 10:.1f} V"
-    model = MODELS.get(servo.model)
-    wanted = f"{model.voltage:g} V" if model is not None else "what its manual recommends"
+    wanted = f"{servo.table.voltage:g} V" if servo.table is not None else "what its manual recommends"
     yield Level.PROBLEM, sentence, (f"switch off, and give it a supply of {wanted}",)
 
 
 def _temperature(servo: FoundServo) -> Iterator[Wrong]:
-    present, limit = servo.values.get("Present Temperature"), servo.values.get("Temperature Limit")
+    present, limit = servo.temperature, servo.values.get("Temperature Limit")
     if present is None or limit is None or present < limit - NEAR_LIMIT_C:
         return
     level = Level.PROBLEM if present >= limit else Level.WARNING
@@ -154,26 +142,21 @@ def _temperature(servo: FoundServo) -> Iterator[Wrong]:
 
 
 def _hardware_errors(port: Path, servo: FoundServo) -> Iterator[Wrong]:
-    status = servo.values.get("Hardware Error Status", 0)
+    status = servo.hardware_error
     if not status:
         return
-    found = hardware_errors(status)
     sentence = f"has stopped: {in_words(status)} (Hardware Error Status {status:#04x})"
     restart = "then hold the arm, as its torque goes off, and restart the servo:"
-    yield (
-        Level.PROBLEM,
-        sentence,
-        (*(one.remedy for one in found), restart, _command(port, servo, f"reboot(p, {servo.number})")),
-    )
+    command = _command(port, servo, f"reboot(p, {servo.number})")
+    yield Level.PROBLEM, sentence, (*(one.remedy for one in hardware_errors(status)), restart, command)
 
 
 def _setting(port: Path, servo: FoundServo, register: str, value: str, words: str) -> tuple[str, ...]:
     """How a register is set; by a command only where its address is known for certain."""
-    model = MODELS.get(servo.model)
     aim = f"set {register} of servo {servo.number} to {words}, with its torque off"
-    if model is None:
+    if servo.table is None:
         return (f"{aim}, with Dynamixel Wizard 2",)
-    address = model.registers[register].address
+    address = servo.table.registers[register].address
     call = f"write1ByteTxRx(p, {servo.number}, {address}, {value})"
     return (f"{aim}; this prints (0, 0) when done:", _command(port, servo, call))
 

@@ -47,6 +47,12 @@ def test_who_is_there(chain):
     assert impatient(chain).ping(7) is None
 
 
+def test_all_ids_have_their_turn_to_answer_to_a_ping_of_all(chain, monkeypatch):
+    monkeypatch.setattr("paramove.robots.dynamixel.servo_chain.TURN_S", 0.001)
+    chain.ping_all()
+    assert chain.port.timeout_s > PATIENT_S + 253 * 0.001
+
+
 def test_numbers_are_written_and_read(chain):
     chain.write(1, REGISTERS["Homing Offset"], -300)
     assert chain.read(1, REGISTERS["Homing Offset"]) == -300

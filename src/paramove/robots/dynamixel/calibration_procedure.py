@@ -76,7 +76,7 @@ class ArmCalibrator:
                 continue
             found[servo.joint] = looked_at(self._chain, pinged)
             if found[servo.joint].model != servo.model:
-                told = found[servo.joint].model or pinged.model_number
+                told = found[servo.joint].name
                 wrong.append(f"{servo.joint}: expected {servo.model} with ID {servo.number}, found {told}")
         if wrong:
             raise CalibrationError(

@@ -24,7 +24,7 @@ from paramove.robots.dynamixel.packets import (
 )
 from paramove.robots.dynamixel.packets import StatusError as Status
 from paramove.robots.dynamixel.servo_models import Register
-from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.servo_port import BITS_PER_BYTE, ServoPort
 
 PACKET_BYTES = 11
 """Of an answer without data."""
@@ -33,6 +33,9 @@ ATTEMPTS = 3
 WIDTHS = 4
 """After a silence, a read asks for up to three bytes more: an answer that comes too late then has the wrong length."""
 PING_DATA = 3
+TURN_S = 0.003
+"""For each ID's answer to a ping of all: so long waits dynamixel-sdk 4.1.0 (`broadcastPing`); a servo alone with ID 5
+was not heard within 10 ms (github.com/ROBOTIS-GIT/Dynamixel2Arduino, issue 106)."""
 REFUSALS = {
     Status.RESULT_FAIL: "could not do it",
     Status.INSTRUCTION: "does not know the instruction",
@@ -130,22 +133,17 @@ class ServoChain:
         answers = self._exchange(lambda: self._sdk.txPacket(self.port, packet), {number: PING_DATA})
         return _pinged(answers[number]) if number in answers else None
 
-    def ping_all(self, longest_s: float = 0.0) -> list[PingedServo]:
+    def ping_all(self) -> list[PingedServo]:
         """All servos that answer at this baud rate, by ID.
 
-        Args:
-            longest_s: To wait for them; 0: as long as 253 of them may take at most.
-
-        Two servos of one ID talk at the same time: then `counts.noise` grows.
+        Two servos of one ID talk at the same time: then `counts.noise` grows. If both were understood, both are told.
         """
         packet = [0, 0, 0, 0, BROADCAST, 3, 0, Instruction.PING, 0, 0]
         self._send(lambda: self._sdk.txPacket(self.port, packet))
-        if longest_s:
-            self.port.setPacketTimeoutMillis(1e3 * longest_s)
-        else:
-            self.port.setPacketTimeout(BROADCAST * (PACKET_BYTES + PING_DATA))
-        found = {one.id: _pinged(one) for one in self._answers({}) if len(one.parameters) == 1 + PING_DATA}
-        return sorted(found.values(), key=lambda one: one.number)
+        wire_s = (PACKET_BYTES + PING_DATA) * BITS_PER_BYTE / self.port.baud_rate
+        self.port.setPacketTimeoutMillis(1e3 * (BROADCAST * (wire_s + TURN_S) + self.port.latency_s))
+        found = [_pinged(one) for one in self._answers({}) if len(one.parameters) == 1 + PING_DATA]
+        return sorted(found, key=lambda one: one.number)
 
     def read(self, number: int, register: Register) -> int:
         """One number of one servo. Raises ServoError."""
@@ -184,17 +182,22 @@ class ServoChain:
         Returns:
             Of those that answered; nothing is made up for the others.
         """
-        address = min(one.address for one in registers)
-        size = max(one.address + one.size for one in registers) - address
         found: dict[int, Answered] = {}
         for order in (1, -1):  # a servo waits for the answer of the one before it: behind a missing one none may answer
             missing = [number for number in numbers if number not in found][::order]
-            if not missing:
-                break
-            for number, packet in self._read(missing, address, size).items():
-                if packet.parameters[0] & ~ALERT == 0:
-                    alert = bool(packet.parameters[0] & ALERT)
-                    found[number] = Answered(_values(registers, packet, address), alert, time.monotonic_ns())
+            if missing:
+                found |= self.read_once(missing, registers)
+        return found
+
+    def read_once(self, numbers: Sequence[int], registers: Sequence[Register]) -> dict[int, Answered]:
+        """As `sync_read`, but nobody is asked twice."""
+        address = min(one.address for one in registers)
+        size = max(one.address + one.size for one in registers) - address
+        found = {}
+        for number, packet in self._read(numbers, address, size).items():
+            if packet.parameters[0] & ~ALERT == 0:
+                alert = bool(packet.parameters[0] & ALERT)
+                found[number] = Answered(_values(registers, packet), alert, time.monotonic_ns())
         return found
 
     def sync_write(self, register: Register, values: dict[int, int]) -> None:
@@ -300,8 +303,8 @@ def _pinged(packet: Packet) -> PingedServo:
     return PingedServo(packet.id, int.from_bytes(data[:2], "little"), data[2])
 
 
-def _values(registers: Sequence[Register], packet: Packet, address: int | None = None) -> dict[str, int]:
-    first = min(one.address for one in registers) if address is None else address
+def _values(registers: Sequence[Register], packet: Packet) -> dict[str, int]:
+    first = min(one.address for one in registers)
     data = packet.parameters[1:]
     return {
         one.name: int.from_bytes(data[one.address - first :][: one.size], "little", signed=one.signed)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.bus_scan import FoundServo, looked_at, model_of
+from paramove.robots.dynamixel.bus_scan import FoundServo, looked_at
 from paramove.robots.dynamixel.hardware_error import hardware_errors
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 
@@ -39,7 +39,7 @@ def sentences(servo: FoundServo) -> list[str]:
 
 def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
     """Raises ServoLoadedError while the servo holds something up, and ServoError."""
-    model = model_of(servo)
+    model = servo.table
     if model is None or not servo.torque:
         return
     if "Present Load" in model.registers:

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Sequence
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.bus_scan import ALL_IDS, USUAL_BAUD_RATES, FoundServo, model_of, scan_bus
+from paramove.robots.dynamixel.bus_scan import ALL_IDS, USUAL_BAUD_RATES, FoundServo, listed, scan_bus
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, ServoModel
 
@@ -23,19 +23,13 @@ def only_servo(
         InputError: None answers, more than one does, or its table is not known here.
     """
     scan = scan_bus(chain, baud_rates, ids)
-    if scan.shared_ids:
-        raise InputError(
-            f"damaged answers from ID {scan.shared_ids[0][1]}: expected exactly one servo on the bus, found probably "
-            "two with the same ID; connect one alone"
-        )
     if not scan.servos:
+        why = "; ".join(scan.faults) or "check its power and its cable"
         raise InputError(
-            f"expected exactly one servo on the bus, found none at {', '.join(map(str, baud_rates))}: check its power "
-            "and its cable",
-            missing=True,
+            f"expected exactly one servo on the bus, found none at {listed(baud_rates)}: {why}", missing=True
         )
-    if len(scan.servos) > 1:
-        told = ", ".join(f"ID {one.number} ({one.model or one.model_number})" for one in scan.servos)
+    if len(scan.servos) > 1 or scan.servos[0].is_shared:
+        told = ", ".join(f"ID {one.number} ({one.fault if one.is_shared else one.name})" for one in scan.servos)
         raise InputError(f"expected exactly one servo on the bus, found {told}: connect one alone")
     return scan.servos[0]
 
@@ -72,22 +66,15 @@ def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, mo
         read = chain.read(number, registers[name])
         if read != value:
             raise InputError(f"servo {number}: {name} was written as {value}, but reads {read}; set it up once more")
-    after = scan_bus(chain, [baud_rate])
-    if [one.number for one in after.servos] != [number]:
-        told = ", ".join(str(one.number) for one in after.servos) or "none"
-        raise InputError(f"expected ID {number} alone at {baud_rate}, found {told}: connect one servo alone")
-    return after.servos[0]
+    return only_servo(chain, [baud_rate])
 
 
 def _checked(servo: FoundServo, number: int, baud_rate: int, model: str) -> ServoModel:
     if model and servo.model != model:
-        found = servo.model or f"model number {servo.model_number}"
-        raise InputError(f"expected a servo {model} for ID {number}, found {found}: connect the right one")
-    table = model_of(servo)
+        raise InputError(f"expected a servo {model} for ID {number}, found {servo.name}: connect the right one")
+    table = servo.table
     if table is None:
-        raise InputError(
-            f"the table of {servo.model or servo.model_number} is not known here: set it up with its maker's tool"
-        )
+        raise InputError(f"the table of {servo.name} is not known here: set it up with its maker's tool")
     low, high = table.registers["ID"].allowed or (0, 0)
     if not (low or 0) <= number <= (high or 0):
         raise InputError(f"an ID is {low} to {high}, found {number}")
