@@ -24,7 +24,7 @@ from paramove.bus import topics
 from paramove.evaluation.after_a_run import evaluated
 from paramove.evaluation.recorded_run import RunFolderError
 from paramove.msgs.truth_pb2 import TruthState
-from paramove.recording.reader import read
+from paramove.recording.parts import PartedRecording
 
 Floats = NDArray[np.float64]
 
@@ -101,13 +101,16 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
 
 
 def _truth_in(folder: Path) -> list[TruthState]:
-    path = folder / "truth.mcap"
-    if not path.is_file():
-        raise RunFolderError(f"no truth.mcap in {folder}: only runs in simulation have one")
-    states = [one.message for one in read(path, (topics.TRUTH_STATE.name,)) if len(one.message.gripper) == 3]
-    if not states:
-        raise RunFolderError(f"{path} tells nothing of the arm: the run ended before it began")
-    return states
+    recording = PartedRecording(folder / "truth.mcap")
+    read = recording.read((topics.TRUTH_STATE.name,))
+    states = [one.message for one in read if len(one.message.gripper) == 3]
+    if states:
+        return states
+    if not folder.is_dir():
+        raise RunFolderError(f"no run folder {folder}")
+    if not (folder / "nodes" / "judge.yaml").is_file():
+        raise RunFolderError(f"no truth.mcap in {folder}: only emulated runs, which have a node judge, write one")
+    raise RunFolderError(f"nothing to judge in {folder}: the run ended before anything was known of the emulated arm")
 
 
 def _tasks_in(folder: Path) -> list[dict[str, Any]]:
