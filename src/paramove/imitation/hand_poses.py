@@ -15,7 +15,8 @@ LEAST_HEIGHT = 0.0005
 """m; of the hand's lowest point above the table."""
 _PITCHES_A_BAND = 41
 _GRID_M = 0.005
-_FARTHEST_M = 2.0
+FARTHEST_M = 2.0
+"""Along each axis, of a place that an arm is asked for."""
 _TRIED_PLACES = 100
 
 
@@ -41,9 +42,9 @@ class HandPoses:
             OutOfReachError: There is none; names the reason and the nearest place where there is one.
         """
         goal = np.asarray(target, dtype=np.float64)
-        if goal.shape != (3,) or not np.isfinite(goal).all() or np.abs(goal).max() > _FARTHEST_M:
+        if goal.shape != (3,) or not np.isfinite(goal).all() or np.abs(goal).max() > FARTHEST_M:
             raise OutOfReachError(
-                f"{goal.tolist()} is no place: expected three numbers x, y, z in m, up to {_FARTHEST_M:g} m away"
+                f"{goal.tolist()} is no place: expected three numbers x, y, z in m, up to {FARTHEST_M:g} m away"
             )
         pitches, angles = self._poses(goal, wanted, band)
         for pitch, row in zip(pitches, angles, strict=True):

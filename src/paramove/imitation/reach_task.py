@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
-from paramove.imitation.hand_poses import metres
+from paramove.imitation.hand_poses import FARTHEST_M, metres
 from paramove.imitation.motion import PlannedMotion
 from paramove.imitation.motion_message import motion_message
 from paramove.imitation.servo_arm_reaching import ServoArmReaching
@@ -25,7 +25,6 @@ from paramove.robots.out_of_reach import OutOfReachError
 from paramove.rules.arm_watch import ArmWatch
 
 FloatArray = NDArray[np.float64]
-Point = tuple[float, float, float]
 
 _log = logging.getLogger(__name__)
 
@@ -33,6 +32,15 @@ RESEND_NS = 400_000_000
 SILENT_NS = 10_000_000_000
 STALE_TRIES = 3
 _STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REFUSED: "refused"}
+
+
+def _near(place: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, place)) > FARTHEST_M:
+        raise ValueError(f"expected x, y, z in m, each from -{FARTHEST_M:g} to {FARTHEST_M:g}")
+    return place
+
+
+Point = Annotated[tuple[float, float, float], AfterValidator(_near)]
 
 
 class ReachStep(BaseModel):
