@@ -73,7 +73,7 @@ def test_what_a_robot_cannot_use_is_refused_with_the_remedy(tmp_path: Path, chan
         load_reaching_model(path)
     sentence = str(refusal.value)
     assert sentence.startswith(f"{path}: ")
-    assert "Remedy: train it again: leave out synthesizer.movement.file" in sentence
+    assert "Remedy: train it again: leave out the node's parameter movement.file" in sentence
     assert "\n" not in sentence
     assert not refusal.value.missing
 

@@ -77,7 +77,7 @@ def test_without_recordings_it_is_told_what_would_help(tmp_path: Path, monkeypat
         people_model(NAME, tmp_path)
     assert no.value.missing
     assert "PARAMOVE_DATA" in str(no.value)
-    assert "synthesizer.movement.file" in str(no.value)
+    assert "by the node's parameter movement.file" in str(no.value)
 
 
 def test_recordings_of_something_else_are_refused(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:

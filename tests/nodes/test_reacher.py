@@ -13,6 +13,7 @@ from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.phmm import ModelFileError
 from paramove.robots.description import DescriptionError
 from tests.imitation.reaching import ROBOT_FOLDER, reaching_model
 from tests.imitation.servo_cell import STEPS, ServoCell
@@ -46,6 +47,13 @@ def test_fails_with_the_reason_of_the_driver(config: Any) -> None:
     reacher.run(bus, config())
     assert bus.states[-1][0] == "failed"
     assert "stopped from the page by a person" in bus.states[-1][1]
+
+
+def test_a_bad_model_file_is_refused_with_the_nodes_own_parameter(config: Any) -> None:
+    damaged = config()
+    damaged.movement.file.write_bytes(b"no model")
+    with pytest.raises(ModelFileError, match=r"reaching\.npz: .* leave out the node's parameter movement\.file"):
+        reacher.run(RecordedBus([]), damaged)
 
 
 def test_wrong_parameters_are_refused_at_the_start(config: Any) -> None:

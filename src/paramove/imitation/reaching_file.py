@@ -16,8 +16,8 @@ from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription
 from paramove.robots.arm_points import ARM_BASE
 
 REMEDY = (
-    "train it again: leave out synthesizer.movement.file to have a model trained from synthetic demonstrations, or "
-    "write this file anew with the model's save()"
+    "train it again: leave out the node's parameter movement.file to have a model trained from synthetic "
+    "demonstrations, or write this file anew with `paramove train SET --out FILE`"
 )
 ARM_LENGTHS = (0.3, 1.2)
 """m; from shoulder to elbow to knuckles of a child to that of a tall person. Millimetres or degrees lie far outside."""

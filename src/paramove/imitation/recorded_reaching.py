@@ -18,8 +18,8 @@ ACTIONS = ("reach_forward", "reach_across")
 N_STATES = 40
 REMEDY = (
     "put the data set beside the clone as ../shared/data/table_reach/data.npz or name its folder in PARAMOVE_DATA; or "
-    "give a trained model with synthesizer.movement.file; or leave out synthesizer.movement to move as the synthetic "
-    "demonstrator does"
+    "give a trained model by the node's parameter movement.file; or leave out its parameter movement to move as the "
+    "synthetic demonstrator does"
 )
 VERSION = 1  # raise it when the same recordings shall give another model: cached models then train again
 
