@@ -110,7 +110,7 @@ def test_a_missing_file_is_told_with_the_remedy(tmp_path):
         ("model: xl330_m288", "model: xl330", "servo model 'xl330' is not known"),
         ("version: 1", "version: 2", "version: input should be 1, found 2"),
         ("  pan:", "  pan: [", "is no YAML"),
-        ("robot: small_arm", "", "robot: field required"),
+        ("robot: small_arm", "", "robot is missing"),
         ("firmware: 45", "firmware: 45\n    firmware: 46", "is no YAML"),
         ("baud_rate: 1000000", "baud_rate: 1000000\n  parity: 1", "bus.parity: extra inputs are not permitted"),
     ],
@@ -121,6 +121,26 @@ def test_a_file_that_contradicts_itself_is_refused(path, old, new, told):
     for use in (lambda: ArmCalibration.load(path, SERIAL), lambda: sign_again(path)):
         with pytest.raises(ValueError, match=told):
             use()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("- pan\n- elbow\n", r"the file: expected lines of `name: value`, found \['pan', 'elbow'\]"),
+        ("word\n", "the file: expected lines of `name: value`, found 'word'"),
+        ("# nothing but this\n", "the file: expected lines of `name: value`, found nothing"),
+        ("joints: [pan]\nbus:\n", "bus: expected lines of `name: value`, found nothing; joints: expected lines of"),
+        ("version: 1\n", "created is missing; tool is missing"),
+        ("created: 2026-13-45\n", "is no YAML: month must be in"),
+        ("[" * 3000, "is no YAML"),
+    ],
+)
+def test_a_file_of_something_else_is_told_in_plain_words(path, text, told):
+    path.write_text(text)
+    with pytest.raises(CalibrationError, match=told) as refused:
+        ArmCalibration.load(path, SERIAL)
+    assert str(refused.value).startswith(str(path))
+    assert "run `paramove arm calibrate`" in str(refused.value)
 
 
 def test_a_cut_file_is_never_taken_for_a_whole_one(path):

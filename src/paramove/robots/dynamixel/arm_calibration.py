@@ -20,6 +20,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -143,7 +144,7 @@ class ArmCalibration(_Part):
             raise CalibrationError(f"{path} cannot be read: {error.strerror}") from error
         except ValidationError as error:
             raise CalibrationError(f"{path}: {_findings(error)}; {_REMEDY}") from error
-        except (YAMLError, UnicodeDecodeError) as error:
+        except (YAMLError, ValueError, RecursionError) as error:  # numbers and dates that are none, too many brackets
             raise CalibrationError(f"{path} is no YAML: {error}; {_REMEDY}") from error
         found.check(str(path))
         return found
@@ -239,12 +240,18 @@ def _contradiction(joint: JointCalibration) -> str:
 
 
 def _findings(error: ValidationError) -> str:
-    told = [
-        f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'][:1].lower()}{item['msg'][1:]}, "
-        f"found {item['input']!r:.60}"
-        for item in error.errors()[:MOST_FINDINGS]
-    ]
-    return "; ".join(told)
+    return "; ".join(_told(item) for item in error.errors()[:MOST_FINDINGS])
+
+
+def _told(item: ErrorDetails) -> str:
+    where = ".".join(map(str, item["loc"])) or "the file"
+    if item["type"] == "missing":
+        return f"{where} is missing"
+    expected = f"{item['msg'][:1].lower()}{item['msg'][1:]}"
+    if item["type"] in ("model_type", "dict_type"):
+        expected = "expected lines of `name: value`"
+    found = "nothing" if item["input"] is None else f"{item['input']!r:.60}"
+    return f"{where}: {expected}, found {found}"
 
 
 def _writer() -> YAML:
