@@ -25,6 +25,7 @@ from paramove.robots.jogging import Jogging
 from paramove.safety.gate_io import PERSON_STOP
 
 HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
+STOPPED = SafetyFault(code=PERSON_STOP, sentence="stopped by a person")
 SAYS = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
@@ -44,6 +45,7 @@ class Arm:
     def __init__(self, bus, keys):
         self.angles = {"pan": 0.0, "lift": 0.5}
         self.heard = []
+        self.ticks = self.stops_until = 0
         self._bus, self._keys = bus, iter(keys)
         self.write = lambda text: None
 
@@ -56,16 +58,25 @@ class Arm:
             )
             if hasattr(event, "topic"):
                 self._hear(event.topic, event.message)
+                continue
+            self.ticks += 1
+            if self.ticks == self.stops_until:
+                self.stops_until = 0
+                self._say_state(SafetyState.STATE_HOLD, STOPPED)
 
     def _hear(self, topic, message):
         if topic in topics.STOPS:
             if "stop" in self.heard:
                 return  # it is said until it is answered
             self.heard.append("stop")
-            self._say_state(SafetyState.STATE_HOLD, SafetyFault(code=PERSON_STOP, sentence="stopped by a person"))
+            self.stops_until = self.ticks + 5
+            self._say_state(SafetyState.STATE_STOPPING, STOPPED)
         elif topic is topics.OPERATOR_ARM:
-            self.heard.append(f"arm from the {message.source}")
-            self._say_state(SafetyState.STATE_ARMED)
+            if self.stops_until:
+                self.heard.append("arm while it stops")
+            else:
+                self.heard.append(f"arm from the {message.source}")
+                self._say_state(SafetyState.STATE_ARMED)
         else:
             (joint,) = message.joints
             self.heard.append(joint)
@@ -129,6 +140,22 @@ def test_keys_arm_move_and_stop_the_arm(folder, monkeypatch):
     assert arm.heard == ["arm from the terminal", "lift", "pan", "stop"]
     assert arm.angles == pytest.approx({"pan": np.deg2rad(3.0), "lift": 0.5 - np.deg2rad(3.0)})
     assert "2 lift" in done.stdout
+
+
+def test_an_arm_that_still_stops_is_armed_once_it_rests(folder, monkeypatch):
+    with running(folder, ["1+", " ", "a", "q"]) as arm:
+        done = jogged(monkeypatch, arm, "a")
+    assert done.exit_code == 0, done.output
+    assert arm.heard == ["arm from the terminal", "pan", "stop", "arm from the terminal"]
+    assert "the arm still stops: it is armed once it rests" in done.stdout
+
+
+def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
+    monkeypatch.setattr("paramove.cli.arm_jog.SILENT_S", 0.0)
+    with running(folder, ["q"]) as arm:
+        done = jogged(monkeypatch, arm, "a")
+    assert "not heard" in done.stdout
+    assert "is the arm's driver running?" in done.stdout
 
 
 def test_without_an_arm_it_says_so(folder, monkeypatch):

@@ -51,6 +51,13 @@ def test_every_step_keeps_to_the_limits(name, degrees):
         jogging.hear_status(told(message, TrajectoryStatus.STATE_SUCCEEDED))
 
 
+def test_a_step_of_a_driver_that_is_gone_is_waited_for_no_longer(jogging):
+    jogging.step(1, 0)
+    jogging.forget_step()
+    assert not jogging.is_moving
+    assert jogging.step(1, 0).points[0].position_rad[0] == pytest.approx(0.1)
+
+
 def test_one_step_at_a_time(jogging):
     first = jogging.step(1, 0)
     assert jogging.is_moving

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from paramove.bus.subscriber import Subscriber
 
 PERIOD_S, PATIENCE_S, STOP_S = 0.02, 3.0, 1.0
+SILENT_S = 2.0
+"""A driver that looks at its servos says nothing meanwhile."""
 KEYS = "1-9 choose a joint, + and - move it, space stops, a arms, q ends"
 
 
@@ -60,11 +63,14 @@ class _Link:
     def __init__(self, folder: Path, step: float) -> None:
         from paramove.bus import topics
         from paramove.bus.visitor import BusVisitor
+        from paramove.robots.arming_key import ArmingKey
         from paramove.robots.jogging import Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
         self._folder, self._topics = folder, topics
-        self._state, self._shown = "", ""
+        self._arming = ArmingKey()
+        self._sentence, self._shown, self._told = "", "", ""
+        self._heard_s = time.monotonic()
         self._arms: Publisher | None = None
         self._bus = BusVisitor(folder, "jog")
 
@@ -84,7 +90,7 @@ class _Link:
     def wait_for_arm(self) -> None:
         """Ends the command if no driver says where the joints are, or none listens."""
         end_s = time.monotonic() + PATIENCE_S
-        while not (self.jogging.angles and self._says.subscriptions):
+        while not (self.jogging.angles and self._says.subscriptions and self._arming.state):
             if time.monotonic() > end_s:
                 raise ended(f"no arm is heard within {PATIENCE_S:g} s: is its driver running?", exit_codes.UNAVAILABLE)
             self._hears[0].socket.poll(int(1e3 * PERIOD_S))
@@ -103,15 +109,15 @@ class _Link:
             if message is not None:
                 say_now(self._says, message)
         elif key == "a":
-            self._arm()
+            self._arming.press(time.monotonic())
+            self._told = ""  # what keeps it from being armed is told again
         elif key == " ":
+            self._arming.cancel()
             answer = stop_arm(self._folder, TERMINAL, STOP_S)
             self.jogging.sentence = "stopped" if answer else "no answer: use the switch of the motors' power"
 
     def exchange(self) -> None:
-        """Hears what has come in."""
-        from paramove.msgs.safety_state_pb2 import SafetyState
-
+        """Hears what has come in, and says the word to arm when it is time."""
         for publisher in (self._says, self._arms):
             if publisher is not None:
                 publisher.serve()
@@ -121,19 +127,41 @@ class _Link:
             while (heard := subscriber.receive()) is not None:
                 hear(heard.message)
         safety.revive()
+        now_s = time.monotonic()
         while (heard := safety.receive()) is not None:
-            self._state = SafetyState.State.Name(heard.message.state).removeprefix("STATE_").lower()
+            self._arming.hear(heard.message)
+            self._heard_s = now_s
+        if self._arming.tick(now_s):
+            self._arm()
+        if self._arming.sentence != self._sentence:
+            self._sentence = self.jogging.sentence = self._arming.sentence
+        if self.is_silent:
+            self.jogging.forget_step()
+            self.jogging.sentence = f"nothing heard for {SILENT_S:g} s: is the arm's driver running?"
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the arm's driver has said nothing for a while."""
+        return time.monotonic() - self._heard_s > SILENT_S
 
     def show(self) -> None:
-        """The chosen joint in one line, written anew at a terminal, else when it is another."""
+        """The chosen joint in one line, written anew at a terminal, else when it is another.
+
+        At a terminal, a sentence that is too long for that has lines of its own, once.
+        """
         jogging = self.jogging
         angle = math.degrees(jogging.angles[jogging.joint])
-        line = f"{self._state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg  {jogging.sentence}"
-        what = f"{self._state} {jogging.joint} {jogging.sentence}"
+        state = "not heard" if self.is_silent else self._arming.state
+        status, sentence = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.sentence
+        what = f"{state} {jogging.joint} {sentence}"
         if sys.stdout.isatty():
-            typer.echo(f"\r\x1b[2K{printable(line)}", nl=False)
+            is_long = len(status) + len(sentence) + 2 >= shutil.get_terminal_size().columns
+            if is_long and sentence != self._told:
+                typer.echo(f"\r\x1b[2K{printable(sentence)}")
+            self._told = sentence
+            typer.echo(f"\r\x1b[2K{printable(status)}  {'' if is_long else printable(sentence)}", nl=False)
         elif what != self._shown:
-            typer.echo(printable(line))
+            typer.echo(printable(f"{status}  {sentence}"))
         self._shown = what
 
     def _arm(self) -> None:
@@ -145,6 +173,6 @@ class _Link:
         try:
             self._arms = self._arms or self._bus.says(self._topics.OPERATOR_ARM)
         except TopicTakenError as error:
-            self.jogging.sentence = str(error)
+            self._arming.refuse(f"{error}, and only one program may arm an arm")
             return
         say_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging"))

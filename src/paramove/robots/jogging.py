@@ -67,6 +67,11 @@ class Jogging:
             self._goals.clear()  # it is not where the last step was to lead
             self.sentence = message.reason
 
+    def forget_step(self) -> None:
+        """Nothing will be heard of the step under way: its driver is gone."""
+        self._waits_for = ""
+        self._goals.clear()
+
     def step(self, direction: int, now_ns: int) -> JointTrajectory | None:
         """The trajectory of one step, 1 up or -1 down; None while the last is under way or no joint is known.
 
