@@ -87,6 +87,19 @@ def test_a_calibrated_arm_has_its_own_zeros_and_keeps_to_the_travel_that_was_sho
         assert low - 1e-9 <= arm.lower[place] < arm.upper[place] <= high + 1e-9
 
 
+def test_the_line_of_a_stop_button_that_is_not_there_is_pressed_from_the_start(tmp_path):
+    link, line = tmp_path / "usb-FTDI_0001-if00-port0", tmp_path / "value"
+    parameters = {"nominal": True, "stop_line": line, "stop_line_pressed": 0}
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, **parameters).driven_arm(tmp_path) as arm:
+        person = Person(arm)
+        person.waits_for("ESTOP")
+        assert arm.trouble == f"the emergency stop counts as pressed: {line} cannot be read (No such file or directory)"
+        line.write_text("1\n")
+        person.arms_and_waits()
+    with pytest.raises(ValidationError, match="stop_line_pressed"):
+        setup(link, stop_line_pressed=2)
+
+
 def test_a_robot_without_a_servo_bus_is_refused():
     with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
         servo_port(RobotDescription.load(FOLDER / "hoap3"), "/dev/null")

@@ -20,6 +20,7 @@ from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
 from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.robots.dynamixel.servo_models import XL430_W250
 from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 
@@ -144,21 +145,43 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     person.waits_for("ARMED")
 
 
-def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulator, tmp_path):
-    button = tmp_path / "estop"
-    arm = DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, stop_file=button))
+def by_file(folder):
+    """An emergency stop, what presses it, what releases it, and what is said while it is pressed."""
+    file = folder / "estop"
+    return StopInputs(file=file), file.touch, file.unlink, f"the emergency stop is pressed: there is a file {file}"
+
+
+def by_line(folder):
+    """As `by_file`, by a button whose wire the system shows as a file."""
+    line = folder / "value"
+    line.write_text("0\n")
+    said = f"the emergency stop is pressed: {line} reads '1', released is '0'"
+    return StopInputs(line=line), lambda: line.write_text("1\n"), lambda: line.write_text("0\n"), said
+
+
+@pytest.mark.parametrize("by", [by_file, by_line])
+def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulator, tmp_path, by):
+    stop, press, release, said = by(tmp_path)
+    arm = DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, stop_inputs=stop))
     with arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
+        assert arm.trouble == ""
         person.moves()
-        button.touch()
+        press()
         person.waits_for("ESTOP")
+        assert arm.trouble == said
+        told = ("emergency_stop", "the emergency stop is pressed; release it, then arm again")
+        assert [(fault.code, fault.sentence) for fault in person.safety.faults] == [told]
+        assert person.is_told("STOPPED").reason == told[1]
         person.hears_until(lambda: np.ptp(person.angles[-30:], axis=0).max() < 1e-3)
         rested = person.goals()
+        assert rested != list(ROBOT.units.to_counts(person.away()))
         person.arms()
-        button.unlink()
+        release()
         person.waits_for("DISARMED")
         assert person.goals() == rested
+        assert arm.trouble == ""
         person.arms()
         person.waits_for("ARMED")
 

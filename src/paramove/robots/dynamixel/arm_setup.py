@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel
@@ -17,6 +18,7 @@ from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.safety.gate_io import Fault
 
 LATENCY_SHARE = 0.8
@@ -33,6 +35,10 @@ class ServoArmSetup(BaseModel):
         patience: With silence.
         calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
         stop_file: The emergency stop is pressed while there is a file of this name, for programs that watch a button.
+        stop_line: File in which the system shows the line of a stop button, such as /sys/class/gpio/gpio17/value; read
+            at every period of the loop.
+        stop_line_pressed: What it reads while the button is pressed, or its wire is cut; all but the other value is
+            pressed.
         nominal: Whether they are even for an arm that everybody assembles differently, as in simulation.
     """
 
@@ -43,6 +49,8 @@ class ServoArmSetup(BaseModel):
     calibration: Path | None = None
     nominal: bool = False
     stop_file: Path | None = None
+    stop_line: Path | None = None
+    stop_line_pressed: Literal[0, 1] = 1
 
     def driven_arm(self, run_folder: Path) -> DrivenArm:
         """The arm, not yet driven.
@@ -58,7 +66,8 @@ class ServoArmSetup(BaseModel):
             description = calibrated(description, calibration)
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
-        settings = LoopSettings(self.torque_off, self.patience, faults, self.stop_file)
+        stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
+        settings = LoopSettings(self.torque_off, self.patience, faults, stop_inputs)
         return DrivenArm(description, servos, port, settings)
 
 

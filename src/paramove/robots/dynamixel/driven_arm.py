@@ -56,7 +56,7 @@ class DrivenArm:
         safety = SafetySettings(
             measured_timeout_ms=1e3 * settings.patience.silent_s,
             following=following,
-            emergency_timeout_ms=None if settings.stop_file is None else EMERGENCY_MS,
+            emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
         self._driver = ArmDriver(description, safety, self_collision(description))
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
@@ -80,14 +80,15 @@ class DrivenArm:
 
     @property
     def trouble(self) -> str:
-        """What is wrong though the gate has no fault: a lost port, silent servos, low voltage; "" if nothing is.
+        """What is wrong: a lost port, silent servos, low voltage, what presses the emergency stop; "" if nothing is.
 
         Raises:
             RuntimeError: The loop has failed; the servos rest by their own watchdog.
         """
         if self._loop.has_failed:
             raise RuntimeError("the arm's loop has failed, the lines above say why; its servos rest by their watchdog")
-        return self._loop.lost or self._loop.arm.unheard() or "; ".join(self._loop.arm.warnings())
+        loop = self._loop
+        return loop.lost or loop.arm.unheard() or "; ".join(filter(None, (loop.pressed, *loop.arm.warnings())))
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Hear a trajectory; the loop accepts or refuses it within a period."""

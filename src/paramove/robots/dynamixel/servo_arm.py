@@ -19,6 +19,7 @@ from paramove.robots.dynamixel.servo_checks import (
     hardware_fault,
     torque_fault,
     voltage_fault,
+    watchdog_fault,
 )
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.servo_port import PortLostError
@@ -28,7 +29,7 @@ from paramove.safety.gate_io import Fault
 Counts = NDArray[np.int16]
 
 GAINS = ("Position P Gain", "Position I Gain", "Position D Gain")
-WATCHDOG_UNIT_S = 0.020
+WATCHDOG_UNIT_S, WATCHDOG_TRIPPED = 0.020, 0xFF
 NOISE_SHARE, NOISE_EXCHANGES = 0.2, 50
 """More exchanges with damaged bytes than this, of about so many, and the wire is not fit to move by."""
 LOW_VOLTAGE_SHARE = 0.10
@@ -245,6 +246,11 @@ class ServoArm:
             low, high = (0.1 * servo.model.registers[f"{end} Voltage Limit"].initial for end in ENDS)
             found = found or voltage_fault(servo, health.voltage, low, high)
         return found
+
+    def look_after_watchdogs(self) -> Fault | None:
+        """Read the bus watchdogs of all servos; one that has tripped takes no goal until somebody arms again."""
+        tripped = [servo for servo, _, (units,) in self._told("Bus Watchdog") if units == WATCHDOG_TRIPPED]
+        return watchdog_fault(tripped[0], self._patience.watchdog_s) if tripped else None
 
     def _told(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
         """Of each servo that answers, its health so far and these registers."""

@@ -63,6 +63,13 @@ class JointServo:
         """Pulses that it must have."""
         return 0 if self.calibration is None else self.calibration.homing_offset
 
+    @property
+    def fence(self) -> dict[str, int]:
+        """Position limits that a calibrated joint must have; in other modes a servo does not look at them."""
+        if self.calibration is None or self.mode != POSITION_MODE:
+            return {}
+        return {"Min Position Limit": self.calibration.min_counts, "Max Position Limit": self.calibration.max_counts}
+
     def turns(self, position: int) -> int:
         """Whole turns by which a servo that presents this position is beyond the counts of the joint's range."""
         if self.mode == POSITION_MODE:
@@ -121,6 +128,15 @@ def torque_fault(servo: JointServo) -> Fault:
     return Fault("torque_lost", servo.joint, sentence)
 
 
+def watchdog_fault(servo: JointServo, watchdog_s: float) -> Fault:
+    """Of Bus Watchdog (98) that has tripped: until it is cleared the servo takes no goal."""
+    sentence = (
+        f"{servo} has stopped by itself, for it heard nothing for {1e3 * watchdog_s:.0f} ms: this computer was too "
+        "busy, or a cable was loose; arm again, which clears its watchdog"
+    )
+    return Fault("watchdog_tripped", servo.joint, sentence)
+
+
 def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
     pinged = chain.ping(servo.number) or chain.ping(servo.number)
     if pinged is None:
@@ -145,11 +161,13 @@ def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
 
 
 def _faults_of_settings(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
-    wanted = {"Operating Mode": servo.mode, "Drive Mode": 0, "Homing Offset": servo.homing_offset}
+    wanted = {"Operating Mode": servo.mode, "Drive Mode": 0, "Homing Offset": servo.homing_offset, **servo.fence}
     for name, value in wanted.items():
         found = chain.read(servo.number, servo.model.registers[name])
         if found != value:
             sentence = f"{servo} has {name} {found}, expected {value}: `paramove arm verify --write` sets it"
+            if name in servo.fence:
+                sentence += ", `--adopt` takes it over into the calibration"
             yield Fault("servo_settings", servo.joint, sentence)
 
 

@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -21,6 +20,7 @@ from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
+from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.robots.streaming.driver import ArmDriver, DriverSays
 from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import Fault, State
@@ -31,6 +31,8 @@ MOVING = (State.ARMED, State.STOPPING)
 HOLDING = (*MOVING, State.HOLD, State.ESTOP)
 HEALTH_STEPS, SUPPLY_STEPS = 10, 100
 REOPEN_S = 0.5
+WATCHDOG_SHARE = 0.5
+"""After a silence of the loop of this part of what a servo bears, it is asked whether it has stopped by itself."""
 TICK_S = 0.02
 """The driver's logic is asked so often; at once where something is wrong."""
 
@@ -43,13 +45,13 @@ class LoopSettings:
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         patience: With silence.
         standing_faults: That keep the arm from being armed, whatever its servos say.
-        stop_file: The emergency stop is pressed while there is a file of this name; None: there is no such stop.
+        stop_inputs: Files that press the emergency stop.
     """
 
     torque_off: bool = False
     patience: Patience = field(default_factory=Patience)
     standing_faults: tuple[Fault, ...] = ()
-    stop_file: Path | None = None
+    stop_inputs: StopInputs = field(default_factory=StopInputs)
 
 
 class ServoLoop:
@@ -79,6 +81,8 @@ class ServoLoop:
         self.driver = driver
         self.lost = ""
         """Why the port is not open; "" while it is."""
+        self.pressed = ""
+        """What presses the emergency stop, in words; "" if nothing does."""
         self.lock = threading.Lock()
         """Held while the loop uses the driver; hold it to tell the driver something."""
         self._description = description
@@ -91,6 +95,7 @@ class ServoLoop:
         self._reader: StreamReader | None = None
         self._says: list[DriverSays] = []
         self._step = 0
+        self._begun_s, self._silent_s = time.monotonic(), 0.0
         self._urgent = self._ended = False
         self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
@@ -146,6 +151,8 @@ class ServoLoop:
             self._ended = True
 
     def _one_period(self) -> None:
+        begun_s, self._begun_s = self._begun_s, time.monotonic()
+        self._silent_s = self._begun_s - begun_s
         self._look_at_emergency_stop()
         try:
             if self.lost:
@@ -162,11 +169,11 @@ class ServoLoop:
         self._step += 1
 
     def _look_at_emergency_stop(self) -> None:
-        if self._settings.stop_file is None:
+        if not self._settings.stop_inputs.are_there:
             return
-        pressed = self._settings.stop_file.exists()
-        self.driver.on_emergency(pressed)
-        self._urgent |= pressed and self.driver.state is not State.ESTOP
+        self.pressed = self._settings.stop_inputs.pressed()
+        self.driver.on_emergency(bool(self.pressed))
+        self._urgent |= bool(self.pressed) and self.driver.state is not State.ESTOP
 
     def _move_and_read(self) -> None:
         reader = self._reader
@@ -195,6 +202,8 @@ class ServoLoop:
 
     def _fault(self, reading: ArmReading) -> Fault | None:
         fault = self._arm.fault_of_answers(reading)
+        if self._arm.holds and self._silent_s > WATCHDOG_SHARE * self._settings.patience.watchdog_s:
+            fault = self._arm.look_after_watchdogs() or fault
         if self._step % HEALTH_STEPS == 0:
             fault = self._arm.look_after() or fault
         elif self._step % SUPPLY_STEPS == HEALTH_STEPS // 2:
