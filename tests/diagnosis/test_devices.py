@@ -2,6 +2,8 @@
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -28,6 +30,17 @@ def test_the_program_that_has_a_device_open_is_named(terminal, started, tmp_path
     program, _ = started(HOLD, str(terminal))
     assert [(one.pid, one.program.startswith("python")) for one in holders(link)] == [(program.pid, True)]
     assert str(holders(link)[0]).startswith(f"pid {program.pid} (python")
+
+
+def test_a_program_in_python_is_named_by_its_module(terminal, tmp_path):
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "nodes" / "driver.py").write_text(HOLD)
+    command = [sys.executable, "-m", "nodes.driver", str(terminal)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=tmp_path, env={}, stdin=pipe, stdout=pipe, text=True) as program:
+        assert program.stdout.readline() == "held\n"
+        assert [str(one) for one in holders(terminal)] == [f"pid {program.pid} (nodes.driver)"]
+        program.communicate()
 
 
 def test_who_serves_a_pseudo_terminal_does_not_hold_it(started):

@@ -51,6 +51,11 @@ def access_remedy(device: Path, group: str, kernel_name: str) -> tuple[str, ...]
     return _join(name)
 
 
+def serial_remedy(device: Path) -> tuple[str, ...]:
+    """As `access_remedy`, for a serial port, not a link."""
+    return access_remedy(device, "dialout", device.name.rstrip("0123456789") + "*")
+
+
 def _join(group: str) -> tuple[str, ...]:
     """Nothing but a new session where this user is of the group already."""
     with contextlib.suppress(KeyError):
@@ -75,8 +80,15 @@ def holders(device: Path) -> list[Holder]:
             continue
         with contextlib.suppress(OSError, psutil.Error):  # it has just ended, or is not ours to look into
             if _holds(process.pid, real):
-                found.append(Holder(process.pid, process.name()))
+                found.append(Holder(process.pid, _program(process)))
     return found
+
+
+def _program(process: psutil.Process) -> str:
+    """Of a Python process the module that it runs: `python` names nobody."""
+    words = process.cmdline()
+    place = words.index("-m") + 1 if "-m" in words and process.name().startswith("python") else len(words)
+    return str(words[place] if place < len(words) else process.name())
 
 
 def _holds(pid: int, device: Path) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from paramove.diagnosis.devices import access_remedy, holders, may_use
+from paramove.diagnosis.devices import holders, may_use, serial_remedy
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
 from paramove.robots.dynamixel.servo_port import ServoPort
 
@@ -59,8 +59,7 @@ def port_finding(link: Path) -> Finding:
         )
     if not may_use(link):
         sentence = f"{link.name}: this user may not use {device}"
-        pattern = device.name.rstrip("0123456789") + "*"
-        return Finding("serial port", Level.PROBLEM, sentence, access_remedy(device, "dialout", pattern), None, facts)
+        return Finding("serial port", Level.PROBLEM, sentence, serial_remedy(device), None, facts)
     if held := holders(link):
         facts["pid"] = held[0].pid
         sentence = f"{link.name}: {device} is in use by {', '.join(map(str, held))}"

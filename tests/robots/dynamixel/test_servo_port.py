@@ -1,5 +1,11 @@
 """Our port under the SDK's packet handler: what it waits for, who may open it, and what is left after a pulled plug."""
 
+import contextlib
+import grp
+import os
+import subprocess
+import sys
+
 import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 
@@ -12,6 +18,43 @@ from paramove.robots.dynamixel.servo_port import LATENCY_S, PortLostError, Servo
 INDIRECT_DATA = 224
 PATIENT_S = 0.3
 """Other programs may keep the emulator waiting."""
+
+
+BEGIN = """
+import os, sys
+from paramove.robots.dynamixel.servo_port import InputError, ServoPort
+def say(*words):
+    print(*words, flush=True)
+"""
+ORDINARY = """
+if os.geteuid() == 0:
+    os.setgroups([])
+    os.setgid(65534)
+    os.setuid(65534)
+"""
+HOLDS = "with ServoPort(sys.argv[1]):\n    say('held')\n    sys.stdin.read()"
+OPENS = ORDINARY + "try:\n    ServoPort(sys.argv[1]).open()\nexcept InputError as error:\n    say(error)"
+OPENS_BARE = ORDINARY + (
+    "try:\n    os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)\nexcept OSError as error:\n    say(error.strerror)\n"
+    "else:\n    say('opened')"
+)
+"""Programs; after ORDINARY they have no more rights than an ordinary user."""
+
+
+@contextlib.contextmanager
+def program(code, *arguments):
+    """Runs until its input ends, which is at the end of this context."""
+    command = [sys.executable, "-c", BEGIN + code, *arguments]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
+        yield running
+        running.communicate(timeout=60)
+
+
+def said_by(code, *arguments):
+    with program(code, *arguments) as running:
+        said = running.stdout.read().strip()
+    assert running.returncode == 0
+    return said
 
 
 @pytest.fixture
@@ -66,11 +109,36 @@ def test_a_pulled_plug_is_told_and_leaves_nothing_busy(emulator, handler):
     port.close()
 
 
-def test_a_second_program_is_refused(emulator):
-    with ServoPort(emulator.port), pytest.raises(InputError, match="in use by another program"):
-        ServoPort(emulator.port).open()
+def test_a_second_program_is_refused_and_told_who_was_first(emulator):
+    with program(HOLDS, emulator.port) as first:
+        assert first.stdout.readline() == "held\n"
+        holder = rf"pid {first.pid} \(python[0-9.]*\): end it in its terminal, or: kill {first.pid}"
+        with pytest.raises(InputError, match=rf"{emulator.port} is in use by {holder}$"):
+            ServoPort(emulator.port).open()
+    with ServoPort(emulator.port), pytest.raises(InputError, match=r"in use by another program: close it \(sudo lsof"):
+        ServoPort(emulator.port).open()  # this program has it itself
+
+
+def test_a_program_that_asks_for_no_lock_is_refused_too(emulator):
+    os.chmod(emulator.port, 0o666)
+    assert said_by(OPENS_BARE, emulator.port) == "opened"
     with ServoPort(emulator.port):
-        pass
+        assert said_by(OPENS_BARE, emulator.port) == "Device or resource busy"
+    assert said_by(OPENS_BARE, emulator.port) == "opened"
+
+
+def test_a_port_that_this_user_may_not_open_is_told_with_the_rule_or_the_group(emulator):
+    os.chmod(emulator.port, 0)
+    told = said_by(OPENS, emulator.port)
+    assert told.startswith(f"{emulator.port} may not be opened by this user: echo 'KERNEL==")
+    assert """MODE="0660", GROUP="dialout"' | sudo tee /etc/udev/rules.d/99-paramove-dialout.rules; """ in told
+    assert told.endswith("; sudo usermod -aG dialout $USER; log out and in again")
+    group = next(one for one in grp.getgrall() if one.gr_gid)
+    if os.geteuid() == 0:  # who is not has no way to give a port to a group
+        os.chown(emulator.port, 0, group.gr_gid)
+        os.chmod(emulator.port, 0o660)
+        gives = f"sudo usermod -aG {group.gr_name} $USER; log out and in again"
+        assert said_by(OPENS, emulator.port) == f"{emulator.port} may not be opened by this user: {gives}"
 
 
 def test_a_port_that_is_not_there_or_none_is_told_with_those_that_are(tmp_path, monkeypatch):

@@ -226,7 +226,8 @@ class ServoArm:
             return None
         sentence = (
             f"more than {NOISE_SHARE:.0%} of the exchanges on the bus are damaged ({counts.noisy} of "
-            f"{counts.exchanges} so far): check cable, plugs and supply; two servos may have one ID"
+            f"{counts.exchanges} so far): check cable, plugs and supply; two servos may have one ID, or another "
+            "program talks on the bus"
         )
         return Fault("bus_noise", "", sentence)
 

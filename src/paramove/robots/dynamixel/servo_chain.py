@@ -93,7 +93,7 @@ class WireCounts:
 
     Attributes:
         exchanges: Questions with an answer.
-        noisy: Exchanges with bytes that belonged to no sound packet.
+        noisy: Exchanges with bytes that belonged to no sound packet, or with stray answers.
         asked: Answers that were expected.
         missing: Those that did not come in time.
         damaged: Packets with a wrong checksum.
@@ -222,7 +222,10 @@ class ServoChain:
         self.counts.asked += len(sizes)
         answer_bytes = sum(PACKET_BYTES + size for size in sizes.values())
         self.port.setPacketTimeout(answer_bytes, len(sizes))
+        noisy, stray = self.counts.noisy, self.counts.stray
         answers = self._trusted(self._answers(dict(sizes)), sizes)
+        if self.counts.stray > stray:
+            self.counts.noisy = noisy + 1
         missing = len(sizes) - len(answers)
         self.counts.missing += missing
         if missing:

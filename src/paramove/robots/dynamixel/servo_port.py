@@ -15,10 +15,12 @@ import select
 import termios
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Self
 
 import serial
 
+from paramove.diagnosis.devices import holders, serial_remedy
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, HEADER, Packet, encoded
 from paramove.robots.dynamixel.serial_adapters import default_by_id, serial_adapters
@@ -159,9 +161,12 @@ def _reason(name: str, error: serial.SerialException) -> str:
         found = ", ".join(str(one.link) for one in serial_adapters()) or f"none in {default_by_id()}"
         return f"no serial port {name}, found are: {found}. Plug in the adapter; `paramove arm scan` lists all of them"
     if error.errno == errno.EACCES:
-        return f"{name} may not be opened by this user: sudo usermod -aG dialout $USER, then log in again"
+        return f"{name} may not be opened by this user: {'; '.join(serial_remedy(Path(name).resolve()))}"
     if error.errno in (errno.EAGAIN, errno.EBUSY):
-        return f"{name} is in use by another program: close it (lsof {name} names it)"
+        held = holders(Path(name))
+        if not held:
+            return f"{name} is in use by another program: close it (sudo lsof {name} names it)"
+        return f"{name} is in use by {', '.join(map(str, held))}: end it in its terminal, or: kill {held[0].pid}"
     if error.errno == errno.EISDIR or "Could not configure port" in str(error):
         return f"{name} is no serial port but something else: name a link in /dev/serial/by-id"
     return f"{name} cannot be opened as a serial port: {error}"
