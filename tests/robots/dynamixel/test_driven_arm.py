@@ -254,9 +254,12 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
             linked.unplug()
             person.waits_for("DISCONNECTED")
             assert "cable" in arm.trouble or "Plug in" in arm.trouble
+            assert "is its cable plugged in?" in person.is_told("STOPPED").reason
+            assert [code for code, _ in person.codes()] == ["port_lost", "robot_silent"]
             linked.plug_in()
             person.waits_for("DISARMED")
             assert arm.trouble == ""
+            assert person.codes()[0] == ("port_lost", "")
             person.arms()
             person.waits_for("ARMED")
 

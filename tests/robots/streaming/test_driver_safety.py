@@ -13,7 +13,7 @@ from paramove.robots.streaming.driver import SAFETY_STATES, ArmDriver
 from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import Fault, SafetySettings, State
 from tests.robots.hoap3.movements import HOAP3
-from tests.robots.streaming.fake_robot import Rig, armed, trajectory
+from tests.robots.streaming.fake_robot import TICK_NS, Rig, armed, trajectory
 from tests.robots.streaming.test_driver import GOAL, expect_within_limits
 
 
@@ -126,3 +126,28 @@ def test_rows_of_another_period_are_driven_by_the_same_driver(period_us: int) ->
     period_s = period_us * 1e-6
     per_rad = np.abs(robot.units.counts_per_rad)
     assert (steps <= per_rad * robot.operating_velocity * period_s + 1).all()
+
+
+def silent(rig: Rig) -> list[str]:
+    """What the driver says of a robot that it does not hear for a second."""
+    for _ in range(15):
+        rig.now_ns += TICK_NS
+        rig.says = rig.driver.tick(rig.now_ns)
+        rig.statuses += rig.says.statuses
+        rig.robot.play()
+    assert rig.driver.state is State.DISCONNECTED
+    return codes(rig)
+
+
+def test_a_robot_that_falls_silent_after_a_fault_is_told_by_that_fault_first() -> None:
+    rig = in_motion()
+    rig.driver.on_fault(Fault("port_lost", "", "the port went away"))
+    assert silent(rig) == ["port_lost", "robot_silent"]
+    assert rig.statuses[-1].reason.startswith("the port went away; the robot was last heard")
+    rig.tick()
+    rig.tick()
+    assert rig.driver.state is State.DISARMED
+    assert codes(rig) == ["port_lost", "robot_silent"]
+    rig.arm()
+    assert (rig.driver.state, codes(rig)) == (State.ARMED, [])
+    assert silent(rig) == ["robot_silent"]
