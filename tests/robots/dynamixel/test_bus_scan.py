@@ -161,6 +161,33 @@ def test_noise_around_sound_answers_is_no_fault():
     assert found.findings() == []
 
 
+def test_one_disturbance_makes_no_servo():
+    """Who asks on hears that nobody has the ID."""
+
+    def disturbed(receive):
+        noise = iter([b"noise", b"noise"])  # after the ping of all, and that of ID 0
+        return lambda *heard: [*receive(*heard), (0.0, next(noise, b""))]
+
+    assert scanned([], (RATE,), range(2), receive=disturbed).servos == []
+
+
+def test_damage_now_and_then_is_told_as_failed_reads():
+    """Also where a sound answer comes with it: it may be another servo's."""
+    servos = [EmulatedServo(XL430_W250, 2, RATE)]
+
+    def damaged_once(receive):
+        spoilt = iter([False, True])
+
+        def damaged(*heard):
+            return [(s, data[:-1] + b"?" + data if next(spoilt, False) else data) for s, data in receive(*heard)]
+
+        return damaged
+
+    found = scanned(servos, (RATE,), receive=damaged_once)
+    assert faults_by_id(found) == {2: "failed in 1 of 3 reads: another servo with this ID, or a bad cable"}
+    assert found.servos[0].torque is False
+
+
 def test_another_device_is_told_and_not_taken_for_servos():
     found = scanned([], (RATE,), receive=lambda _: lambda *_: [(0.0, b"$GPGGA,120000.0,,,,,0,0,,,M,,M,,*47\r\n")])
     assert (found.servos, found.foreign) == ([], [RATE])
