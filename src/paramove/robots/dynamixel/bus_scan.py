@@ -20,7 +20,7 @@ from paramove.robots.dynamixel.servo_models import MODELS, Register, ServoModel
 USUAL_BAUD_RATES = (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 """bit/s; the first is set at the factory."""
 ALL_IDS = range(253)
-NOBODY = 253
+NOBODYS_ID = 253
 """An ID that no servo can have (ROBOTIS e-Manual, "Protocol 2.0", Packet ID)."""
 READS = 3
 """Of each servo: answers of two with one ID differ, so that sooner or later they are damaged."""
@@ -205,7 +205,7 @@ def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[FoundServo]:
     """Servos of these IDs, until what is not understood comes from somebody who was not asked."""
     for number in ids:
         servo = _asked(chain, number)
-        if servo is not None and servo.garbled and _asked(chain, NOBODY) is not None:
+        if servo is not None and servo.garbled and _asked(chain, NOBODYS_ID) is not None:
             return
         if servo is not None:
             yield servo
