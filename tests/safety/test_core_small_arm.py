@@ -186,6 +186,17 @@ def test_no_report_for_half_a_second_is_silence_too() -> None:
     assert arm.step(measured=None)[2] == ("robot_silent",)
 
 
+def test_a_refused_movement_begins_the_stop_at_once_where_it_would_have_begun() -> None:
+    arm = SmallArm()
+    arm.in_motion()
+    wanted = arm.proposal()
+    jump = replace(wanted, captured_ns=arm.now + 10 * MS, rows=wanted.rows + 1.0)
+    targets, state, faults = arm.step(proposal=jump)
+    assert (state, faults) == (State.STOPPING, ("jump",))
+    assert targets is not None
+    assert (targets.first_index, targets.ramp_rows) == (jump.first_index, len(targets.rows))
+
+
 def test_what_was_found_before_the_silence_stays_and_refusals_to_arm_do_not() -> None:
     arm = SmallArm()
     arm.in_motion()
