@@ -16,8 +16,8 @@ help: ## this list
 demo: setup ## the robot learns where three objects belong and tidies them up, in simulation
 	@$(BIN)/paramove launch rule_learning $(ARGS)
 
-test: setup ## all tests that need no hardware
-	@$(BIN)/python -m pytest -m "not hardware" $(ARGS)
+test: setup ## all tests that need no hardware, on up to four processors at once
+	@$(BIN)/python -m pytest -m "not hardware" -n logical --maxprocesses 4 --dist worksteal $(ARGS)
 
 test-hardware: setup ## tests of a real servo arm, which moves a little: make test-hardware PORT=/dev/serial/by-id/… ROBOT=koch_v1_1
 	@test -n "$(PORT)" || { echo "which port? make test-hardware PORT=/dev/serial/by-id/…" >&2; exit 2; }

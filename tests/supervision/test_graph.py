@@ -144,8 +144,8 @@ def test_command_tells_what_is_wrong(arguments, code, message, monkeypatch, tmp_
     assert message in answer.stderr
 
 
-def test_running_nodes_are_drawn_with_measured_rates(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+@pytest.mark.usefixtures("workspace")
+def test_running_nodes_are_drawn_with_measured_rates():
     folder = Path(os.environ["XDG_RUNTIME_DIR"]) / "paramove" / "default"
     made, ready = [], threading.Event()
 

@@ -52,9 +52,9 @@ def test_a_socket_that_is_listened_at_is_found_and_a_stale_one_is_not(runtime: P
     assert left_over(DOMAIN, runtime) == []
 
 
-@pytest.mark.parametrize("where", [DOMAIN + "/clock.lock", DOMAIN + ".lock", f"truth-{DOMAIN}-x/truth.state.lock"])
+@pytest.mark.parametrize("where", ["{}/clock.lock", "{}.lock", "truth-{}-x/truth.state.lock"])
 def test_a_held_lock_is_found_and_a_free_one_is_not(runtime: Path, where: str) -> None:
-    path = runtime / where
+    path = runtime / where.format(DOMAIN)
     path.parent.mkdir(exist_ok=True)
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
