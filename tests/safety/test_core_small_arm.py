@@ -190,7 +190,7 @@ def test_a_refused_movement_begins_the_stop_at_once_where_it_would_have_begun() 
     arm = SmallArm()
     arm.in_motion()
     wanted = arm.proposal()
-    jump = replace(wanted, captured_ns=arm.now + 10 * MS, rows=wanted.rows + 1.0)
+    jump = replace(wanted, captured_ns=arm.now + 10 * MS, rows=wanted.rows + 0.1)
     targets, state, faults = arm.step(proposal=jump)
     assert (state, faults) == (State.STOPPING, ("jump",))
     assert targets is not None
