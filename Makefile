@@ -7,6 +7,8 @@
 BIN := .venv/bin
 ARGS ?=
 SEEDS ?= 0-9
+# Of linear algebra in each process: with small matrices threads mostly wait for each other, and keep processors busy with it.
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-hardware check docs ci format setup messages lock benchmark-seeds coverage mutation bare clean
 
@@ -17,7 +19,7 @@ demo: setup ## the robot learns where three objects belong and tidies them up, i
 	@$(BIN)/paramove launch rule_learning $(ARGS)
 
 test: setup ## all tests that need no hardware, on up to four processors at once
-	@$(BIN)/python -m pytest -m "not hardware" -n logical --maxprocesses 4 --dist worksteal $(ARGS)
+	@$(ONE_THREAD) $(BIN)/python -m pytest -m "not hardware" -n logical --maxprocesses 4 --dist worksteal $(ARGS)
 
 test-hardware: setup ## tests of a real servo arm, which moves a little: make test-hardware PORT=/dev/serial/by-id/… ROBOT=koch_v1_1
 	@test -n "$(PORT)" || { echo "which port? make test-hardware PORT=/dev/serial/by-id/…" >&2; exit 2; }
