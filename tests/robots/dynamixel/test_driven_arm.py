@@ -1,5 +1,8 @@
 """A driven arm, with all of its threads, on an emulated bus: it moves as told, and rests when something is wrong."""
 
+import contextlib
+import os
+import re
 import select
 import time
 from dataclasses import replace
@@ -14,6 +17,7 @@ from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
 from paramove.robots.dynamixel.driven_arm import SLOW_NS, DrivenArm
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
+from paramove.robots.dynamixel.emulated_body import HardwareError
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
@@ -27,6 +31,7 @@ from tests.robots.dynamixel.person import Person
 SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
+TORQUE_LOST = "lost its torque: it was switched off, lost power or was rebooted; the arm must be armed again"
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
 
 
@@ -187,16 +192,37 @@ def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulato
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "code"), [("Torque Enable", 0, "torque_lost"), ("Hardware Error Status", 0x04, "hardware_error")]
+    ("goes_wrong", "sentence"),
+    [
+        (lambda servo: servo.memory.__setitem__("Torque Enable", 0), TORQUE_LOST),
+        (lambda servo: servo.fail(HardwareError.OVERHEATING), "overheated (register 70 is 0x04); let it cool, and"),
+        (lambda servo: servo.fail(HardwareError.OVERLOAD), "overloaded (register 70 is 0x20); take the load off"),
+        (lambda servo: servo.fail(HardwareError.ENCODER), "motor encoder failed (register 70 is 0x08); the servo must"),
+        (lambda servo: setattr(servo, "voltage", 5.0), "input voltage out of its limits (register 70 is 0x01); check"),
+    ],
+    ids=["torque", "heat", "load", "encoder", "voltage"],
 )
-def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, name, value, code):
+def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, monkeypatch, goes_wrong, sentence):
+    reboots = []
+    monkeypatch.setattr(EmulatedServo, "reboot", reboots.append)
     person.arms_and_waits()
     person.moves()
     with person.emulator.lock:
-        person.emulator.bus.servos[1].memory[name] = value
+        goes_wrong(person.emulator.bus.servos[1])
     person.waits_for("HOLD")
-    assert (code, "joint2") in person.codes()
-    assert sum(person.memory("Torque Enable")) >= 4
+    fault = person.safety.faults[0]
+    assert (fault.code, fault.joint) == ("torque_lost" if sentence == TORQUE_LOST else "hardware_error", "joint2")
+    assert sentence in fault.sentence
+    assert fault.sentence.startswith("servo 12 (joint2) has ")
+    assert sentence == TORQUE_LOST or fault.sentence.endswith("then `paramove arm reboot 12`")
+    assert person.is_told("STOPPED").reason.startswith(fault.sentence)
+    assert [person.memory("Torque Enable")[place] for place in (0, 2, 3, 4)] == [1] * 4
+    rested = person.goals()
+    assert rested != list(ROBOT.units.to_counts(person.away()))
+    heard = len(person.angles)
+    person.hears_until(lambda: len(person.angles) > heard + 10)
+    assert person.goals() == rested
+    assert reboots == []
 
 
 def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_somebody_arms_again(person):
@@ -206,6 +232,8 @@ def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_some
         person.emulator.bus.servos[1].reboot()
     person.waits_for("HOLD")
     assert person.codes()[0] in (("torque_lost", "joint2"), ("joint_silent", "joint2"))
+    told = person.safety.faults[0].sentence
+    assert TORQUE_LOST in told or told.startswith("servo 12 (joint2) was last heard")
     assert person.memory("Torque Enable") == [1, 0, 1, 1, 1]
     person.hears_until(lambda: person.emulator.bus.servos[1].listens)
     person.arms()  # one word is enough
@@ -219,7 +247,14 @@ def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):
     person.moves()
     person.emulator.faults = WireFaults(damaged=0.2, seed=1)
     person.waits_for("HOLD")
-    assert person.codes()[0][0] in ("bus_noise", "joint_silent")
+    assert person.codes()[0][0] == "bus_noise"
+    sentence = (
+        r"more than 20% of the exchanges on the bus are damaged \(\d+ of \d+ so far\): check cable, plugs and supply"
+    )
+    assert re.match(sentence, person.safety.faults[0].sentence)
+    rested = person.goals()
+    assert person.is_told("STOPPED").reason == person.safety.faults[0].sentence
+    assert person.goals() == rested
 
 
 def test_a_second_servo_of_one_id_stops_the_arm(person):
@@ -230,6 +265,8 @@ def test_a_second_servo_of_one_id_stops_the_arm(person):
         person.emulator.bus.add(EmulatedServo(XL430_W250, 12, 1_000_000))
     person.waits_for("HOLD")
     assert person.codes()[0] in (("joint_silent", "joint2"), ("bus_noise", ""))
+    told = person.safety.faults[0].sentence
+    assert told.startswith("servo 12 (joint2) was last heard") or "two servos may have one ID" in told
 
 
 def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
@@ -238,30 +275,63 @@ def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
     with person.emulator.lock:
         person.emulator.bus.servos[0].blocked = True
     person.waits_for("HOLD")
-    assert ("following", "joint1") in person.codes()
+    (fault,) = person.safety.faults
+    assert (fault.code, fault.joint) == ("following", "joint1")
+    told = r"joint joint1 is [0-9.]+ deg from where it is commanded for 100 ms, allowed 10\.00 deg; see what holds it"
+    assert re.match(told, fault.sentence)
+    person.hears_until(lambda: np.ptp(person.angles[-10:], axis=0).max() < 1e-3)
+    held = person.memory("Present Position")
+    np.testing.assert_allclose(person.goals(), held, rtol=0, atol=2)  # no wind-up: let go of, it does not move
 
 
-def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path):
+@contextlib.contextmanager
+def name_taken(name):
+    """Another device has this name meanwhile, as /dev/ttyUSB0 is another adapter after a while."""
+    taken = []
+    while not taken or (os.ttyname(taken[-1]) != name and len(taken) < 50):
+        taken += os.openpty()
+    yield
+    for end in taken:
+        os.close(end)
+
+
+def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path, monkeypatch):
     link = tmp_path / "usb-FTDI_0001-if00-port0"
     with DynamixelEmulator(emulator.bus.servos, link) as linked:
         port = servo_port(ROBOT, str(link))
         port.latency_s = LATENCY_S
-        settings = LoopSettings(patience=Patience(silent_s=0.5, watchdog_s=2.54, read_s=1.0))
+        settings = LoopSettings(patience=Patience(silent_s=0.5, watchdog_s=0.5, read_s=1.0))
         with DrivenArm(ROBOT, joint_servos(ROBOT), port, settings) as arm:
             person = PersonAtEmulator(arm, linked)
             person.arms_and_waits()
             person.moves()
+            opened = []
+            monkeypatch.setattr(ServoPort, "open", lambda port, was=ServoPort.open: (opened.append(port), was(port)))
+            before = linked.port
             linked.unplug()
             person.waits_for("DISCONNECTED")
             assert "cable" in arm.trouble or "Plug in" in arm.trouble
             assert "is its cable plugged in?" in person.is_told("STOPPED").reason
             assert [code for code, _ in person.codes()] == ["port_lost", "robot_silent"]
-            linked.plug_in()
+            person.hears_until(lambda: person.memory("Bus Watchdog") == [0xFF] * 5)  # they stop by themselves
+            assert not any(person.memory("Present Velocity"))
+            assert len(opened) < 10  # it is asked for twice a second
+            with name_taken(before):
+                linked.plug_in()
+            assert linked.port != before
+            with linked.lock:
+                linked.bus.servos[1].memory["Drive Mode"] = 1  # what was plugged in may be set otherwise
             person.waits_for("DISARMED")
             assert arm.trouble == ""
             assert person.codes()[0] == ("port_lost", "")
+            rested = person.memory("Present Position")
+            person.arms()
+            person.hears_until(lambda: person.codes() == [("servo_settings", "joint2")])
+            with linked.lock:
+                linked.bus.servos[1].memory["Drive Mode"] = 0
             person.arms()
             person.waits_for("ARMED")
+            assert person.memory("Present Position") == rested
 
 
 @pytest.mark.parametrize(("torque_off", "torque"), [(False, [1] * 5), (True, [0] * 5)])
@@ -274,13 +344,29 @@ def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque
     assert person.memory("Bus Watchdog") == [0] * 5
 
 
-def test_a_servo_that_does_not_answer_at_the_end_keeps_nothing_from_the_others(emulator):
-    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator, 0.05), replace(SETTINGS, torque_off=True)) as arm:
+@pytest.mark.parametrize(
+    ("goes_wrong", "torque", "not_heard"),
+    [
+        (lambda servo: servo.memory.__setitem__("ID", 99), [1, 0, 0, 0, 0], ["Torque Enable", "Bus Watchdog"]),
+        (lambda servo: servo.fail(HardwareError.OVERLOAD), [0] * 5, []),
+    ],
+    ids=["silent", "in error"],
+)
+def test_a_servo_in_trouble_at_the_end_keeps_nothing_from_the_others(emulator, caplog, goes_wrong, torque, not_heard):
+    closed = port(emulator, 0.05)
+    with DrivenArm(ROBOT, joint_servos(ROBOT), closed, replace(SETTINGS, torque_off=True)) as arm:
         person = PersonAtEmulator(arm, emulator)
         person.arms_and_waits()
         with emulator.lock:
-            emulator.bus.servos[0].memory["ID"] = 99
-    assert person.memory("Torque Enable") == [1, 0, 0, 0, 0]
+            goes_wrong(emulator.bus.servos[0])
+    assert person.memory("Torque Enable") == torque
+    assert person.memory("Bus Watchdog")[1:] == [0] * 4
+    told = [record.message for record in caplog.records if "did not hear the last word" in record.message]
+    begin = "a servo did not hear the last word: joint1: servo 11 did not answer"
+    assert [one.partition(" (write ")[::2][0] for one in told] == [begin] * len(not_heard)
+    assert [name for name, one in zip(not_heard, told, strict=True) if name in one] == not_heard
+    with ServoPort(emulator.port):  # free for others
+        pass
 
 
 def test_servos_that_never_answer_are_named_with_the_remedy(emulator):

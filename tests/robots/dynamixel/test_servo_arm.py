@@ -10,7 +10,7 @@ from paramove.robots.dynamixel.arm_calibration import JointCalibration
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
-from paramove.robots.dynamixel.servo_chain import ServoChain
+from paramove.robots.dynamixel.servo_chain import ServoChain, ServoRefusedError
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
@@ -21,6 +21,10 @@ PATIENT_S, PERIOD_S, WATCHDOG_UNITS = 0.3, 1.0, 127
 """Other programs may keep the emulator waiting, and the test."""
 JOINTS = (JointServo("pan", 1, XL430_W250), JointServo("lift", 2, XL430_W250), JointServo("wrist", 3, XL330_M288))
 PLACES = (1000.0, 2000.0, 3000.0)
+WITHIN_A_TURN = JointCalibration(
+    id=3, model="xl330_m288", firmware=45, sign=1, operating_mode=3, homing_offset=0, zero_counts=3000,
+    min_counts=2000, max_counts=4000,
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -121,10 +125,56 @@ def test_all_that_is_wrong_is_told_together(arm, emulator):
     ]
 
 
-def test_a_bus_that_is_too_slow_is_told_with_the_remedy(port):
-    (fault,) = ServoArm(JOINTS, ServoChain(port), period_s=1e-4).check()
+@pytest.mark.parametrize(("end", "found"), [("Min", 3100), ("Max", 3900)])
+def test_a_calibrated_arm_whose_position_limits_are_others_is_not_armed(emulator, port, end, found):
+    calibrated = replace(JOINTS[2], calibration=WITHIN_A_TURN)
+    arm = ServoArm((*JOINTS[:2], calibrated), ServoChain(port), PERIOD_S)
+    expected = {"Min": WITHIN_A_TURN.min_counts, "Max": WITHIN_A_TURN.max_counts}
+    with emulator.lock:
+        for each, value in expected.items():
+            emulator.bus.servos[2].preset(f"{each} Position Limit", value)
+    assert arm.check() == ()
+    change(emulator, 2, f"{end} Position Limit", found)
+    (fault,) = arm.check()
+    assert (fault.code, fault.joint) == ("servo_settings", "wrist")
+    assert fault.sentence == (
+        f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}: `paramove arm verify --write` "
+        "sets it, `--adopt` takes it over into the calibration"
+    )
+    assert memory(emulator, "Torque Enable") == [0, 0, 0]
+
+
+def test_an_adapter_that_keeps_answers_for_16_ms_is_told_with_time_and_remedy(emulator, port):
+    emulator.faults = WireFaults(delay_s=0.016)
+    (fault,) = ServoArm(JOINTS, ServoChain(port), period_s=0.010).check()
     assert fault.code == "bus_slow"
-    assert "latency timer" in fault.sentence
+    told = re.fullmatch(
+        r"reading the servos takes ([0-9.]+) ms, allowed 10\.0 ms: raise the baud rate, or set the adapter's latency "
+        r"timer to 1 ms \(`paramove doctor` tells how\)",
+        fault.sentence,
+    )
+    assert told is not None
+    assert float(told[1]) >= 16.0
+    assert memory(emulator, "Torque Enable") == [0, 0, 0]
+
+
+def test_servos_that_stopped_by_themselves_are_told_take_no_goal_and_hold_again_when_armed(emulator, port):
+    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=0.1))
+    assert arm.take_hold() == ()
+    while memory(emulator, "Bus Watchdog") != [0xFF] * 3:  # nobody asks them anything
+        pass
+    fault = arm.look_after_watchdogs()
+    assert (fault.code, fault.joint) == ("watchdog_tripped", "pan")
+    assert "servo 1 (pan) has stopped by itself, for it heard nothing for 100 ms" in fault.sentence
+    assert fault.sentence.endswith("arm again, which clears its watchdog")
+    goal = XL430_W250.registers["Goal Position"]
+    with pytest.raises(
+        ServoRefusedError, match=r"servo 1 says that the value is out of range: write Goal Position = 10"
+    ):
+        ServoChain(port).write(1, goal, 1010)
+    assert arm.take_hold() == ()
+    assert memory(emulator, "Goal Position") == [1000, 2000, 3000]
+    assert 0xFF not in memory(emulator, "Bus Watchdog")
 
 
 def test_a_servo_that_cannot_hold_leaves_the_others_as_they_were(arm, emulator):
@@ -214,6 +264,14 @@ def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_i
         servo.preset("Operating Mode", 4)
         servo.turned(100.0)  # beyond the seam: 4196 in the counts of the joint
     arm = ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S)
+    assert arm.measured().counts[2] == 4196
+    with emulator.lock:
+        servo.turned(4196.0)  # counted on beyond its turn,
+        assert servo.memory["Present Position"] == 4196
+        servo.reboot()  # and after a loss of power in one turn again
+        assert servo.memory["Present Position"] == 100
+    while not servo.listens:
+        pass
     assert arm.measured().counts[2] == 4196
     assert arm.check() == ()
     assert arm.take_hold() == ()

@@ -1,0 +1,190 @@
+"""Whoever says whatever in whatever order: nobody arms the gate but a person, now, with all checks passed."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule
+
+from benchmarks.safety_steps import EPOCH, MECHANICAL, MS, Checker
+from paramove.safety.core import SafetyCore
+from paramove.safety.gate_io import ArmWord, Fault, Proposal, SafetySettings, State, Targets
+from paramove.safety.stop_ramp import straight_move
+from tests.safety.small_arm import HOME, LIMITS, SmallArm
+
+SETTINGS = SafetySettings(emergency_timeout_ms=500.0, words_per_s=None)
+CHECKS = (Fault("voltage", "", "9.1 V, allowed 11 to 13 V"), Fault("model", "wrist", "XL430, allowed XM430"))
+GOALS = (np.array([1.0, -0.8, 0.5]), np.array([-0.5, 0.2, 0.0]), HOME)
+
+
+class ArmingMachine(RuleBasedStateMachine):
+    """A gate, a robot, and people, programs and buttons around them; what is allowed is written down here again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arm = SmallArm(SETTINGS)
+        self.judge = Checker(LIMITS, HOME)
+        self.words: list[ArmWord] = []
+        self.delivered: list[ArmWord] = []
+        self.checks: tuple[Fault, ...] = ()
+        self.plan: tuple[int, np.ndarray] | None = None
+        self.pressed = self.heard_pressed = False
+        self.source_speaks = True
+        self.source_heard_ns = self.only_later_ns = self.arm.now
+
+    @rule(times=st.integers(1, 12))
+    def time_passes(self, times: int) -> None:
+        for _ in range(times):
+            self.step()
+
+    @rule(age_ms=st.sampled_from([0, 0, 0, 0, 900, 1100, -1100]), source=st.sampled_from(["a person", "a person", ""]))
+    def somebody_arms(self, age_ms: int, source: str) -> None:
+        self.says(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True))
+
+    @rule()
+    def somebody_disarms(self) -> None:
+        self.says(ArmWord(self.arm.now + 10 * MS, "a person", False))
+
+    @rule(goal=st.sampled_from(range(len(GOALS))), steps=st.integers(0, 25))
+    def all_is_well_and_the_arm_moves(self, goal: int, steps: int) -> None:
+        """So that the rest happens to an arm that is armed, too."""
+        self.pressed, self.source_speaks, self.checks = False, True, ()
+        for _ in range(12):
+            self.step(ms=50)
+        self.says(ArmWord(self.arm.now + 10 * MS, "a person", True))
+        assert self.arm.core.state is State.ARMED
+        self.a_movement_is_asked_for(goal)
+        for _ in range(steps):
+            self.step()
+
+    @rule(by_button=st.booleans(), steps=st.integers(1, 40))
+    def a_word_is_said_before_a_stop_and_heard_after_it(self, by_button: bool, steps: int) -> None:
+        self.pressed, self.source_speaks, self.checks = False, True, ()
+        self.words.append(ArmWord(self.arm.now + 10 * MS, "a person", True))
+        self.step()
+        if by_button:
+            self.the_emergency_stop_is_pressed_or_released(True)
+            self.the_emergency_stop_is_pressed_or_released(False)
+        else:
+            self.a_person_stops_the_arm()
+        for _ in range(steps):
+            self.step()
+        self.step(word=self.words[-1])
+
+    @rule(data=st.data())
+    def an_earlier_word_comes_again(self, data: st.DataObject) -> None:
+        if self.words:
+            self.step(word=data.draw(st.sampled_from(self.words)))
+
+    @rule(goal=st.sampled_from(range(len(GOALS))))
+    def a_movement_is_asked_for(self, goal: int) -> None:
+        """In whatever state: the proposals come all the same."""
+        if self.plan is None and self.arm.at_rest:
+            self.plan = (self.arm.played, straight_move(self.arm.stream[-1], GOALS[goal], LIMITS))
+        self.step()
+
+    @rule()
+    def a_person_stops_the_arm(self) -> None:
+        self.step(stop=Fault("person_stop", "", "stopped from the page by a person"))
+
+    @rule(pressed=st.booleans())
+    def the_emergency_stop_is_pressed_or_released(self, pressed: bool) -> None:
+        self.pressed = pressed
+        self.step()
+
+    @rule(speaks=st.booleans())
+    def its_source_ends_or_comes_back(self, speaks: bool) -> None:
+        self.source_speaks = speaks
+        self.step()
+
+    @rule(failing=st.sampled_from([(), (), CHECKS[:1], CHECKS]))
+    def checks_change(self, failing: tuple[Fault, ...]) -> None:
+        self.checks = failing
+        self.step()
+
+    @rule()
+    def the_robot_is_silent_for_long(self) -> None:
+        self.step(ms=300, measured=None)
+        self.step(ms=300, measured=None)
+        self.step()
+
+    @rule()
+    def the_driver_restarts(self) -> None:
+        """Its stream begins anew, and words of its earlier life do not count."""
+        if not self.arm.at_rest:
+            return
+        self.arm.stream, self.arm.played = self.arm.stream[-1:], 0
+        self.judge = Checker(LIMITS, self.arm.stream[-1])
+        mechanical = (np.full(3, -MECHANICAL), np.full(3, MECHANICAL))
+        self.arm.core = SafetyCore(LIMITS, mechanical, EPOCH, self.arm.now, SETTINGS)
+        self.plan = None
+        self.heard_pressed = False
+        self.source_heard_ns = self.only_later_ns = self.arm.now
+        self.step()
+
+    def says(self, word: ArmWord) -> None:
+        self.words.append(word)
+        self.step(word=word)
+
+    def proposal(self) -> Proposal | None:
+        if self.plan is None:
+            return None
+        start, path = self.plan
+        return self.arm.proposal(path, start) if self.arm.played - start < len(path) - 3 else None
+
+    def step(self, word: ArmWord | None = None, ms: int = 10, **said: object) -> None:
+        arm, before, rested = self.arm, self.arm.core.state, self.arm.at_rest
+        emergency = self.pressed if self.source_speaks else None
+        if self.source_speaks:
+            self.heard_pressed, self.source_heard_ns = self.pressed, arm.now + ms * MS
+        pressed = self.heard_pressed or arm.now + ms * MS - self.source_heard_ns > 500 * MS
+        said |= {"word": word, "emergency": emergency, "arming_faults": self.checks, "proposal": self.proposal}
+        targets, state, faults = arm.step(ms=ms, **said)
+        assert (state is State.ESTOP) == pressed
+        if state is State.ARMED and before is not State.ARMED:
+            self.expect_a_person_now(word, before, rested)
+        elif word is not None and word.armed and word.captured_ns > self.only_later_ns and not pressed:
+            self.expect_reasons(word, before, faults)
+        if targets is not None:
+            self.expect_a_movement_that_may_be(targets, before, state)
+        if state is not State.ARMED:
+            self.plan = None
+        self.delivered += [] if word is None else [word]
+        if pressed or "stop" in said:
+            self.only_later_ns = arm.now
+
+    def expect_a_person_now(self, word: ArmWord | None, before: State, rested: bool) -> None:
+        assert before in (State.DISARMED, State.HOLD, State.DISCONNECTED)  # connected in this very step
+        assert word is not None
+        assert word.armed
+        assert word.source
+        assert abs(self.arm.now - word.captured_ns) <= 1000 * MS
+        assert word.captured_ns > self.only_later_ns
+        assert self.checks == ()
+        assert rested
+        assert self.arm.core.faults == ()
+
+    def expect_reasons(self, word: ArmWord, before: State, faults: tuple[str, ...]) -> None:
+        """Whoever may not arm is told every check that fails."""
+        newer = any(one.captured_ns >= word.captured_ns for one in self.delivered)
+        if before not in (State.DISARMED, State.HOLD) or newer or self.arm.core.state is State.DISCONNECTED:
+            return
+        failing = {fault.code for fault in self.checks}
+        failing |= {"arming_stale"} if abs(self.arm.now - word.captured_ns) > 1000 * MS else set()
+        failing |= set() if word.source else {"arming_source"}
+        assert failing <= set(faults)
+        assert faults
+        assert all(fault.sentence for fault in self.arm.core.faults)
+
+    def expect_a_movement_that_may_be(self, targets: Targets, before: State, state: State) -> None:
+        assert before is State.ARMED
+        assert state is State.ARMED or targets.ramp_rows == len(targets.rows)
+        self.judge.given(targets)
+
+
+ArmingMachine.TestCase.settings = settings(deadline=None, max_examples=80, stateful_step_count=20, derandomize=True)
+
+
+class TestArming(ArmingMachine.TestCase):
+    """`paramove evaluate faults` names it."""
