@@ -81,6 +81,24 @@ def test_lost_batches_are_ridden_through(lost: int) -> None:
     expect_within_limits(rig)
 
 
+def test_a_driver_that_is_faster_than_the_robot_does_not_fill_its_buffer() -> None:
+    rig = armed()
+    rig.send("one", GOAL, duration_s=3.0)
+    reader, depths = rig.robot.reader, []
+    for _ in range(300):  # the robot plays nothing meanwhile
+        rig.now_ns += 1_000_000
+        rig.driver.on_robot_state(rig.robot.state(rig.now_ns), rig.now_ns)
+        batch = rig.driver.tick(rig.now_ns).stream
+        assert batch is None or reader.offer(batch)
+        depths.append(reader.depth)
+    assert depths[-1] == max(depths)
+    stream = HOAP3.stream
+    assert 0 < max(depths) < stream.cover_ms + stream.guard_ms + 400  # with the stop ramp
+    rig.run_until_rest()
+    assert rig.statuses[-1].state == SUCCEEDED, rig.statuses[-1].reason
+    expect_within_limits(rig)
+
+
 def test_a_dead_driver_leaves_a_robot_that_stops_smoothly() -> None:
     rig = armed()
     rig.send("one", GOAL, duration_s=2.0)
