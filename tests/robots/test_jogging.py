@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.description import RobotDescription
-from paramove.robots.jogging import Jogging
+from paramove.robots.jogging import OVERDUE_S, Jogging
 from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import check_trajectory
 
@@ -52,9 +52,11 @@ def test_every_step_keeps_to_the_limits(name, degrees):
 
 
 def test_a_step_of_a_driver_that_is_gone_is_waited_for_no_longer(jogging):
-    jogging.step(1, 0)
-    jogging.forget_step()
-    assert not jogging.is_moving
+    duration_s = jogging.step(1, 0).points[-1].time_s
+    jogging.tick(int(1e9 * (duration_s + OVERDUE_S)))
+    assert jogging.is_moving
+    jogging.tick(int(1e9 * (duration_s + OVERDUE_S)) + 1)
+    assert "was it started again?" in jogging.sentence
     assert jogging.step(1, 0).points[0].position_rad[0] == pytest.approx(0.1)
 
 

@@ -131,12 +131,12 @@ class _Link:
         while (heard := safety.receive()) is not None:
             self._arming.hear(heard.message)
             self._heard_s = now_s
+        self.jogging.tick(time.monotonic_ns())
         if self._arming.tick(now_s):
             self._arm()
         if self._arming.sentence != self._sentence:
             self._sentence = self.jogging.sentence = self._arming.sentence
         if self.is_silent:
-            self.jogging.forget_step()
             self.jogging.sentence = f"nothing heard for {SILENT_S:g} s: is the arm's driver running?"
 
     @property

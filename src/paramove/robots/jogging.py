@@ -11,6 +11,8 @@ SHORTEST_S = 0.5
 FASTEST = float(np.deg2rad(10.0))
 """On the average of a step, rad/s."""
 POINTS = 21
+OVERDUE_S = 2.0
+"""Beyond the time of a step: the driver waits a second for joints that do not arrive."""
 OVER = (TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED)
 
 
@@ -35,6 +37,7 @@ class Jogging:
         self._count = 0
         self._goals: dict[str, float] = {}
         self._waits_for = ""
+        self._overdue_ns = 0
 
     @property
     def joint(self) -> str:
@@ -67,10 +70,11 @@ class Jogging:
             self._goals.clear()  # it is not where the last step was to lead
             self.sentence = message.reason
 
-    def forget_step(self) -> None:
-        """Nothing will be heard of the step under way: its driver is gone."""
-        self._waits_for = ""
-        self._goals.clear()
+    def tick(self, now_ns: int) -> None:
+        """A step of which the driver tells no end, as it was started again meanwhile, is waited for no longer."""
+        if self.is_moving and now_ns > self._overdue_ns:
+            self._waits_for, self.sentence = "", "the arm's driver says nothing of this step: was it started again?"
+            self._goals.clear()
 
     def step(self, direction: int, now_ns: int) -> JointTrajectory | None:
         """The trajectory of one step, 1 up or -1 down; None while the last is under way or no joint is known.
@@ -90,6 +94,7 @@ class Jogging:
         share = np.linspace(0.0, 1.0, POINTS)
         course = begin + (end - begin) * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         duration_s = max(SHORTEST_S, self._step / FASTEST)
+        self._overdue_ns = now_ns + int(1e9 * (duration_s + OVERDUE_S))
         message.points.extend(
             TrajectoryPoint(time_s=time_s, position_rad=[angle])
             for time_s, angle in zip(duration_s * share, course, strict=True)
