@@ -39,6 +39,41 @@ def test_an_arm_without_torque_falls_and_with_torque_it_stays(tmp_path):
     assert limp.servos[0].memory["Present Current"] == 0
 
 
+def test_a_hand_leads_a_limp_joint_against_its_weight_and_lets_it_fall(tmp_path):
+    arm = Arm(tmp_path, XL430_W250, posture={"shoulder": -1.5})
+    arm.servos[0].lead(2048 + 0.5 * COUNTS_PER_RAD)
+    fastest = 0.0
+    for _ in range(400):
+        before = arm.angle()
+        arm.run(0.01)
+        fastest = max(fastest, abs(arm.angle() - before) / 0.01)
+    assert arm.angle() == pytest.approx(0.5, abs=0.005)
+    assert fastest < 1.5
+    assert arm.servos[0].memory["Present Load"] == 0  # it is not the motor that lifts
+    arm.servos[0].hand = None
+    arm.run(3.0)
+    assert arm.angle() == pytest.approx(-math.pi / 2, abs=0.05)
+
+
+@pytest.mark.parametrize(("model", "gives_way"), [(XL330_M288, True), (XM430_W350, False)])
+def test_a_hand_is_not_stronger_than_a_hand(model, gives_way, tmp_path):
+    arm = holding(Arm(tmp_path, model, mass=0.01))
+    arm.servos[0].lead(2048 + COUNTS_PER_RAD)
+    arm.run(2.0)
+    assert (arm.angle() > 0.8) is gives_way
+    assert arm.angle() > 0.01
+
+
+def test_a_hand_leads_a_joint_whose_servo_is_turned_round_or_reversed(tmp_path):
+    arm = Arm(tmp_path, XL430_W250)
+    arm.servos[0].preset("Drive Mode", 1)
+    arm.servos[0].lead(2048 + 0.3 * COUNTS_PER_RAD)
+    arm.servos[1].lead(2048 - 0.6 * COUNTS_PER_RAD)
+    arm.run(3.0)
+    assert arm.angle() == pytest.approx(0.3, abs=0.005)
+    assert arm.angle("elbow") == pytest.approx(0.6, abs=0.005)
+
+
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_goals_are_reached_whichever_way_the_servo_is_built_in(name, tmp_path):
     arm = holding(Arm(tmp_path, MODELS[name], mass=0.01))

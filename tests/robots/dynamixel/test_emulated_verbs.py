@@ -78,6 +78,19 @@ def test_block_and_free(bench):
     assert bench.value(2, "Present Position") == 2500
 
 
+def test_a_limp_servo_is_led_and_keeps_its_place_once_it_is_let_go(bench):
+    bench.do("lead elbow 45")
+    bench.wait(0.1)
+    assert 2048 < bench.value(2, "Present Position") < 2048 + 512
+    bench.wait(1.0)
+    assert bench.value(2, "Present Position") == 2048 + 512
+    bench.do("free elbow")
+    bench.do("lead shoulder 0")
+    bench.wait(0.1)
+    assert bench.value(2, "Present Position") == 2048 + 512
+    assert bench.value(1, "Present Position") == 2048
+
+
 @pytest.mark.parametrize(
     ("line", "error"),
     [
@@ -205,7 +218,10 @@ def test_the_state_and_what_was_found_are_told(bench):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("", "is no verb of the emulator: block, free"),
+        ("", "is no verb of the emulator: block, lead, free"),
+        ("lead elbow", "lead JOINT DEGREES"),
+        ("lead elbow up", "expected a number, found 'up'"),
+        ("lead elbow 1e9", "to an angle of -720 to 720 deg, found 1e9"),
         ("blok 1", "did you mean 'block'"),
         ("block", "block JOINT"),
         ("block wrist", "no servo 'wrist'; there are 1, 2, elbow, shoulder"),

@@ -60,6 +60,7 @@ class EmulatedArm:
         self.robot = robot
         self._servos = emulated_servos(robot)
         self.mechanics = MujocoMechanics(robot.model_path.parent / scene, joints, pose)
+        self._joints = dict(zip(robot.servo_ids, joints, strict=True))
         self._objects = _free_bodies(self.mechanics.model)
         self._link, self._control, self._seed, self._held = link, control, seed, held
         self._open = contextlib.ExitStack()
@@ -75,7 +76,7 @@ class EmulatedArm:
                     servo.hold()
             if self._control is not None:
                 names = dict(zip(self.robot.joint_names, self.robot.servo_ids, strict=True))
-                opened.enter_context(ControlSocket(self._control, EmulatorVerbs(self.emulator, names).do))
+                opened.enter_context(ControlSocket(self._control, EmulatorVerbs(self.emulator, names, self._joints).do))
             self._open = opened.pop_all()
         return self
 

@@ -6,6 +6,7 @@ import math
 from enum import IntFlag
 
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.emulated_hand import Hand
 from paramove.robots.dynamixel.emulated_loops import STEP_S, VELOCITY_UNIT, Loops
 from paramove.robots.dynamixel.emulated_motor import LIMP, RAD_PER_PULSE, Effort, Motor
 from paramove.robots.dynamixel.servo_memory import CURRENT_MODE, PWM_MODE, TRIPPED, ServoMemory
@@ -41,6 +42,7 @@ class ServoBody:
         voltage: V that it gets.
         torque: N m at the shaft in the last step, in its own direction.
         blocked: Whether something holds its shaft.
+        hand: That leads its shaft, None: there is none.
         powered: Whether its cable is plugged in.
     """
 
@@ -52,6 +54,7 @@ class ServoBody:
         self.loops = Loops(self.memory, self.motor)
         self.voltage, self.torque = model.voltage, 0.0
         self.blocked, self.powered = False, True
+        self.hand: Hand | None = None
         self._shaft = position
         self._overloaded_s = 0.0
         self._now_s = self._heard_s = 0.0
@@ -136,22 +139,29 @@ class ServoBody:
             course = self.loops.course
             if self.blocked:
                 course.begin(self.position)
+            elif self.hand is not None and not self.has_torque:
+                course.begin(self._direction * self.hand.led())
             else:
                 self.loops.unloaded()
             if self.memory["Bus Watchdog"] == TRIPPED and course.velocity:
                 self._hold()
             self.position, self.velocity = course.position, course.velocity
+            self._shaft = self._direction * self.position
         self.present()
 
     def effort(self) -> Effort:
-        """Begins a step: what the servo does at its shaft, in the direction of the encoder; `moved` ends it."""
+        """Begins a step: what servo and hand do at the shaft, in the direction of the encoder; `moved` ends it."""
         self._tick()
         if not self.has_torque or not self.listens:
             self.loops.begin(self.position, self.velocity)
             self.loops.pwm, self._effort = 0.0, LIMP
         else:
             self._effort = self.loops.effort(self.position, self.velocity, self.voltage)
-        return Effort(self._direction * self._effort.torque, self._effort.damping)
+        torque, damping = self._direction * self._effort.torque, self._effort.damping
+        if self.hand is None:
+            return Effort(torque, damping)
+        led = self.hand.effort(self._shaft, self._direction * self.velocity)
+        return Effort(torque + led.torque, damping + led.damping)
 
     def moved(self, shaft: float, velocity: float) -> None:
         """Its shaft is there, pulses from the zero of the encoder, and turns so fast, pulses per second."""
@@ -161,6 +171,10 @@ class ServoBody:
         self.motor.warm(self.torque, STEP_S)
         loaded = abs(self.torque) > OVERLOAD_SHARE * self.model.stall_torque
         self._overloaded_s = max(0.0, self._overloaded_s + (STEP_S if loaded else -STEP_S))
+
+    def lead(self, target: float) -> None:
+        """A hand takes hold of its shaft and leads it there, pulses from the zero of the encoder."""
+        self.hand = Hand(self._shaft, target)
 
     def stand(self, shaft: float) -> None:
         """Before any movement: the shaft is there, pulses from the zero of the encoder."""

@@ -13,11 +13,15 @@ from dataclasses import asdict, fields
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_body import HardwareError
+from paramove.robots.dynamixel.emulated_mechanics import DrivenJoint
+from paramove.robots.dynamixel.emulated_motor import RAD_PER_PULSE
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, model_named
 from paramove.robots.dynamixel.wire_faults import WireFaults
 
+UNGEARED = DrivenJoint("", 1.0 / RAD_PER_PULSE)
+FARTHEST_DEG = 720.0
 ELSEWHERE = 700.0
 """Pulses by which a second servo of an id stands away from the first."""
 
@@ -28,11 +32,17 @@ class EmulatorVerbs:
     Args:
         emulator: To whom.
         names: Ids of servos by the names of their joints, which may be used instead.
+        joints: Pulses of servos, by ids; those of others turn with their joints, which are at 0 with 2048 pulses.
     """
 
-    def __init__(self, emulator: DynamixelEmulator, names: Mapping[str, int] | None = None) -> None:
+    def __init__(
+        self,
+        emulator: DynamixelEmulator,
+        names: Mapping[str, int] | None = None,
+        joints: Mapping[int, DrivenJoint] | None = None,
+    ) -> None:
         self.emulator = emulator
-        self.names = dict(names or {})
+        self.names, self._joints = dict(names or {}), dict(joints or {})
 
     def do(self, line: str) -> str:
         """The answer: empty, or text in one line.
@@ -64,6 +74,11 @@ class EmulatorVerbs:
             raise InputError(f"no servo {who!r}; there are {', '.join(known)}")
         return found
 
+    def pulses(self, servo: EmulatedServo, angle: float) -> float:
+        """Of the encoder of a servo whose joint is at this angle, rad."""
+        joint = self._joints.get(servo.id, UNGEARED)
+        return joint.zero_counts + joint.counts_per_rad * angle
+
 
 def _each(change: Callable[[EmulatedServo, list[str]], None]) -> Callable[[EmulatorVerbs, list[str]], str]:
     """A verb that does this to the servos that its first word names."""
@@ -76,11 +91,21 @@ def _each(change: Callable[[EmulatedServo, list[str]], None]) -> Callable[[Emula
     return verb
 
 
-def _set_blocked(blocked: bool) -> Callable[[EmulatedServo, list[str]], None]:
-    def change(servo: EmulatedServo, words: list[str]) -> None:
-        servo.blocked = blocked
+def _block(servo: EmulatedServo, words: list[str]) -> None:
+    servo.blocked = True
 
-    return change
+
+def _free(servo: EmulatedServo, words: list[str]) -> None:
+    servo.blocked, servo.hand = False, None
+
+
+def _lead(verbs: EmulatorVerbs, words: list[str]) -> str:
+    degrees = _number(words[1])
+    if abs(degrees) > FARTHEST_DEG:
+        raise InputError(f"a joint is led to an angle of -{FARTHEST_DEG:g} to {FARTHEST_DEG:g} deg, found {words[1]}")
+    for servo in verbs.servos(words[0]):
+        servo.lead(verbs.pulses(servo, math.radians(degrees)))
+    return ""
 
 
 def _failing(error: HardwareError) -> Callable[[EmulatedServo, list[str]], None]:
@@ -180,6 +205,7 @@ def _state(verbs: EmulatorVerbs, words: list[str]) -> str:
         servo.present()
         numbers = {name.lower().replace(" ", "_"): servo.memory[name] for name in shown}
         about = {"id": servo.id, "model": servo.model.name, "powered": servo.powered, "blocked": servo.blocked}
+        about["led"] = servo.hand is not None
         servos.append({**about, **numbers, "temperature": round(servo.temperature, 1), "voltage": servo.voltage})
     judge = verbs.emulator.bus.judge
     found = {"packets": judge.packets, "findings": dict(judge.counts)}
@@ -205,8 +231,9 @@ def _number(word: str) -> float:
 
 
 VERBS: dict[str, tuple[str, Callable[[EmulatorVerbs, list[str]], str]]] = {
-    "block": ("block JOINT", _each(_set_blocked(True))),
-    "free": ("free JOINT", _each(_set_blocked(False))),
+    "block": ("block JOINT", _each(_block)),
+    "lead": ("lead JOINT DEGREES", _lead),
+    "free": ("free JOINT", _each(_free)),
     "overload": ("overload ID", _each(_failing(HardwareError.OVERLOAD))),
     "overheat": ("overheat ID", _each(_overheat)),
     "encoder": ("encoder ID", _each(_failing(HardwareError.ENCODER))),
