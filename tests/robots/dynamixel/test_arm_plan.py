@@ -7,7 +7,7 @@ import pytest
 
 from paramove.input_error import InputError
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm_plan import PITCH, ROLL, YAW, load_plan
+from paramove.robots.dynamixel.arm_plan import PITCH, ROLL, ROOM, YAW, load_plan
 
 DESCRIPTIONS = Path(__file__).parents[3] / "robot_description"
 ARMS = ["koch_v1_1", "open_manipulator_x"]
@@ -22,21 +22,26 @@ def test_the_plan_is_that_of_the_description(name):
     assert tuple(servo.number for servo in plan.servos) == robot.servo_ids
     for servo in plan.servos:
         assert servo.lower < servo.posture < servo.upper
-        assert servo.direction
+        end = servo.upper if servo.grows else servo.lower
+        assert abs(end - servo.posture) >= ROOM  # it can be moved as it is asked
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_the_words_for_directions_are_true(name):
     chain = RobotDescription.load(DESCRIPTIONS / name).chain
-    words = {servo.joint: servo.direction for servo in load_plan(DESCRIPTIONS / name).servos}
+    plan = load_plan(DESCRIPTIONS / name).servos
+    words = {servo.joint: servo.direction for servo in plan}
+    way = {servo.joint: 1.0 if servo.grows else -1.0 for servo in plan}
     zero = np.zeros(len(chain.joints))
     held = chain.kinematics.forward(zero)
     for place, joint in enumerate(chain.joints):
-        moved = chain.kinematics.forward(zero + 0.1 * (np.arange(len(zero)) == place))
+        moved = chain.kinematics.forward(zero + 0.1 * way[joint] * (np.arange(len(zero)) == place))
         step = moved.position - held.position
-        true = {YAW: step[1] > 0.0, PITCH: step[2] < 0.0, ROLL: moved.roll > held.roll and abs(step[0]) < 1e-9}
+        rolled = moved.roll - held.roll if abs(step[0]) < 1e-9 else 0.0
+        true = {YAW[0]: step[1] > 0.0, PITCH[0]: step[2] < 0.0, ROLL[0]: rolled > 0.0}
+        true |= {YAW[1]: step[1] < 0.0, PITCH[1]: step[2] > 0.0, ROLL[1]: rolled < 0.0}
         assert true[words[joint]], joint
-    opens = chain.gripper_open > chain.gripper_closed
+    opens = (chain.gripper_open > chain.gripper_closed) is (way[chain.gripper] > 0.0)
     assert words[chain.gripper] == ("the gripper opens" if opens else "the gripper closes")
 
 

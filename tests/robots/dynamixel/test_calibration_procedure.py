@@ -77,6 +77,28 @@ def test_an_arm_is_calibrated(arm):
     assert any("lift counts the other way than described" in sentence for sentence in hands.told)
 
 
+def test_a_joint_whose_posture_is_an_end_of_its_range_is_shown_the_other_way(arm):
+    servos = tuple(
+        dataclasses.replace(one, grows=False, direction="it falls") if one.joint == "elbow" else one
+        for one in PLAN.servos
+    )
+    hands = Hands(arm, wrong="elbow")
+    near(calibrated(arm, hands, dataclasses.replace(PLAN, servos=servos)), calibration())
+    assert "Move elbow by 10 deg or more so that it falls." in hands.asked
+
+
+def test_a_joint_that_is_put_back_before_its_direction_is_seen_is_asked_for_again(arm):
+    class Hesitating(Hands):
+        def _steps(self, request):
+            first = request.startswith("Move pan") and request not in self.asked[:-1]
+            return [{"pan": 0.4}, {"pan": 0.0}] if first else super()._steps(request)
+
+    hands = Hesitating(arm)
+    near(calibrated(arm, hands), calibration())
+    assert "pan is where it was: leave it there after you have moved it." in hands.told
+    assert sum(one.startswith("Move pan") for one in hands.asked) == 2
+
+
 def test_missing_and_wrong_servos_are_told_before_anything_is_asked(arm):
     arm.chain.port.latency_s = 0.03
     pan, lift, elbow = PLAN.servos

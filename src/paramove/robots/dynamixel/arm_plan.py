@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,9 +10,19 @@ from paramove.input_error import InputError
 from paramove.robots.description import Chain, RobotDescription
 from paramove.robots.dynamixel.servo_models import model_named
 
-YAW = "the hand swings to the left, seen from behind the arm"
-PITCH = "what it carries goes down in front"
-ROLL = "the hand turns clockwise, seen from behind the arm"
+YAW = (
+    "the hand swings to the left, seen from behind the arm",
+    "the hand swings to the right, seen from behind the arm",
+)
+PITCH = ("what it carries goes down in front", "what it carries goes up in front")
+ROLL = (
+    "the hand turns clockwise, seen from behind the arm",
+    "the hand turns counterclockwise, seen from behind the arm",
+)
+ANGLE = ("its angle grows, as its description has it", "its angle falls, as its description has it")
+"""Where a joint moves with a growing and with a falling angle."""
+ROOM = math.radians(15.0)
+"""That a joint needs to show its direction."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +34,8 @@ class PlannedServo:
         lower, upper: Range of the joint, rad.
         posture: Its angle in the posture in which the arm is held for calibration, rad.
         sign: 1 where the servo counts up with the angle in the arm as it is described, else -1.
-        direction: Where the joint moves with a growing angle, in words.
+        grows: Whether its direction is shown with a growing angle; not where the posture leaves no room for that.
+        direction: Where the joint moves then, in words.
         grips: Whether it holds with a limited current, in Current-based Position Control Mode.
     """
 
@@ -34,7 +46,8 @@ class PlannedServo:
     upper: float
     posture: float = 0.0
     sign: int = 1
-    direction: str = ""
+    grows: bool = True
+    direction: str = ANGLE[0]
     grips: bool = False
 
 
@@ -66,6 +79,7 @@ def load_plan(folder: Path) -> ArmPlan:
     words = {} if robot.chain is None else _directions(robot.chain)
     servos = []
     for place, joint in enumerate(robot.joint_names):
+        grows = bool(robot.upper[place] >= ROOM)
         servo = PlannedServo(
             joint=joint,
             number=robot.servo_ids[place],
@@ -73,16 +87,16 @@ def load_plan(folder: Path) -> ArmPlan:
             lower=float(robot.lower[place]),
             upper=float(robot.upper[place]),
             sign=1 if robot.units.counts_per_rad[place] > 0 else -1,
-            direction=words.get(joint, ""),
+            grows=grows,
+            direction=words.get(joint, ANGLE)[0 if grows else 1],
             grips=robot.chain is not None and robot.chain.grip_current_ma is not None and joint == robot.chain.gripper,
         )
         servos.append(servo)
     return ArmPlan(robot.name, robot.bus.baud_rate, tuple(servos))
 
 
-def _directions(chain: Chain) -> dict[str, str]:
-    """Where each joint moves with a growing angle: a yaw, three pitches, perhaps a roll, and the gripper."""
+def _directions(chain: Chain) -> dict[str, tuple[str, str]]:
+    """Of a yaw, three pitches, perhaps a roll, and the gripper."""
     words = dict(zip(chain.joints, (YAW, PITCH, PITCH, PITCH, ROLL), strict=False))
-    return words | {
-        chain.gripper: "the gripper opens" if chain.gripper_open > chain.gripper_closed else "the gripper closes"
-    }
+    opens, closes = "the gripper opens", "the gripper closes"
+    return words | {chain.gripper: (opens, closes) if chain.gripper_open > chain.gripper_closed else (closes, opens)}

@@ -10,7 +10,7 @@ import numpy as np
 from paramove.robots.dynamixel.arm_calibration import ArmCalibration, CalibratedBus, CalibrationError, JointCalibration
 from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
 from paramove.robots.dynamixel.bus_scan import FoundServo, looked_at
-from paramove.robots.dynamixel.calibration_sweep import JointSweep, calibrated_joint, remarks
+from paramove.robots.dynamixel.calibration_sweep import SMALLEST_MOVE, JointSweep, calibrated_joint, remarks
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import model_named
 from paramove.robots.dynamixel.servo_settings import write_settings
@@ -144,10 +144,14 @@ class ArmCalibrator:
                 sweep.add(positions[servo.number])
             return [f"{servo.joint}: moved by {sweep.present - start} counts"]
 
-        words = servo.direction or "its angle grows, as its description has it"
-        self._person.until_done(f"Move {servo.joint} by 10 deg or more so that {words}.", look)
-        sweep.add(self._all_positions()[servo.number])
-        return sweep.present - start
+        for _ in range(ATTEMPTS):
+            self._person.until_done(f"Move {servo.joint} by 10 deg or more so that {servo.direction}.", look)
+            sweep.add(self._all_positions()[servo.number])
+            moved = sweep.present - start
+            if abs(moved) >= SMALLEST_MOVE:
+                break
+            self._person.tell(f"{servo.joint} is where it was: leave it there after you have moved it.")
+        return moved if servo.grows else -moved
 
     def _angles(self, joints: dict[str, JointCalibration]) -> list[str]:
         positions = self._positions()
