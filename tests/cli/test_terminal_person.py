@@ -54,6 +54,13 @@ def test_enter_says_that_it_is_done(terminal, capsys, monkeypatch):
     assert "looked" not in capsys.readouterr().out
 
 
+def test_a_key_that_is_pressed_once_the_request_is_seen_counts_and_an_earlier_one_does_not(terminal, monkeypatch):
+    descriptor, source = terminal
+    os.write(descriptor, b"q\n")
+    monkeypatch.setattr("typer.echo", lambda text, nl=True: os.write(descriptor, b"\n"))
+    TerminalPerson(source).until_done("Move the arm.", list)
+
+
 def test_q_ends_and_the_terminal_is_as_before(terminal):
     descriptor, source = terminal
     before = termios.tcgetattr(descriptor)

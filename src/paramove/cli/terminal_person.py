@@ -41,10 +41,11 @@ class TerminalPerson:
 
     def until_done(self, request: str, look: Callable[[], list[str]]) -> None:
         """Ask, and look again and again until it is done. Raises QuitError."""
-        typer.echo(f"{printable(request)} Enter when it is done, q to end.")
+        asked = f"{printable(request)} Enter when it is done, q to end."
         if self._source.isatty():
-            self._keys(look)
+            self._keys(asked, look)
         else:
+            typer.echo(asked)
             self._lines(look)
 
     @contextlib.contextmanager
@@ -68,9 +69,10 @@ class TerminalPerson:
 
             yield pressed
 
-    def _keys(self, look: Callable[[], list[str]]) -> None:
+    def _keys(self, asked: str, look: Callable[[], list[str]]) -> None:
         shown = 0
-        with _unbuffered(self._source.fileno()) as descriptor:
+        with _unbuffered(self._source.fileno()) as descriptor:  # drops what was typed before, and nothing after
+            typer.echo(asked)
             while True:
                 lines = look()
                 if sys.stdout.isatty():
