@@ -2,6 +2,7 @@
 
 import os
 import pty
+import select
 import sys
 import termios
 
@@ -57,6 +58,7 @@ def test_enter_says_that_it_is_done(terminal, capsys, monkeypatch):
 def test_a_key_that_is_pressed_once_the_request_is_seen_counts_and_an_earlier_one_does_not(terminal, monkeypatch):
     descriptor, source = terminal
     os.write(descriptor, b"q\n")
+    assert select.select([source], [], [], 10.0)[0]
     monkeypatch.setattr("typer.echo", lambda text, nl=True: os.write(descriptor, b"\n"))
     TerminalPerson(source).until_done("Move the arm.", list)
 
