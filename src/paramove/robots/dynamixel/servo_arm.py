@@ -108,7 +108,7 @@ class ServoArm:
         self._numbers = [servo.number for servo in servos]
         self._registers = servos[0].model.registers  # those used here have one address in all models
         self._noise_mark = (0, 0)
-        self._noisy = False
+        self._noise = ""
 
     def check(self) -> tuple[Fault, ...]:
         """Everything that keeps the servos from being armed."""
@@ -205,29 +205,30 @@ class ServoArm:
         )
 
     def fault_of_answers(self, reading: ArmReading) -> Fault | None:
-        """A joint that is silent for too long, or a wire that damages too much."""
-        late, allowed_s = int(np.argmax(reading.ages_s)), self._patience.silent_s
-        if reading.ages_s[late] > allowed_s:
-            servo = self.servos[late]
-            sentence = (
-                f"{servo} was last heard {1e3 * reading.ages_s[late]:.0f} ms ago, allowed "
-                f"{1e3 * allowed_s:.0f} ms: check its cable and its power"
-            )
-            return Fault("joint_silent", servo.joint, sentence)
-        return self._fault_of_noise()
+        """Joints that are silent for too long, or a wire that damages too much."""
+        allowed_s = self._patience.silent_s
+        late = [self.servos[place] for place in np.flatnonzero(reading.ages_s > allowed_s)]
+        if not late:
+            return self._fault_of_noise()
+        names = "any servo" if len(late) == len(self.servos) > 1 else ", ".join(map(str, late))
+        remedy = "its cable and its power" if len(late) == 1 else "cables and the motors' power"
+        silent_ms = 1e3 * reading.ages_s[reading.ages_s > allowed_s].min()
+        sentence = (
+            f"nothing was heard of {names} for {silent_ms:.0f} ms, allowed {1e3 * allowed_s:.0f} ms: check {remedy}"
+        )
+        return Fault("joint_silent", late[0].joint if len(late) == 1 else "", sentence)
 
     def _fault_of_noise(self) -> Fault | None:
         counts = self._chain.counts
         exchanges, noisy = counts.exchanges - self._noise_mark[0], counts.noisy - self._noise_mark[1]
         if exchanges >= NOISE_EXCHANGES:
             self._noise_mark = (counts.exchanges, counts.noisy)
-            self._noisy = noisy > NOISE_SHARE * exchanges
-        if not self._noisy:
+            self._noise = f"{noisy} of the last {exchanges}" if noisy > NOISE_SHARE * exchanges else ""
+        if not self._noise:
             return None
         sentence = (
-            f"more than {NOISE_SHARE:.0%} of the exchanges on the bus are damaged ({counts.noisy} of "
-            f"{counts.exchanges} so far): check cable, plugs and supply; two servos may have one ID, or another "
-            "program talks on the bus"
+            f"{self._noise} exchanges on the bus were damaged, allowed {NOISE_SHARE:.0%}: check cable, plugs and "
+            "supply; two servos may have one ID, or another program talks on the bus"
         )
         return Fault("bus_noise", "", sentence)
 
