@@ -17,6 +17,7 @@ from typing import Annotated
 import typer
 
 from paramove.cli.completions import typed_words
+from paramove.linear_algebra_threads import ONE_THREAD
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
@@ -86,6 +87,8 @@ def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> 
 
 def main() -> None:
     """Entry point of the `paramove` script."""
+    for name, number in ONE_THREAD.items():  # numpy looks when it is imported, which is later
+        os.environ.setdefault(name, number)
     build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
 
 

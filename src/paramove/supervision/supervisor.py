@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from paramove.linear_algebra_threads import ONE_THREAD
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import by_hand, exit_codes
 from paramove.supervision.control import Answer, ControlServer
@@ -278,12 +279,8 @@ def stop_waves(file: LaunchFile) -> list[list[str]]:
 
 
 def node_environment(own: Mapping[str, str]) -> dict[str, str]:
-    """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set.
-
-    Ten processes with a thread per core each would only hinder one another.
-    """
-    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    environment = {**threads, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
+    """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set."""
+    environment = {**ONE_THREAD, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
     environment.pop("PYTHONSAFEPATH", None)  # nodes are found in the workspace, their working directory
     return environment
 

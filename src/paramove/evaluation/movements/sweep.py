@@ -24,6 +24,7 @@ from typing import Any, Protocol
 from paramove.evaluation.movements.method import Method
 from paramove.evaluation.movements.tasks import Fold
 from paramove.evaluation.movements.trial import able, measure
+from paramove.linear_algebra_threads import ONE_THREAD
 
 PROTOCOL = (
     "paramove.evaluation.movements.method",
@@ -190,7 +191,7 @@ def _numbered(index: int, job: Work) -> tuple[int, dict[str, Any]]:
 
 def _one_thread() -> None:
     """Workers share the processors: a second thread in one of them only takes from another."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    for name in (*ONE_THREAD, "NUMBA_NUM_THREADS"):
         os.environ.setdefault(name, "1")
 
 
