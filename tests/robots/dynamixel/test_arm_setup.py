@@ -100,6 +100,28 @@ def test_the_line_of_a_stop_button_that_is_not_there_is_pressed_from_the_start(t
         setup(link, stop_line_pressed=2)
 
 
+def test_where_an_arm_may_go_limp_must_be_told_for_joints_that_it_has(tmp_path):
+    with pytest.raises(DescriptionError, match="needs `rest_deg`: where can the arm go limp"):
+        setup(tmp_path / "port", on_exit="rest_then_off").driven_arm(tmp_path)
+    with pytest.raises(DescriptionError, match=r"'shoulder_pam'.*nearest is 'shoulder_pan'"):
+        setup(tmp_path / "port", on_exit="rest_then_off", rest_deg={"shoulder_pam": 3.0}).driven_arm(tmp_path)
+    with pytest.raises(ValidationError, match="finite"):
+        setup(tmp_path / "port", on_exit="rest_then_off", rest_deg={"shoulder_pan": float("nan")})
+
+
+def test_with_on_exit_it_goes_limp_there(tmp_path):
+    link, rest = tmp_path / "usb-FTDI_0001-if00-port0", {"wrist_flex": 30.0}
+    with DynamixelEmulator(emulated_servos(KOCH), link) as emulator:
+        with setup(link, nominal=True, on_exit="rest_then_off", rest_deg=rest).driven_arm(tmp_path) as arm:
+            person = Person(arm)
+            person.arms_and_waits()
+        servo = emulator.bus.servos[KOCH.index("wrist_flex")]
+        pose = KOCH.base_pose.copy()
+        pose[KOCH.index("wrist_flex")] = np.deg2rad(30.0)
+        assert servo.memory["Goal Position"] == KOCH.units.to_counts(pose)[KOCH.index("wrist_flex")]
+        assert [one.memory["Torque Enable"] for one in emulator.bus.servos] == [0] * 6
+
+
 def test_a_robot_without_a_servo_bus_is_refused():
     with pytest.raises(DescriptionError, match="hoap3 has no servo bus"):
         servo_port(RobotDescription.load(FOLDER / "hoap3"), "/dev/null")

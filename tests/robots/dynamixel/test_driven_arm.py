@@ -344,6 +344,77 @@ def test_at_the_end_it_rests_and_holds_or_goes_limp(emulator, torque_off, torque
     assert person.memory("Bus Watchdog") == [0] * 5
 
 
+REST = {"joint2": float(ROBOT.base_pose[1]) + 0.2, "joint3": float(ROBOT.base_pose[2]) - 0.1}
+
+
+def test_at_the_end_it_goes_to_rest_slowly_and_then_limp(emulator, monkeypatch):
+    played = []
+    command = ServoArm.command
+    monkeypatch.setattr(ServoArm, "command", lambda arm, counts: (played.append(counts), command(arm, counts)))
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, rest=REST)) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        played.clear()
+    rest = ROBOT.base_pose.copy()
+    rest[[1, 2]] = list(REST.values())
+    assert person.goals() == list(ROBOT.units.to_counts(rest))
+    assert person.memory("Torque Enable") == [0] * 5
+    assert person.memory("Bus Watchdog") == [0] * 5
+    speeds = np.abs(np.diff(ROBOT.units.to_radians(np.array(played)), axis=0)) / 0.01
+    assert (speeds[:, 1:3].max(axis=0) > 0.05).all()
+    assert (speeds <= 0.51 * ROBOT.operating_velocity + 0.16).all()  # a count in a period
+
+
+def stops(person):
+    person.arm.on_stop(StopRequest(source="page"), time.monotonic_ns())
+    person.waits_for("HOLD")
+
+
+@pytest.mark.parametrize(
+    ("rest", "before_the_end", "why"),
+    [
+        (REST, stops, "it is not armed"),
+        (REST, PersonAtEmulator.moves, "it was moving, and stops"),
+        ({"joint1": 2.5}, lambda person: None, r"it would take 6\.0 s, and a launcher would kill this driver before"),
+        (
+            {"joint4": float(np.deg2rad(113.0))},
+            lambda person: None,
+            r"trajectory refused \(joint_limit\) at point 1, joint joint4: asked 113 deg, allowed -96.4 to 111.8 deg",
+        ),
+    ],
+    ids=["stopped", "moving", "far away", "impossible"],
+)
+def test_where_anything_is_wrong_it_does_not_go_to_rest_but_holds(emulator, caplog, rest, before_the_end, why):
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), replace(SETTINGS, torque_off=True, rest=rest)) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        before_the_end(person)
+    assert person.memory("Torque Enable") == [1] * 5
+    assert person.memory("Bus Watchdog") == [0] * 5
+    assert re.search(f"the arm holds where it is and does not go to rest: {why}", caplog.text)
+
+
+def test_the_emergency_stop_wins_over_the_way_to_rest(emulator, tmp_path, caplog):
+    button = tmp_path / "estop"
+    settings = replace(SETTINGS, rest={"joint1": 0.8}, stop_inputs=StopInputs(file=button))
+    with DrivenArm(ROBOT, joint_servos(ROBOT), port(emulator), settings) as arm:
+        person = PersonAtEmulator(arm, emulator)
+        person.arms_and_waits()
+        measured = arm._loop._arm.measured
+
+        def measured_until_it_moves():
+            reading = measured()
+            if abs(ROBOT.units.to_radians(reading.counts)[0] - ROBOT.base_pose[0]) > 0.1:
+                button.touch()
+            return reading
+
+        arm._loop._arm.measured = measured_until_it_moves
+    assert person.memory("Torque Enable") == [1] * 5
+    reached = ROBOT.units.to_radians(np.array(person.goals()))[0] - ROBOT.base_pose[0]
+    assert 0.1 <= reached < 0.5
+    assert "does not go to rest: the emergency stop is pressed" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("goes_wrong", "torque", "not_heard"),
     [

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.arm_calibration import ArmCalibration
@@ -39,6 +39,8 @@ class ServoArmSetup(BaseModel):
             at every period of the loop.
         stop_line_pressed: What it reads while the button is pressed, or its wire is cut; all but the other value is
             pressed.
+        on_exit: At a normal end: left as when it is disarmed, or slowly to `rest_deg`, then limp.
+        rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
         nominal: Whether they are even for an arm that everybody assembles differently, as in simulation.
     """
 
@@ -48,6 +50,8 @@ class ServoArmSetup(BaseModel):
     patience: Patience = Patience()
     calibration: Path | None = None
     nominal: bool = False
+    on_exit: Literal["as_disarmed", "rest_then_off"] = "as_disarmed"
+    rest_deg: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
     stop_file: Path | None = None
     stop_line: Path | None = None
     stop_line_pressed: Literal[0, 1] = 1
@@ -67,8 +71,18 @@ class ServoArmSetup(BaseModel):
         faults = () if self.nominal or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
-        settings = LoopSettings(self.torque_off, self.patience, faults, stop_inputs)
+        settings = LoopSettings(self.torque_off, self.patience, faults, stop_inputs, self._rest(description))
         return DrivenArm(description, servos, port, settings)
+
+    def _rest(self, description: RobotDescription) -> dict[str, float] | None:
+        """Angles at which the arm goes limp, rad; None: it does not. Raises InputError."""
+        if self.on_exit != "rest_then_off":
+            return None
+        if not self.rest_deg:
+            raise DescriptionError("on_exit is rest_then_off, which needs `rest_deg`: where can the arm go limp?")
+        for joint in self.rest_deg:
+            description.index(joint)
+        return {joint: float(np.deg2rad(degrees)) for joint, degrees in self.rest_deg.items()}
 
 
 def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:

@@ -9,13 +9,15 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
 from paramove.input_error import InputError
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.exit_movement import LONGEST_S, MARGIN_S, movement_to
 from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_checks import JointServo
@@ -46,12 +48,15 @@ class LoopSettings:
         patience: With silence.
         standing_faults: That keep the arm from being armed, whatever its servos say.
         stop_inputs: Files that press the emergency stop.
+        rest: Angles by joint, rad, to which the armed arm goes slowly at a normal end, and then goes limp; without time
+            or where anything is wrong it holds. None: at the end it is left as when it is disarmed.
     """
 
     torque_off: bool = False
     patience: Patience = field(default_factory=Patience)
     standing_faults: tuple[Fault, ...] = ()
     stop_inputs: StopInputs = field(default_factory=StopInputs)
+    rest: Mapping[str, float] | None = None
 
 
 class ServoLoop:
@@ -96,7 +101,7 @@ class ServoLoop:
         self._says: list[DriverSays] = []
         self._step = 0
         self._begun_s, self._silent_s = time.monotonic(), 0.0
-        self._urgent = self._ended = False
+        self._urgent = self._ended = self._normal_end = False
         self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
         self._stopped = threading.Event()
@@ -115,6 +120,7 @@ class ServoLoop:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
+        self._normal_end = kind is None
         self._stopped.set()
         self._thread.join()
         self._port.close()
@@ -145,8 +151,9 @@ class ServoLoop:
                     self._one_period()
                 self._said()
                 self._stopped.wait(max(0.0, due_s - time.monotonic()))
+            rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
             with self.lock:
-                self._end()
+                self._end(rests)
         finally:
             self._ended = True
 
@@ -192,7 +199,7 @@ class ServoLoop:
             self._urgent = True
             reader = self._reader = StreamReader(self._description, reading.counts)
         elif self._arm.holds and self.driver.state not in HOLDING and reader.at_rest:
-            self._let_go()  # not before the stop ramp is over
+            self._let_go(self._settings.torque_off)  # not before the stop ramp is over
         self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
 
     def _prepare(self) -> ArmReading | None:
@@ -234,11 +241,49 @@ class ServoLoop:
         self.lost = ""
         self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.patience)
 
-    def _let_go(self) -> None:
-        for failed in self._arm.let_go(self._settings.torque_off):
+    def _let_go(self, torque_off: bool) -> None:
+        for failed in self._arm.let_go(torque_off):
             _log.warning("a servo did not hear the last word: %s", failed)
 
-    def _end(self) -> None:
+    def _goes_to(self, rest: Mapping[str, float]) -> bool:
+        """Go to rest, slowly and through the gate; whether the arm is there. It is not where anything is wrong."""
+        ends_s, name, sentence = time.monotonic() + LONGEST_S, "", "it is not armed"
+        reader = self._reader
+        if reader is not None and not reader.at_rest:
+            reader, sentence = None, "it was moving, and stops"
+        while reader is not None and not self.lost and self.driver.state is State.ARMED:
+            if not name:
+                start = self._description.units.to_radians(reader.target)
+                message, duration_s = movement_to(self._description, start, rest, f"rest {time.monotonic_ns()}")
+                sentence = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
+                if time.monotonic() + duration_s + MARGIN_S > ends_s:
+                    break
+                name, sentence = message.id, "it was stopped on its way"
+                with self.lock:
+                    self.driver.on_trajectory(message, time.monotonic_ns())
+            elif time.monotonic() > ends_s:
+                sentence = "it took too long"
+                break
+            self._stopped_period()
+            heard = [one for says in self.take() for one in says.statuses if one.trajectory_id == name]
+            if heard and heard[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
+                return True
+            if heard and heard[-1].code == "busy":  # the movement before has not settled yet
+                name = ""
+            elif heard and heard[-1].reason:
+                sentence = heard[-1].reason
+                break
+        _log.warning("the arm holds where it is and does not go to rest: %s", self.lost or sentence)
+        return False
+
+    def _stopped_period(self) -> None:
+        """One more period of a loop that was asked to end."""
+        begun_s = time.monotonic()
+        with self.lock:
+            self._one_period()
+        time.sleep(max(0.0, begun_s + self._period_s - time.monotonic()))
+
+    def _end(self, rests: bool) -> None:
         """Come to rest by what the reader still holds, then the last word to every servo."""
         try:
             while self._arm.holds and self._reader is not None and not self._reader.at_rest:
@@ -247,4 +292,4 @@ class ServoLoop:
         except PortLostError as error:
             self.lost = str(error)
         if not self.lost:
-            self._let_go()
+            self._let_go(self._settings.torque_off if self._settings.rest is None else rests)
