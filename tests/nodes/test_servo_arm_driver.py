@@ -97,8 +97,9 @@ class Run:
 
 
 @pytest.fixture
-def run():
-    """A driver in a thread of its own, armed from a terminal."""
+def run(monkeypatch):
+    """A driver in a thread of its own, armed from a terminal; other programs may keep the emulator waiting."""
+    monkeypatch.setattr("paramove.robots.dynamixel.arm_setup.LATENCY_SHARE", 30.0)
     with tempfile.TemporaryDirectory(prefix="arm-") as name, contextlib.ExitStack() as opened:
         folder, link = Path(name), Path(name) / "usb-emulated_0001-if00-port0"
         emulator = opened.enter_context(DynamixelEmulator(emulated_servos(ROBOT), link))

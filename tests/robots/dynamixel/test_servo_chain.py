@@ -132,3 +132,30 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(chain, emulator
             servo.turned(float(place))
         found = positions(chain, 1)
         assert found in ({}, {1: place})
+
+
+@pytest.mark.parametrize(
+    ("faults", "rounds", "least"),
+    [(WireFaults(late=0.03, late_s=0.06, seed=9), 40, 100), (WireFaults(late=0.2, late_s=0.04, seed=3), 15, 0)],
+    ids=["now and then", "most of them"],
+)
+def test_an_answer_that_comes_several_questions_too_late_is_not_taken_for_another_ones(
+    chain, emulator, faults, rounds, least
+):
+    """Of different registers, in turn: what a joint's position says is no torque."""
+    chain.port.latency_s = 0.01
+    emulator.faults = faults
+    torque = [REGISTERS["Torque Enable"], REGISTERS["Hardware Error Status"]]
+    with emulator.lock:
+        for servo in emulator.bus.servos:
+            servo.turned(2048.0)  # whose first byte is 0
+            servo.hold()
+    heard = 0
+    for _ in range(rounds):
+        for found, right in (
+            (positions(chain, 1, 2, 3), 2048),
+            ({number: one.values["Torque Enable"] for number, one in chain.sync_read([1, 2, 3], torque).items()}, 1),
+        ):
+            heard += len(found)
+            assert set(found.values()) <= {right}
+    assert heard >= least

@@ -8,6 +8,7 @@ for that to the next question.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -30,8 +31,11 @@ PACKET_BYTES = 11
 """Of an answer without data."""
 MOST_BYTES = 4096
 ATTEMPTS = 3
-WIDTHS = 4
-"""After a silence, a read asks for up to three bytes more: an answer that comes too late then has the wrong length."""
+MOST_OWED, QUIET_S, LONGEST_NOISE_S = 16, 0.05, 1.0
+"""After silences, a read asks for some bytes more: an answer that comes too late then has the wrong length. Lengths of
+so many questions are remembered, until one is answered by all, behind whose answers no earlier one can come; beyond
+that the wire is left alone until it is quiet.
+"""
 PING_DATA = 3
 TURN_S = 0.003
 """For each ID's answer to a ping of all: so long waits dynamixel-sdk 4.1.0 (`broadcastPing`); a servo alone with ID 5
@@ -93,7 +97,7 @@ class WireCounts:
 
     Attributes:
         exchanges: Questions with an answer.
-        noisy: Exchanges with bytes that belonged to no sound packet, or with stray answers.
+        noisy: Exchanges with bytes that belonged to no sound packet, or with answers to nobody's question.
         asked: Answers that were expected.
         missing: Those that did not come in time.
         damaged: Packets with a wrong checksum.
@@ -125,7 +129,7 @@ class ServoChain:
         self.port = port
         self.counts = WireCounts()
         self._sdk = Protocol2PacketHandler()
-        self._width = 0
+        self._owed: deque[int] = deque(maxlen=MOST_OWED)
 
     def ping(self, number: int) -> PingedServo | None:
         """Ask one servo whether it is there."""
@@ -206,7 +210,9 @@ class ServoChain:
         self._send(lambda: self._sdk.syncWriteTxOnly(self.port, register.address, register.size, content, len(content)))
 
     def _read(self, numbers: Sequence[int], address: int, size: int) -> dict[int, Packet]:
-        wide = size + self._width
+        if len(self._owed) == MOST_OWED:
+            self._wait_for_quiet()
+        wide = next(one for one in range(size, size + MOST_OWED + 1) if one not in self._owed)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
             packet = [0, 0, 0, 0, numbers[0], 7, 0, Instruction.READ, *asked, 0, 0]
@@ -216,6 +222,14 @@ class ServoChain:
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
         )
 
+    def _wait_for_quiet(self) -> None:
+        """So much is owed that an answer to an old question could be taken for one to the next."""
+        ends_s = time.monotonic() + LONGEST_NOISE_S
+        self.port.setPacketTimeoutMillis(1e3 * QUIET_S)
+        while self.port.readPort(MOST_BYTES) and time.monotonic() < ends_s:
+            self.port.setPacketTimeoutMillis(1e3 * QUIET_S)
+        self._owed.clear()
+
     def _exchange(self, send: Callable[[], int], sizes: dict[int, int]) -> dict[int, Packet]:
         """Ask, and wait for the answer of each of these servos with so many bytes of data."""
         self._send(send)
@@ -224,12 +238,14 @@ class ServoChain:
         self.port.setPacketTimeout(answer_bytes, len(sizes))
         noisy, stray = self.counts.noisy, self.counts.stray
         answers = self._trusted(self._answers(dict(sizes)), sizes)
-        if self.counts.stray > stray:
+        if self.counts.stray > stray and not self._owed:  # else they are answers that came too late
             self.counts.noisy = noisy + 1
         missing = len(sizes) - len(answers)
         self.counts.missing += missing
         if missing:
-            self._width = (self._width + 1) % WIDTHS
+            self._owed.append(max(sizes.values()))
+        else:
+            self._owed.clear()
         return answers
 
     def _send(self, send: Callable[[], int]) -> None:
