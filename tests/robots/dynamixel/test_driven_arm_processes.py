@@ -26,7 +26,7 @@ from tests.robots.dynamixel.person import PATIENT_S, Person
 
 ROOT = Path(__file__).parents[3]
 ROBOT = RobotDescription.load(ROOT / "robot_description" / "open_manipulator_x")
-SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=0.4, read_s=1.0))
+SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=1.0, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
 TRIPPED = 0xFF
@@ -119,7 +119,7 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
         ((code, sentence),) = json.loads(driver.stdout.readline())
         assert code == "watchdog_tripped"
         assert sentence == (
-            "servo 11 (joint1) has stopped by itself, for it heard nothing for 400 ms: this computer was too busy, or "
+            "servo 11 (joint1) has stopped by itself, for it heard nothing for 1000 ms: this computer was too busy, or "
             "a cable was loose; arm again, which clears its watchdog"
         )
         assert memory(emulator, "Present Position") == rested
