@@ -40,23 +40,25 @@ class JointUnits:
         # The manual's ends are whole counts; rounding must not shut them out.
         return np.ceil(ends.min(axis=0) - 1e-6), np.floor(ends.max(axis=0) + 1e-6)
 
-    def to_counts(self, angles: ArrayLike) -> NDArray[np.int16]:
+    def to_counts(self, angles: ArrayLike, beyond: float = 0.0) -> NDArray[np.int16]:
         """Nearest integer units of joint angles.
 
         Args:
             angles: Shape [..., J], rad.
+            beyond: That a joint may lie beyond its range, rad: one that rests against its stop is measured there.
 
         Returns:
             Shape [..., J].
 
         Raises:
-            JointRangeError: Wrong number of joints, a value that is not finite, or one beyond the joint's range by more
-                than half a count. Nothing is clipped: a clipped NaN would be full travel.
+            JointRangeError: Wrong number of joints, a value that is not finite, or one farther beyond the joint's
+                range than by half a count. Nothing is clipped: a clipped NaN would be full travel.
         """
         values = self._checked(angles, "angles")
         counts = np.rint(self.zero_counts + self.counts_per_rad * values)
         low, high = self.counts_range()
-        self._refuse_first(values, (counts < low) | (counts > high))
+        slack = np.abs(self.counts_per_rad) * beyond
+        self._refuse_first(values, (counts < low - slack) | (counts > high + slack))
         return counts.astype(np.int16)
 
     def to_radians(self, counts: ArrayLike) -> NDArray[np.float64]:

@@ -95,6 +95,16 @@ def test_it_moves_as_it_is_told(person):
     assert all(motor.heard and motor.voltage_v == pytest.approx(12.0, abs=0.01) for motor in person.motors.motors)
 
 
+def test_an_arm_with_a_joint_at_its_stop_a_little_beyond_its_range_moves(person):
+    beyond = ROBOT.units.zero_counts[2] + ROBOT.units.counts_per_rad[2] * (ROBOT.upper[2] + np.deg2rad(0.3))
+    with person.emulator.lock:
+        person.emulator.bus.servos[2].turned(float(round(beyond)))
+    person.arms_and_waits()
+    person.says("a", ROBOT.joint_names[:1], [(0.0, [0.0]), (1.0, [0.2])])
+    person.is_told("SUCCEEDED")
+    assert person.goals()[2] == round(beyond)
+
+
 def test_nothing_moves_before_it_is_armed(person):
     person.waits_for("DISARMED")
     person.sends(person.away())

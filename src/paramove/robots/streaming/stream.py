@@ -22,6 +22,8 @@ MAX_FRAMES = 5000
 # Accelerations are judged over spans of this length, at least one frame: over 1 ms, rounding to counts is larger than
 # the limit.
 SPAN_S = 0.004
+BEYOND = float(np.deg2rad(2.0))
+"""A joint that rests so far beyond its range, against its stop, may be kept there; the gate judges how far it may."""
 _FRAME_TYPE = np.dtype("<i2")
 
 
@@ -46,7 +48,7 @@ class StreamWriter:
         Raises:
             JointRangeError: A value that the robot's integer units cannot hold.
         """
-        frames = self._units.to_counts(rows)
+        frames = self._units.to_counts(rows, BEYOND)
         content = frames.astype(_FRAME_TYPE).tobytes()
         return StreamBatch(
             epoch=self.epoch,
@@ -86,7 +88,8 @@ class StreamReader:
         self._step = np.floor(counts_per_rad * description.velocity * period_s) + 1
         self._span = max(1, round(SPAN_S / period_s))
         self._bend = np.floor(counts_per_rad * description.stop_acceleration * (self._span * period_s) ** 2) + 2
-        self._low, self._high = self._units.counts_range()
+        low, high = self._units.counts_range()
+        self._low, self._high = np.minimum(low, held_counts), np.maximum(high, held_counts)  # what is held may stay
         # The last two spans of played frames, then the frames to come.
         self._played = np.repeat(np.asarray(held_counts, dtype=np.int16)[None], 2 * self._span, axis=0)
         self._coming = self._played[:0]
