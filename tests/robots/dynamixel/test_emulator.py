@@ -16,6 +16,7 @@ from dynamixel_sdk import (
     port_handler,
 )
 
+from paramove.input_error import InputError
 from paramove.robots.dynamixel import emulated_servo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import TCGETS2, TERMIOS2, DynamixelEmulator
@@ -290,6 +291,20 @@ def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
         assert PacketHandler(2.0).ping(port, 1)[0] == 1060
         port.closePort()
     assert not link.exists()
+
+
+def test_the_port_of_a_running_emulator_is_not_taken_from_it(tmp_path):
+    link = tmp_path / "usb-emulated"
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:
+        with pytest.raises(InputError, match="usb-emulated is the port of another emulator, which is running"):
+            DynamixelEmulator([EmulatedServo(XL430_W250)], link)
+        emulator.unplug()
+        with pytest.raises(InputError, match="another emulator"):
+            DynamixelEmulator([EmulatedServo(XL430_W250)], link)
+        emulator.plug_in()
+        assert str(link.resolve()) == emulator.port
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:
+        assert str(link.resolve()) == emulator.port
 
 
 def test_a_pulled_plug_ends_the_port_and_a_new_one_has_the_old_link(tmp_path):

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import fcntl
+import hashlib
 import os
 import select
+import socket
 import struct
 import threading
 import time
@@ -42,6 +46,9 @@ class DynamixelEmulator:
         link: A symbolic link to make to the port, so that its name does not change from run to run.
         mechanics: What the servos move, in the same order; without, each carries nothing.
 
+    Raises:
+        InputError: Something else is in the place of the link, or another emulator serves it.
+
     Attributes:
         faults: What goes wrong on the wire; may be replaced at any time.
         port: Name of the terminal; another one after `plug_in`.
@@ -60,7 +67,11 @@ class DynamixelEmulator:
         self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
         self._wanted = self.plugged_in = False
         self._error: Exception | None = None
-        self._open()
+        with contextlib.ExitStack() as claimed:
+            if link is not None:
+                claimed.enter_context(_claim(link))
+            self._open()
+            self._claimed = claimed.pop_all()
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -73,6 +84,7 @@ class DynamixelEmulator:
         self._thread.join()
         if self.plugged_in:
             self._close()
+        self._claimed.close()
 
     def check(self) -> None:
         """Raises RuntimeError if the thread that serves the port has ended by an error."""
@@ -157,3 +169,19 @@ class DynamixelEmulator:
             if early_s > 0.0:
                 self._stopped.wait(early_s)
             os.write(self._ours, answer)
+
+
+def _claim(link: Path) -> socket.socket:
+    """Keeps other emulators from this link, also those of other programs, until it is closed or its program ends."""
+    claim = socket.socket(socket.AF_UNIX)
+    name = hashlib.sha256(os.fsencode(link.absolute())).hexdigest()
+    try:
+        claim.bind(f"\0paramove-emulator-{name}")  # of the system, not of a folder: nothing is left behind
+    except OSError as error:
+        claim.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise InputError(
+            f"{link} is the port of another emulator, which is running: end that one, or name another place"
+        ) from None
+    return claim
