@@ -80,7 +80,7 @@ def test_a_refusal_is_told_with_every_reason():
 
 @pytest.mark.parametrize(
     ("sentences", "told"),
-    [(["servo 12 is silent"], "not armed: servo 12 is silent"), ([], "not armed: no answer within 3 s; press a again")],
+    [(["servo 12 is silent"], "not armed: servo 12 is silent"), ([], "not armed: no answer within 2 s; press a again")],
 )
 def test_the_same_refusal_again_and_no_answer_at_all_are_told_after_a_while(sentences, told):
     key = hearing("DISARMED", *sentences)

@@ -6,7 +6,7 @@ from paramove.msgs.safety_state_pb2 import SafetyState
 
 WAITS_S = 1.0
 """For a gate that cannot hear the word yet: so long a person who pressed a key still looks."""
-ANSWER_S = 3.0
+ANSWER_S = 2.0
 """The driver looks at all servos before it answers."""
 HEARING = (SafetyState.STATE_DISARMED, SafetyState.STATE_HOLD)
 
