@@ -22,6 +22,8 @@ VELOCITY_UNIT = 0.229 * 2.0 * math.pi / 60.0
 """rad/s of one unit, 0.229 rev/min (e-Manual, "Profile Velocity")."""
 ROUND_TRIPS = 20
 ENDS = ("Min", "Max")
+ENDED = "once this driver has ended,"
+"""One program uses the adapter at a time."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def hardware_fault(servo: JointServo, error: int) -> Fault:
     known = hardware_errors(error)
     sentence = (
         f"{servo} has a hardware error: {' and '.join(one.words for one in known)} (register 70 is 0x{error:02x}); "
-        f"{'; '.join(one.remedy for one in known)}; then `paramove arm reboot {servo.number}`"
+        f"{'; '.join(one.remedy for one in known)}; then, {ENDED} `paramove arm reboot {servo.number}`"
     )
     return Fault("hardware_error", servo.joint, sentence)
 
@@ -140,7 +142,7 @@ def watchdog_fault(servo: JointServo, watchdog_s: float) -> Fault:
 def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
     pinged = chain.ping(servo.number) or chain.ping(servo.number)
     if pinged is None:
-        sentence = f"{servo} does not answer: check cable, power and ID; `paramove arm scan` looks for it"
+        sentence = f"{servo} does not answer: check cable, power and ID; {ENDED} `paramove arm scan` looks for it"
         return [Fault("servo_missing", servo.joint, sentence)]
     if pinged.model_number != servo.model.number:
         sentence = (
@@ -165,7 +167,7 @@ def _faults_of_settings(servo: JointServo, chain: ServoChain) -> Iterable[Fault]
     for name, value in wanted.items():
         found = chain.read(servo.number, servo.model.registers[name])
         if found != value:
-            sentence = f"{servo} has {name} {found}, expected {value}: `paramove arm verify --write` sets it"
+            sentence = f"{servo} has {name} {found}, expected {value}: {ENDED} `paramove arm verify --write` sets it"
             if name in servo.fence:
                 sentence += ", `--adopt` takes it over into the calibration"
             yield Fault("servo_settings", servo.joint, sentence)
