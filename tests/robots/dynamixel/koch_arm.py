@@ -50,5 +50,5 @@ def hands(emulator: DynamixelEmulator) -> list[Step]:
     steps: list[Step] = [(rest, "\n")]
     steps += [(move(share(part)), "look\n") for part in (*np.linspace(0.5, 0.0, 5), *np.linspace(0.0, 1.0, 9))]
     steps += [(rest, "\n"), (move(dict.fromkeys((one.joint for one in PLAN.servos), 0.0)), "\n")]
-    steps += [(move({one.joint: 0.3}), "\n") for one in PLAN.servos]
+    steps += [(move({one.joint: 0.3 if one.grows else -0.3}), "\n") for one in PLAN.servos]
     return [*steps, (rest, "\n")]
