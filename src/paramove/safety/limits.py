@@ -6,7 +6,7 @@ nominal one, never a measured one: a loop that stalled must not be allowed a lar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,10 @@ STOP_JERK_FACTOR = 2.0
 
 @dataclass(frozen=True)
 class Violation:
-    """One value that breaks a rule. `asked` and `allowed` are in `unit`; `allowed` is the text of a limit or range."""
+    """One value that breaks a rule. `asked` and `allowed` are in `unit`; `allowed` is the text of a limit or range.
+
+    `step` is where a jump begins and ends, deg; None for other rules.
+    """
 
     code: str
     row: int
@@ -44,6 +47,7 @@ class Violation:
     asked: float
     allowed: str
     unit: str
+    step: tuple[float, float] | None = None
 
     @property
     def sentence(self) -> str:
@@ -56,9 +60,9 @@ class Violation:
             "acceleration": "accelerates too hard",
             "jerk": "changes its acceleration too fast",
         }[self.code]
-        return (
-            f"joint {self.joint} {what} at row {self.row}: asked {self.asked:.4g} {self.unit}, allowed {self.allowed}"
-        )
+        way = "" if self.step is None else f" from {self.step[0]:.4g} to {self.step[1]:.4g} deg"
+        where = f"joint {self.joint} {what}{way} at row {self.row}"
+        return f"{where}: asked {self.asked:.4g} {self.unit}, allowed {self.allowed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +157,9 @@ class MotionLimits:
         ):
             # Written so that a NaN would be a violation too.
             violation = self._first(code, ~(np.abs(found) <= limit), np.abs(found), unit, limit)
+            if violation is not None and code == "jump":
+                step = whole[h + violation.row - 1 : h + violation.row + 1, self.names.index(violation.joint)]
+                return replace(violation, step=(float(np.rad2deg(step[0])), float(np.rad2deg(step[1]))))
             if violation is not None:
                 return violation
         return None

@@ -113,7 +113,7 @@ RADIANS = np.rint(np.repeat(PATH[:1], 20, axis=0))
         (changed(epoch=0), "epoch 0"),
         (changed(stop_ramp_frames=10_000), "stop ramp of 10000"),
         (StreamBatch(epoch=EPOCH, period_us=1000, joint_count=28), "0 bytes"),
-        (recoded(JUMP), "right_shoulder_pitch: a step of 424 counts, allowed 57"),
+        (recoded(JUMP), "right_shoulder_pitch: a step of 424 counts from 18810 to 19234, allowed 57"),
         (recoded(RADIANS), "head_tilt: 0 counts, allowed 15 to 75"),
         (recoded(np.full((10, 28), 32767)), "32767 counts, allowed"),
         (recoded(np.zeros((10, 20)), 20), "20 joints"),
@@ -179,7 +179,13 @@ def test_more_frames_than_the_buffer_takes_are_refused() -> None:
     assert robot.offer(recoded(np.repeat(HELD[None], 5000, axis=0)))
     assert not robot.offer(recoded(np.repeat(HELD[None], 5001, axis=0)))
     assert "allowed 1 to 5000 frames" in robot.refusal
+    appended = recoded(HELD[None])
+    appended.first_index = 5000
+    assert not robot.offer(appended)
+    assert robot.refusal == "5001 frames to be played, allowed 5000: the buffer is full"
     assert robot.depth == 5000
+    robot.play()
+    assert robot.offer(appended)
 
 
 def moving() -> StreamReader:

@@ -136,7 +136,7 @@ class StreamReader:
         refusal = self._refusal_of_form(batch)
         if not refusal:
             frames = np.frombuffer(batch.frames, dtype=_FRAME_TYPE).reshape(-1, batch.joint_count).astype(np.int16)
-            refusal = self._refusal_of_place(batch) or self._refusal_of_frames(batch, frames)
+            refusal = self._refusal_of_place(batch, len(frames)) or self._refusal_of_frames(batch, frames)
         if refusal:
             self.refused_batches += 1
             self.refusal = refusal
@@ -180,13 +180,16 @@ class StreamReader:
         found = zlib.crc32(batch.frames)
         return "" if found == batch.crc else f"CRC {found:08x}, the batch says {batch.crc:08x}"
 
-    def _refusal_of_place(self, batch: StreamBatch) -> str:
+    def _refusal_of_place(self, batch: StreamBatch, n_frames: int) -> str:
         if batch.epoch != self.epoch:
             return "" if self.at_rest else f"epoch {batch.epoch} while {self.epoch} is played; allowed only at rest"
         if batch.first_index < self.next_index:
             return f"first index {batch.first_index}, played up to {self.next_index}: too late"
         end = self.next_index + self.depth
-        return "" if batch.first_index <= end else f"first index {batch.first_index}, allowed up to {end}: a gap"
+        if batch.first_index > end:
+            return f"first index {batch.first_index}, allowed up to {end}: a gap"
+        depth = batch.first_index + n_frames - self.next_index
+        return "" if depth <= MAX_FRAMES else f"{depth} frames to be played, allowed {MAX_FRAMES}: the buffer is full"
 
     def _refusal_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
         kept = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
@@ -198,11 +201,13 @@ class StreamReader:
         bends = np.abs(whole[2 * span :] - 2 * whole[span:-span] + whole[: -2 * span])
         for values, bad, what in (
             (frames, outside, "{0:.0f} counts, allowed {1:.0f} to {2:.0f}"),
-            (steps, steps > self._step, "a step of {0:.0f} counts, allowed {3:.0f}"),
+            (steps, steps > self._step, "a step of {0:.0f} counts from {5:.0f} to {6:.0f}, allowed {3:.0f}"),
             (bends, bends > self._bend, "speed changes by {0:.0f} counts in " + f"{span} frames, allowed {{4:.0f}}"),
         ):
             if bad.any():
                 row, joint = (int(i) for i in np.argwhere(bad)[0])
                 limits = (self._low[joint], self._high[joint], self._step[joint], self._bend[joint])
-                return f"frame {row}, joint {self._units.names[joint]}: " + what.format(values[row, joint], *limits)
+                way = whole[2 * span - 1 + row : 2 * span + 1 + row, joint]
+                told = what.format(values[row, joint], *limits, *way)
+                return f"frame {row}, joint {self._units.names[joint]}: {told}"
         return ""
