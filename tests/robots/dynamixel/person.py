@@ -42,9 +42,16 @@ class Person:
         self.arm.on_arm_request(ArmRequest(source="person", armed=True), time.monotonic_ns())
 
     def arms_and_waits(self) -> None:
+        """Says the word again whenever it was heard too late: other programs may keep the arm waiting."""
         self.waits_for("DISARMED")
         self.arms()
-        self.waits_for("ARMED")
+        self.hears_until(self._is_armed)
+
+    def _is_armed(self) -> bool:
+        if any(fault.code == "arming_stale" for fault in self.safety.faults):
+            self.safety = SafetyState()  # what was told once is answered once
+            self.arms()
+        return self.safety.state == SafetyState.STATE_ARMED
 
     def says(self, name: str, joints, points) -> None:
         """A trajectory of pairs of time, s, and angles, rad."""
