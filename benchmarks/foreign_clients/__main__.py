@@ -22,12 +22,14 @@ from rich.table import Table
 HERE = Path(__file__).parent
 ENVIRONMENT = HERE.parents[1] / "build" / "foreign_clients"
 PYTHON = ENVIRONMENT / "bin" / "python"
+# Of dynamixel-sdk the release that LeRobot asks for; 4.1.0 empties its input before each question, and dynamixel_api
+# reads late on purpose.
 ALONE = ("lerobot==0.4.4",)  # installed without what it asks for: a deep learning framework
 PACKAGES = (
     "rustypot==1.13.1",
     "pypot==5.0.2",
     "dynamixel_api==1.0.3",
-    "dynamixel-sdk==4.1.0",
+    "dynamixel-sdk==3.8.4",
     "numpy<2",
     "deepdiff",
     "tqdm",
