@@ -206,6 +206,9 @@ def test_what_was_found_before_the_silence_stays_and_refusals_to_arm_do_not() ->
     arm.arm(arming_faults=(MODEL,))
     assert arm.core.faults == (MODEL,)
     assert arm.step(ms=501, measured=None)[1:] == (State.DISCONNECTED, ("robot_silent",))
+    arm.step()
+    arm.arm(arming_faults=(MODEL,))
+    assert arm.step(stop=VOLTAGE)[1:] == (State.HOLD, (VOLTAGE.code,))
 
 
 def test_a_joint_that_is_held_is_given_way_to_in_motion() -> None:

@@ -256,10 +256,10 @@ class SafetyCore:
 
     def _latch(self, now_ns: int, fault: Fault) -> None:
         """A fault while nothing is let through: it stays until a new arm word, and so nobody arms by an older one."""
-        self._add(fault)
         self._disarm_after_stop = False
-        if self.state is State.DISARMED:
-            self.state = State.HOLD
+        if self.state is State.DISARMED:  # what kept somebody from arming before is no more of interest
+            self.state, self.faults = State.HOLD, ()
+        self._add(fault)
         self._heard_ns = max(self._heard_ns, now_ns)
 
     def _moving(self, measured: Measured) -> bool:

@@ -224,7 +224,9 @@ def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, monkey
     assert (fault.code, fault.joint) == ("torque_lost" if sentence == TORQUE_LOST else "hardware_error", "joint2")
     assert sentence in fault.sentence
     assert fault.sentence.startswith("servo 12 (joint2) has ")
-    assert sentence == TORQUE_LOST or fault.sentence.endswith("then `paramove arm reboot 12`")
+    assert sentence == TORQUE_LOST or fault.sentence.endswith(
+        "then, once this driver has ended, `paramove arm reboot 12`"
+    )
     assert person.is_told("STOPPED").reason.startswith(fault.sentence)
     assert [person.memory("Torque Enable")[place] for place in (0, 2, 3, 4)] == [1] * 4
     rested = person.goals()

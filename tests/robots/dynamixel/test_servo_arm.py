@@ -143,8 +143,8 @@ def test_a_calibrated_arm_whose_position_limits_are_others_is_not_armed(emulator
     (fault,) = arm.check()
     assert (fault.code, fault.joint) == ("servo_settings", "wrist")
     assert fault.sentence == (
-        f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}: `paramove arm verify --write` "
-        "sets it, `--adopt` takes it over into the calibration"
+        f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}: once this driver has ended, "
+        "`paramove arm verify --write` sets it, `--adopt` takes it over into the calibration"
     )
     assert memory(emulator, "Torque Enable") == [0, 0, 0]
 
