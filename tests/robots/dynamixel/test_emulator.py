@@ -1,6 +1,8 @@
 """To the unmodified dynamixel-sdk the emulated port is a bus of servos, in all that its sample programs do."""
 
 import fcntl
+import os
+import termios
 import time
 
 import pytest
@@ -19,7 +21,7 @@ from dynamixel_sdk import (
 from paramove.input_error import InputError
 from paramove.robots.dynamixel import emulated_servo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import TCGETS2, TERMIOS2, DynamixelEmulator
+from paramove.robots.dynamixel.emulator import TCGETS2, TERMIOS2, TIOCGEXCL, DynamixelEmulator
 from paramove.robots.dynamixel.packets import StatusError
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, XL330_M288, XL430_W250, XM430_W350
 
@@ -243,6 +245,25 @@ def test_a_rate_that_is_set_as_a_number_and_not_by_its_name_is_the_same_rate(cli
     fcntl.ioctl(client.port.ser.fileno(), TCSETS2, TERMIOS2.pack(*modes))
     assert client.emulator.baud_rate == baud_rate
     assert client.handler.ping(client.port, 1) == (XL430_W250.number, COMM_SUCCESS, 0)
+
+
+def test_a_program_that_was_killed_does_not_keep_the_port_from_the_next(client):
+    client.port.closePort()
+    emulator = client.emulator
+    first = os.open(emulator.port, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(first, fcntl.LOCK_EX)
+    fcntl.ioctl(first, termios.TIOCEXCL)
+
+    def exclusive() -> bool:
+        return fcntl.ioctl(emulator._theirs, TIOCGEXCL, bytes(4)) != bytes(4)
+
+    for _ in range(5):  # idle rounds of the emulator
+        emulator._stopped.wait(0.01)
+        assert exclusive()
+    os.close(first)  # as when it is killed
+    client.until(lambda: not exclusive())
+    assert client.port.openPort()
+    assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
 
 
 def test_status_return_level(client):

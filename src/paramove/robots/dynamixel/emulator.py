@@ -10,6 +10,7 @@ import os
 import select
 import socket
 import struct
+import termios
 import threading
 import time
 import tty
@@ -31,6 +32,8 @@ MOST_BYTES = 4096
 TCGETS2 = 0x802C542A
 """Settings of a line with its rates as numbers (Linux, asm-generic/ioctls.h). Python's `termios` reads only rates that
 have a name; pyserial sets those, programs in Rust set numbers."""
+TIOCGEXCL = 0x80045440
+"""Whether a program has asked to be the only one at the line (Linux, asm-generic/ioctls.h)."""
 TERMIOS2 = struct.Struct("4I B 19s 2I")
 """Input, output, control and local modes, line discipline, control characters, input and output speed."""
 
@@ -158,7 +161,21 @@ class DynamixelEmulator:
             self._stopped.wait(IDLE_S)
             return b""
         ready, _, _ = select.select([self._ours], [], [], IDLE_S)
+        if not ready:
+            self._forget_who_was_killed()
         return os.read(self._ours, MOST_BYTES) if ready else b""
+
+    def _forget_who_was_killed(self) -> None:
+        """A program that was the only one at the line, and is no more, leaves it closed to others while it is open.
+
+        A real one would not be: nobody else has it open, as this emulator has. Such programs hold a lock on it, too.
+        """
+        if not struct.unpack("i", fcntl.ioctl(self._theirs, TIOCGEXCL, bytes(4)))[0]:
+            return
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(self._theirs, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.ioctl(self._theirs, termios.TIOCNXCL)
+            fcntl.flock(self._theirs, fcntl.LOCK_UN)
 
     def _say(self, question: bytes, answers: list[tuple[float, bytes]]) -> None:
         byte_s = BITS_PER_BYTE / self.baud_rate if self.baud_rate else 0.0
