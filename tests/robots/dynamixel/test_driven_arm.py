@@ -255,7 +255,7 @@ def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_some
 
 def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):
     person.arms_and_waits()
-    person.port.latency_s = 0.005
+    person.port.latency_s = 0.02
     person.moves()
     person.emulator.faults = WireFaults(damaged=0.2, seed=1)
     person.waits_for("HOLD")
@@ -269,7 +269,7 @@ def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):
 
 def test_a_second_servo_of_one_id_stops_the_arm(person):
     person.arms_and_waits()
-    person.port.latency_s = 0.005
+    person.port.latency_s = 0.02
     person.moves()
     with person.emulator.lock:
         person.emulator.bus.add(EmulatedServo(XL430_W250, 12, 1_000_000))
