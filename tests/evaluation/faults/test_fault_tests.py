@@ -68,6 +68,29 @@ def test_pytest_that_runs_nothing_is_told_in_its_own_words(tmp_path: Path) -> No
         run_tests([row("P1", "test_all.py::test_renamed")], tmp_path, lambda *_: None)
 
 
+@pytest.mark.parametrize("end", ["os._exit(3)", "os.kill(os.getpid(), signal.SIGKILL)", "pytest.exit('enough')"])
+def test_pytest_that_ends_early_is_told_with_how_far_it_came(tmp_path: Path, end: str) -> None:
+    test = f"import os, signal, pytest\n\ndef test_ends():\n    {end}\n"
+    (tmp_path / "test_all.py").write_text(TESTS + test)
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    rows = [
+        row("P1", "test_all.py::test_good"),
+        row("P2", "test_all.py::test_ends"),
+        row("P3", "test_all.py::test_bad"),
+    ]
+    with pytest.raises(TestsNotRunError, match=r"ended with -?\d after 2 tests"):
+        run_tests(rows, tmp_path, lambda *_: None)
+
+
+def test_what_a_test_replaces_does_not_reach_its_report(tmp_path: Path) -> None:
+    test = "import builtins, pathlib\n\ndef test_replaces(monkeypatch):\n"
+    test += "    monkeypatch.setattr(pathlib.Path, 'open', None)\n    monkeypatch.setattr(builtins, 'open', None)\n"
+    (tmp_path / "test_all.py").write_text(test)
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    (result,) = run_tests([row("P1", "test_all.py::test_replaces")], tmp_path, lambda *_: None)
+    assert result.outcome == "passed"
+
+
 def test_a_test_that_no_longer_exists_is_missing_even_if_others_of_the_row_pass() -> None:
     told = [{"test": "a.py::test_x", "outcome": "passed", "message": []}]
     (result,) = judge([row("P1", "a.py::test_x", "a.py::test_gone")], told)

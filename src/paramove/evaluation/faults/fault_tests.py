@@ -17,11 +17,11 @@ from paramove.evaluation.faults.fault_page import FaultRow
 from paramove.evaluation.faults.pytest_results import FILE_VARIABLE
 
 LOOK_S = 0.2
-_NOTHING_RAN = (2, 3, 4, 5)  # exit codes of pytest: interrupted, internal error, wrong use, no tests
+_ALL_RAN = (0, 1)  # exit codes of pytest; the others: interrupted, internal error, wrong use, no tests
 
 
 class TestsNotRunError(RuntimeError):
-    """pytest ran no test; the message is its own."""
+    """pytest did not run all tests; the message is its own."""
 
     __test__ = False
 
@@ -80,11 +80,12 @@ def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int
                 if process.poll() is None:
                     process.terminate()
                 process.wait()
-            told = _read(file)
-            if not any("test" in line for line in told):
+            told = [line for line in _read(file) if "test" in line]
+            if process.returncode not in _ALL_RAN or not told:
                 output.seek(0)
-                raise TestsNotRunError(f"pytest ended with {process.returncode}:\n{output.read()[-2000:]}")
-    return judge(rows, [line for line in told if "test" in line])
+                said = output.read()[-2000:]
+                raise TestsNotRunError(f"pytest ended with {process.returncode} after {len(told)} tests:\n{said}")
+    return judge(rows, told)
 
 
 def judge(rows: Iterable[FaultRow], told: Sequence[dict[str, Any]]) -> list[RowResult]:
