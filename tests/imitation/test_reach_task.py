@@ -41,10 +41,11 @@ def test_goes_back_to_the_base_pose_at_the_end() -> None:
 def test_begins_where_the_arm_rests_and_not_before() -> None:
     start = reaching("koch_v1_1").reach((0.12, -0.1, 0.12)).angles[-1]
     cell = ServoCell("koch_v1_1", start=start)
-    cell.safety = SafetyState(state=SafetyState.STATE_DISARMED)
+    assert cell.task.sentence == "waiting for the arm's driver"
+    cell.disarm(SafetyState.STATE_DISARMED, "servo 3 does not answer")
     cell.tick(20)
     assert not cell.sent
-    assert cell.task.sentence == "waiting for the arm"
+    assert cell.task.sentence == "waiting until a person arms the arm (paramove arm enable); servo 3 does not answer"
     for number in range(12):
         if number == 4:
             cell.safety = SafetyState(state=SafetyState.STATE_ARMED)

@@ -126,7 +126,7 @@ class ReachTask:
         self._running: _Running | None = None
         self._says = ReachSays()
         self._now_ns = 0
-        self.sentence = "waiting for the arm"
+        self._unarmed = self.sentence = "waiting for the arm's driver"
         self.failure = ""
         self.finished = False
         self._rehearse()
@@ -139,6 +139,8 @@ class ReachTask:
         """Hear the safety gate's state."""
         self._armed = message.state == SafetyState.STATE_ARMED
         self._watch.on_safety(message, self._now_ns * 1e-9)
+        why = "".join(f"; {fault.sentence}" for fault in message.faults)
+        self._unarmed = f"waiting until a person arms the arm (paramove arm enable){why}"
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
         """Hear how the driver fares with the motion under way."""
@@ -200,6 +202,7 @@ class ReachTask:
             self._fail(f"the arm has no joint {absent}: give the reacher the same `robot` as the arm's driver")
             return
         if not self._armed:
+            self.sentence = self._unarmed
             return
         if self._at is None:
             self._at = self._joints.settled(self._now_ns)
