@@ -22,7 +22,7 @@ from paramove.input_error import InputError
 from paramove.robots.dynamixel import emulated_servo
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import TCGETS2, TERMIOS2, TIOCGEXCL, DynamixelEmulator
-from paramove.robots.dynamixel.packets import StatusError
+from paramove.robots.dynamixel.packets import Instruction, Packet, StatusError, encoded
 from paramove.robots.dynamixel.servo_models import BAUD_RATES, XL330_M288, XL430_W250, XM430_W350
 
 TORQUE, LED, GOAL, PRESENT, MODE, WATCHDOG, ERROR_STATUS = 64, 65, 116, 132, 11, 98, 70
@@ -264,6 +264,24 @@ def test_a_program_that_was_killed_does_not_keep_the_port_from_the_next(client):
     client.until(lambda: not exclusive())
     assert client.port.openPort()
     assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
+
+
+def test_a_program_that_never_reads_does_not_stop_the_servos(client):
+    """The port of a computer drops what it cannot hold; so does this one."""
+    client.servo(1).memory["Baud Rate"] = 6  # quick
+    client.port.setBaudRate(4_000_000)
+    question = encoded(Packet(1, Instruction.READ, bytes([0, 0, 0x95, 0x02])))
+    for _ in range(60):  # 40 kB of answers
+        client.port.ser.write(question)
+    client.port.ser.write(encoded(Packet(1, Instruction.WRITE, bytes([LED, 0, 1]))))
+
+    def heard():
+        with client.emulator.lock:
+            return client.servo(1).memory["LED"] == 1
+
+    client.until(heard)
+    led = (1, COMM_SUCCESS, 0)
+    client.until(lambda: client.handler.read1ByteTxRx(client.port, 1, LED) == led)  # behind what the port still held
 
 
 def test_status_return_level(client):

@@ -112,6 +112,7 @@ class DynamixelEmulator:
     def _open(self) -> None:
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
+        os.set_blocking(self._ours, False)
         self.port = os.ttyname(self._theirs)
         if self._link is not None:
             if self._link.exists() and not self._link.is_symlink():
@@ -185,7 +186,8 @@ class DynamixelEmulator:
             early_s = free_s - self._now_s()
             if early_s > 0.0:
                 self._stopped.wait(early_s)
-            os.write(self._ours, answer)
+            with contextlib.suppress(BlockingIOError):  # a client that never reads loses what its port cannot hold
+                os.write(self._ours, answer)
 
 
 def _claim(link: Path) -> socket.socket:
