@@ -83,7 +83,7 @@ def calibration() -> ArmCalibration:
         ends = sorted(round(zero + sign * COUNTS_PER_RAD * end) for end in RANGE)
         crosses = not 64 <= ends[0] <= ends[1] < PULSES_PER_TURN - 64
         joints[servo.joint] = JointCalibration(
-            id=servo.number, model=servo.model, firmware=45, sign=sign, operating_mode=4 if crosses else 3,
+            id=servo.number, model=servo.model, firmware=46, sign=sign, operating_mode=4 if crosses else 3,
             homing_offset=0, zero_counts=zero, min_counts=ends[0], max_counts=ends[1],
         )  # fmt: skip
     bus = CalibratedBus(serial=SERIAL, baud_rate=BAUD_RATE)

@@ -24,7 +24,7 @@ PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0)
 def one_of(place: int) -> JointCalibration:
     """A joint of which only a half of the travel was shown, and whose zero is somewhere else."""
     return JointCalibration(
-        id=place + 1, model=KOCH.motors[place], firmware=45, sign=1, operating_mode=3, homing_offset=0,
+        id=place + 1, model=KOCH.motors[place], firmware=46, sign=1, operating_mode=3, homing_offset=0,
         zero_counts=2000 + place, min_counts=1500, max_counts=2010 + place,
     )  # fmt: skip
 

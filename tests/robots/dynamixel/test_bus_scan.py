@@ -71,7 +71,7 @@ def test_servos_of_all_baud_rates_are_found():
     ]
     assert [one.torque for one in found.servos] == [False, False, True]
     assert found.servos[0].voltage == pytest.approx(11.1)
-    assert (found.servos[0].temperature, found.servos[0].firmware) == (30, 45)
+    assert (found.servos[0].temperature, found.servos[0].firmware) == (30, 46)
     assert in_words(found.servos[1].hardware_error) == "overheated, overloaded"
     assert (found.asked, found.findings()) == (list(USUAL_BAUD_RATES), [])
 

@@ -94,7 +94,7 @@ def test_ping(port):
 def test_broadcast_ping(port):
     found, result = packets.broadcastPing(port)
     assert result == COMM_SUCCESS
-    assert found == {1: [1060, 45], 2: [1020, 45], 3: [1030, 45]}
+    assert found == {1: [1060, 46], 2: [1020, 46], 3: [1030, 46]}
 
 
 def test_read_write(port):

@@ -22,7 +22,7 @@ PATIENT_S, PERIOD_S, WATCHDOG_UNITS = 0.3, 1.0, 127
 JOINTS = (JointServo("pan", 1, XL430_W250), JointServo("lift", 2, XL430_W250), JointServo("wrist", 3, XL330_M288))
 PLACES = (1000.0, 2000.0, 3000.0)
 WITHIN_A_TURN = JointCalibration(
-    id=3, model="xl330_m288", firmware=45, sign=1, operating_mode=3, homing_offset=0, zero_counts=3000,
+    id=3, model="xl330_m288", firmware=46, sign=1, operating_mode=3, homing_offset=0, zero_counts=3000,
     min_counts=2000, max_counts=4000,
 )  # fmt: skip
 
@@ -278,7 +278,7 @@ def test_the_last_word_goes_to_every_servo_even_if_one_does_not_answer(arm, emul
 
 def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_is_in(emulator, port):
     across = JointCalibration(
-        id=3, model="xl330_m288", firmware=45, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
+        id=3, model="xl330_m288", firmware=46, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
         min_counts=3000, max_counts=5200,
     )  # fmt: skip
     with emulator.lock:

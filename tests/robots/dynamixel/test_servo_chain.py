@@ -42,8 +42,8 @@ def positions(chain: ServoChain, *numbers: int) -> dict[int, int]:
 
 
 def test_who_is_there(chain):
-    assert chain.ping(2) == PingedServo(2, 1200, 45)
-    assert chain.ping_all() == [PingedServo(1, 1060, 45), PingedServo(2, 1200, 45), PingedServo(3, 1200, 45)]
+    assert chain.ping(2) == PingedServo(2, 1200, 46)
+    assert chain.ping_all() == [PingedServo(1, 1060, 46), PingedServo(2, 1200, 46), PingedServo(3, 1200, 46)]
     assert impatient(chain).ping(7) is None
 
 

@@ -7,7 +7,7 @@ from enum import IntFlag
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.emulated_hand import Hand
-from paramove.robots.dynamixel.emulated_loops import STEP_S, VELOCITY_UNIT, Loops
+from paramove.robots.dynamixel.emulated_loops import PROFILE_ONGOING, STEP_S, VELOCITY_UNIT, Loops
 from paramove.robots.dynamixel.emulated_motor import LIMP, RAD_PER_PULSE, Effort, Motor
 from paramove.robots.dynamixel.servo_memory import CURRENT_MODE, PWM_MODE, TRIPPED, ServoMemory
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, ServoModel
@@ -57,7 +57,7 @@ class ServoBody:
         self.hand: Hand | None = None
         self._shaft = position
         self._overloaded_s = 0.0
-        self._now_s = self._heard_s = 0.0
+        self._now_s = self._heard_s = self._booted_s = 0.0
         self._deaf_until_s = -math.inf
         self._effort = LIMP
         self._settle()
@@ -114,7 +114,7 @@ class ServoBody:
     def hold(self) -> None:
         """Torque is on although nobody asked for it, and the goal is where the servo stands."""
         self.loops.begin(self.position)
-        self.memory["Goal Position"] = round(self.position) + self.memory["Homing Offset"]
+        self.memory["Goal Position"] = round(self.position) + self.memory.homing
         self.memory["Torque Enable"] = 1
 
     def _settle(self) -> None:
@@ -212,21 +212,23 @@ class ServoBody:
 
     def _hold(self) -> None:
         """The bus watchdog has tripped: the goal is where the servo is, so that clearing it moves nothing; assumed."""
-        self.memory["Goal Position"] = round(self.position) + self.memory["Homing Offset"]
+        self.memory["Goal Position"] = round(self.position) + self.memory.homing
         self.memory["Goal Velocity"] = 0
 
     def present(self) -> None:
         """Writes what it measures to its table."""
-        self.memory["Realtime Tick"] = int(self._now_s * 1000.0) % 32768
+        self.memory["Realtime Tick"] = int((self._now_s - self._booted_s) * 1000.0) % 32768
         self._present()
 
     def _present(self) -> None:
         memory, model, course = self.memory, self.model, self.loops.course
-        memory["Present Position"] = round(self.position) + memory["Homing Offset"]
+        memory["Present Position"] = round(self.position) + memory.homing
         memory["Present Velocity"] = round(self.velocity / VELOCITY_UNIT)
-        memory["Position Trajectory"] = round(course.position) + memory["Homing Offset"]
+        memory["Position Trajectory"] = round(course.position) + memory.homing
         memory["Velocity Trajectory"] = round(course.velocity / VELOCITY_UNIT)
-        memory["Moving"] = int(abs(self.velocity) > memory["Moving Threshold"] * VELOCITY_UNIT)
+        memory["Moving Status"] = self.loops.moving_status(self.position)
+        ongoing = bool(memory["Moving Status"] & PROFILE_ONGOING) and not self.blocked
+        memory["Moving"] = int(ongoing or abs(self.velocity) > memory["Moving Threshold"] * VELOCITY_UNIT)
         memory["Present PWM"] = round(self.loops.pwm)
         if model.current_unit is None:
             memory["Present Load"] = round(1000.0 * self.torque / model.stall_torque)

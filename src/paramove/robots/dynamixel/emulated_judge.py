@@ -11,12 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.servo_memory import POSITION_MODE
+from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN
 
 HEAD = b"\xff\xff\xfd"
 TO_ALL = 0xFE
 WRITES = {0x03, 0x04}
 SYNC_WRITE, BULK_WRITE = 0x83, 0x93
-KNOWN = {0x01, 0x02, *WRITES, 0x05, 0x06, 0x08, 0x10, 0x82, SYNC_WRITE, 0x8A, 0x92, BULK_WRITE, 0x9A}
+KNOWN = {0x01, 0x02, *WRITES, 0x05, 0x06, 0x08, 0x10, 0x20, 0x82, SYNC_WRITE, 0x8A, 0x92, BULK_WRITE, 0x9A}
 RATE_WINDOW_S = 0.1
 """After a longer silence the next step may not be larger than after this one."""
 ROUNDING = 2.0
@@ -219,7 +221,8 @@ class WireJudge:
         self._courses.pop(servo.id, None)
         if not value or memory["Torque Enable"]:
             return
-        away = memory["Goal Position"] - memory["Homing Offset"] - servo.position
+        position = servo.position % PULSES_PER_TURN if memory["Operating Mode"] == POSITION_MODE else servo.position
+        away = memory["Goal Position"] - memory.homing - position
         if memory["Operating Mode"] in (3, 4, 5) and abs(away) > NEAR:
             self._find(
                 "torque",
@@ -237,7 +240,7 @@ class WireJudge:
             self._find("limit", f"Goal Position {goal} is outside of {low} to {high}", servo.id)
         if not memory["Torque Enable"]:
             return
-        present = _Course(servo.position + memory["Homing Offset"], -RATE_WINDOW_S)
+        present = _Course(servo.position + memory.homing, -RATE_WINDOW_S)
         last = self._courses.get(servo.id, present)
         elapsed_s = min(RATE_WINDOW_S, self._now_s - last.time_s)
         fastest = self.fastest.get(servo.id, servo.model.top_speed * PULSES_PER_MINUTE_TO_SECOND)

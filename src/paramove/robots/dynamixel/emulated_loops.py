@@ -33,6 +33,10 @@ AT_ONCE = 1e9
 """Pulses per second squared of a course without Profile Acceleration."""
 TIME_BASED = 0x04
 """Bit of Drive Mode (10)."""
+IN_POSITION, PROFILE_ONGOING, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x01, 0x02, 0x10, 0x20, 0x30
+"""Bits of Moving Status (123) (e-Manual, "Moving Status")."""
+NEAR = 20.0
+"""Pulses from the goal that count as arrived; assumed."""
 POSITION_P, POSITION_I, POSITION_D = 1 / 128, 1 / 65536, 1 / 16
 VELOCITY_P, VELOCITY_I = 1 / 128, 1 / 65536
 
@@ -78,7 +82,8 @@ class Loops:
         self.course = Course()
         self.pwm = 0.0
         self._sum = 0.0
-        self._timed = (math.inf, AT_ONCE)
+        self._limits = (math.inf, AT_ONCE)  # greatest speed and acceleration of the course, pulses and s
+        self._shape = 0
 
     def begin(self, position: float, velocity: float = 0.0) -> None:
         """Torque comes on, or the servo is told anew where it is."""
@@ -86,19 +91,47 @@ class Loops:
         self._sum = 0.0
 
     def plan(self) -> None:
-        """A new goal: with a profile by time, speed and acceleration follow from the way to it."""
-        whole_s, gaining_s = 1e-3 * self.memory["Profile Velocity"], 1e-3 * self.memory["Profile Acceleration"]
-        if whole_s > 0.0:
-            gaining_s = min(gaining_s, whole_s / 2.0)
-            speed = max(abs(self._goal() - self.course.position) / (whole_s - gaining_s), VELOCITY_UNIT)
-            self._timed = (speed, speed / gaining_s if gaining_s else AT_ONCE)
+        """A new goal: its profile is made from the registers as they are now; later changes wait for the next goal."""
+        velocity, acceleration = self.memory["Profile Velocity"], self.memory["Profile Acceleration"]
+        if not velocity and self.memory["Operating Mode"] != VELOCITY_MODE:
+            self._limits = math.inf, AT_ONCE  # a step
+        elif self.memory["Drive Mode"] & TIME_BASED:
+            self._limits = self._limits_by_time(1e-3 * velocity, 1e-3 * acceleration)
         else:
-            self._timed = (math.inf, AT_ONCE)
+            self._limits = velocity * VELOCITY_UNIT or math.inf, acceleration * ACCELERATION_UNIT or AT_ONCE
+        self._shape = self._shape_to(abs(self._goal() - self.course.position))
+
+    def _limits_by_time(self, whole_s: float, gaining_s: float) -> tuple[float, float]:
+        """Speed and acceleration with which the way to the goal takes so long, and gaining speed so much of it."""
+        if self.memory["Operating Mode"] == VELOCITY_MODE:
+            change = abs(self.memory["Goal Velocity"] * VELOCITY_UNIT - self.course.velocity)
+            return math.inf, change / gaining_s if change and gaining_s else AT_ONCE
+        gaining_s = min(gaining_s, whole_s / 2.0)
+        speed = max(abs(self._goal() - self.course.position) / (whole_s - gaining_s), VELOCITY_UNIT)
+        return speed, speed / gaining_s if gaining_s else AT_ONCE
+
+    def _shape_to(self, way: float) -> int:
+        """Bits of Moving Status (123) for the profile of a way, pulses."""
+        fastest, acceleration = self._limits
+        if math.isinf(fastest):
+            return 0
+        if acceleration >= AT_ONCE:
+            return RECTANGULAR
+        return TRIANGULAR if way * acceleration <= fastest * fastest * (1.0 + 1e-9) else TRAPEZOIDAL
+
+    def moving_status(self, position: float) -> int:
+        """Moving Status (123) of a servo that is there; Following Error is never told."""
+        memory = self.memory
+        if not memory["Torque Enable"] or memory["Operating Mode"] not in (POSITION_MODE, *EXTENDED_MODES):
+            return 0
+        arrived = IN_POSITION if abs(self._goal() - position) <= NEAR else 0
+        ongoing = PROFILE_ONGOING if self._shape and abs(self._goal() - self.course.position) > 0.5 else 0
+        return arrived | ongoing | self._shape
 
     def unloaded(self) -> None:
         """One step of the course of a servo that carries nothing and so follows it exactly."""
         memory, top = self.memory, self.motor.model.top_speed * REV_PER_MINUTE
-        fastest, acceleration = self._profile()
+        fastest, acceleration = self._limits
         acceleration = acceleration if acceleration < AT_ONCE else UNLOADED_ACCELERATION
         if memory["Bus Watchdog"] == TRIPPED:
             self.course.reach(0.0, UNLOADED_ACCELERATION)
@@ -136,21 +169,12 @@ class Loops:
         return Effort(at_rest.torque, at_rest.damping + self._stalled_by(damping, volts))
 
     def _goal(self) -> float:
-        return float(self.memory["Goal Position"] - self.memory["Homing Offset"])
-
-    def _profile(self) -> tuple[float, float]:
-        """Greatest speed and acceleration of the course, pulses and s."""
-        memory = self.memory
-        position = memory["Operating Mode"] in (POSITION_MODE, *EXTENDED_MODES)
-        if memory["Drive Mode"] & TIME_BASED and position:
-            return self._timed
-        fastest = memory["Profile Velocity"] * VELOCITY_UNIT or math.inf
-        return fastest, memory["Profile Acceleration"] * ACCELERATION_UNIT or AT_ONCE
+        return float(self.memory["Goal Position"] - self.memory.homing)
 
     def _position_loop(self, position: float, velocity: float, most: float) -> tuple[float, float]:
         """PWM, and how much of it each pulse per second takes away."""
         memory, course = self.memory, self.course
-        fastest, acceleration = self._profile()
+        fastest, acceleration = self._limits
         if math.isinf(fastest) or memory["Bus Watchdog"] == TRIPPED:  # a step
             course.begin(self._goal())
         else:
@@ -164,7 +188,7 @@ class Loops:
 
     def _velocity_loop(self, velocity: float, most: float) -> tuple[float, float]:
         memory = self.memory
-        acceleration = AT_ONCE if memory["Bus Watchdog"] == TRIPPED else self._profile()[1]
+        acceleration = AT_ONCE if memory["Bus Watchdog"] == TRIPPED else self._limits[1]
         self.course.reach(memory["Goal Velocity"] * VELOCITY_UNIT, acceleration)
         error = (self.course.velocity - velocity) / VELOCITY_UNIT
         integral = memory["Velocity I Gain"] * VELOCITY_I

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 from paramove.robots.dynamixel.emulated_body import REVERSE, ServoBody
 from paramove.robots.dynamixel.emulated_loops import VELOCITY_UNIT
 from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
-from paramove.robots.dynamixel.servo_memory import GOALS, RefusedError
-from paramove.robots.dynamixel.servo_models import BAUD_RATES, RAM_BEGINS, ServoModel
+from paramove.robots.dynamixel.servo_memory import GOALS, POSITION_MODE, RefusedError
+from paramove.robots.dynamixel.servo_models import BAUD_RATES, PULSES_PER_TURN, RAM_BEGINS, ServoModel
 
 REBOOT_S = 0.3
 """So long a servo that reboots hears nothing; assumed."""
 CLEAR_MULTI_TURN = bytes([0x01, 0x44, 0x58, 0x4C, 0x22])
+STORE, RESTORE = bytes([0x01, 0x43, 0x54, 0x52, 0x4C]), bytes([0x02, 0x43, 0x54, 0x52, 0x4C])
+STARTS_WITH_TORQUE, STARTS_WITH_BACKUP = 0x01, 0x02
+"""Bits of Startup Configuration (60)."""
+RATE_MARGIN = 0.03
+"""Part by which a baud rate may differ (e-Manual, "Baud Rate")."""
 RESET_ALL, KEEP_ID, KEEP_ID_AND_BAUD = 0xFF, 0x01, 0x02
 KEPT = {RESET_ALL: (), KEEP_ID: ("ID",), KEEP_ID_AND_BAUD: ("ID", "Baud Rate")}
 TORQUE_ON_BY_GOAL = 0x08
@@ -51,6 +56,10 @@ class EmulatedServo(ServoBody):
     def baud_rate(self) -> int:
         """At which it listens, bit/s."""
         return BAUD_RATES[self.memory["Baud Rate"]]
+
+    def hears_at(self, baud_rate: int) -> bool:
+        """Whether what is said at this rate, bit/s, can be understood."""
+        return abs(baud_rate - self.baud_rate) < RATE_MARGIN * self.baud_rate
 
     @property
     def return_delay_s(self) -> float:
@@ -103,6 +112,8 @@ class EmulatedServo(ServoBody):
             self._factory_reset(parameters)
         elif instruction == Instruction.CLEAR:
             self._clear(parameters)
+        elif instruction == Instruction.BACKUP:
+            self._back_up(parameters)
         else:
             raise RefusedError(StatusError.INSTRUCTION)
         return b""
@@ -119,11 +130,14 @@ class EmulatedServo(ServoBody):
             self.position, self.velocity = -self.position, -self.velocity
             self._settle()
         if memory["Operating Mode"] != before["Operating Mode"]:
+            memory.retune()
             self._settle()
         goal = GOALS[memory["Operating Mode"]]
         if goal in written and memory["Drive Mode"] & TORQUE_ON_BY_GOAL and not self.is_shut_down:
             memory["Torque Enable"] = 1
         if memory["Torque Enable"] > before["Torque Enable"]:
+            if memory["Operating Mode"] == POSITION_MODE:
+                self.position %= PULSES_PER_TURN
             self.loops.begin(self.position)
         if memory["Bus Watchdog"] != before["Bus Watchdog"]:
             self._heard_s = self._now_s
@@ -131,11 +145,19 @@ class EmulatedServo(ServoBody):
             self.loops.plan()
 
     def reboot(self) -> None:
-        """RAM is as after switching on: torque off, goals where the servo stands, within one turn."""
+        """As after switching on: RAM is initial, goals where the servo stands, within one turn; torque is off.
+
+        Startup Configuration (60) may want torque on, and gains and profile of the backup.
+        """
+        startup = self.memory["Startup Configuration"]
         self.memory.reset(RAM_BEGINS)
+        if startup & STARTS_WITH_BACKUP:
+            self.memory.restore_ram()
         self._registered, self._overloaded_s, self.torque = None, 0.0, 0.0
-        self._deaf_until_s = self._now_s + REBOOT_S
+        self._booted_s, self._deaf_until_s = self._now_s, self._now_s + REBOOT_S
         self._settle()
+        self.memory["Torque Enable"] = startup & STARTS_WITH_TORQUE
+        self.loops.plan()
 
     def _factory_reset(self, parameters: bytes) -> None:
         if len(parameters) != 1 or parameters[0] not in KEPT:
@@ -145,6 +167,18 @@ class EmulatedServo(ServoBody):
         for name, value in kept.items():
             self.memory[name] = value
         self.reboot()
+
+    def _back_up(self, parameters: bytes) -> None:
+        if parameters not in (STORE, RESTORE):
+            raise RefusedError(StatusError.DATA_RANGE)
+        if self.memory["Torque Enable"]:
+            raise RefusedError(StatusError.RESULT_FAIL)
+        if parameters == STORE:
+            self.memory.back_up()
+        elif self.memory.restore_eeprom():
+            self.reboot()
+        else:
+            raise RefusedError(StatusError.RESULT_FAIL)
 
     def _clear(self, parameters: bytes) -> None:
         if parameters != CLEAR_MULTI_TURN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.packets import StatusError
@@ -17,6 +18,13 @@ GOALS = {
     5: "Goal Position", PWM_MODE: "Goal PWM",
 }  # fmt: skip
 """By the value of Operating Mode (11)."""
+GAINS_AND_PROFILE = (
+    "Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain", "Position P Gain",
+    "Feedforward 2nd Gain", "Feedforward 1st Gain", "Profile Acceleration", "Profile Velocity",
+)  # fmt: skip
+"""Initial again with another Operating Mode, and of a backup (e-Manual, "Operating Mode", "Control Table Backup")."""
+FARTHEST_HOME = 1024
+"""In position mode a Homing Offset beyond this, either way, is ignored (e-Manual, "Homing Offset")."""
 TRIPPED = 0xFF
 """Of Bus Watchdog (98), which reads -1."""
 
@@ -36,6 +44,7 @@ class ServoMemory:
         self.model = model
         self._bytes = bytearray(model.size)
         self._values: dict[str, int] = {}  # what the bytes say: the servo looks at it thousands of times a second
+        self._backup: bytes | None = None
         self._at = {one.address + i: one for one in model.registers.values() for i in range(one.size)}
         self.reset(0)
 
@@ -45,11 +54,47 @@ class ServoMemory:
             if register.address >= first:
                 self[register.name] = register.initial
         self["Firmware Version"] = self.model.firmware
+        self["Backup Ready"] = int(self._backup is not None)
         for block in self.model.indirect:
             for i in range(block.count):
                 at = block.addresses + 2 * i
                 self._bytes[at : at + 2] = (block.data + i).to_bytes(2, "little")
                 self._bytes[block.data + i] = 0
+
+    @property
+    def homing(self) -> int:
+        """Homing Offset as it counts in this mode, pulses."""
+        offset = self["Homing Offset"]
+        return 0 if self["Operating Mode"] == POSITION_MODE and abs(offset) > FARTHEST_HOME else offset
+
+    def retune(self) -> None:
+        """Gains and profile are initial again."""
+        for name in GAINS_AND_PROFILE:
+            self[name] = self.model.registers[name].initial
+
+    def back_up(self) -> None:
+        """Keeps the table, also without power."""
+        self["Backup Ready"] = 1
+        self._backup = bytes(self._bytes)
+
+    def restore_eeprom(self) -> bool:
+        """From the backup; whether there is one."""
+        return self._restore(register for register in self.model.registers.values() if register.address < RAM_BEGINS)
+
+    def restore_ram(self) -> None:
+        """Gains, profile and indirect addresses from the backup, if there is one."""
+        if self._restore(self.model.registers[name] for name in GAINS_AND_PROFILE) and self._backup is not None:
+            for block in self.model.indirect:
+                places = slice(block.addresses, block.addresses + 2 * block.count)
+                self._bytes[places] = self._backup[places]
+
+    def _restore(self, registers: Iterable[Register]) -> bool:
+        if self._backup is None:
+            return False
+        for register in registers:
+            kept = self._backup[register.address : register.address + register.size]
+            self[register.name] = int.from_bytes(kept, "little")
+        return True
 
     def register(self, name: str) -> Register:
         """Raises InputError, with the nearest name, if the model has none of this name."""
@@ -84,11 +129,13 @@ class ServoMemory:
         if not data or address + len(data) > len(self._bytes):
             raise RefusedError(StatusError.ACCESS)
         written: dict[int, int] = {}
+        indirect: dict[int, int] = {}
         for place, byte in zip(range(address, address + len(data)), data, strict=True):
-            if not self._is_indirect_address(place):
+            if self._is_indirect_address(place):
+                indirect[place] = byte
+            else:
                 written[self._meant(place)] = byte
-            elif self["Torque Enable"]:
-                raise RefusedError(StatusError.ACCESS)
+        self._check_indirect(indirect)
         return [self._checked(register, written) for register in self._touched(written)]
 
     def write(self, address: int, data: bytes) -> set[str]:
@@ -104,6 +151,16 @@ class ServoMemory:
             told = self._bytes[register.address : register.address + register.size]
             self._values[name] = int.from_bytes(told, "little", signed=register.signed)
         return written
+
+    def _check_indirect(self, written: dict[int, int]) -> None:
+        """Indirect addresses are of two bytes, and lead to RAM. Raises RefusedError if these cannot be written."""
+        if written and self["Torque Enable"]:
+            raise RefusedError(StatusError.ACCESS)
+        for place, byte in written.items():
+            if place ^ 1 not in written:
+                raise RefusedError(StatusError.DATA_LENGTH)
+            if place % 2 == 0 and not RAM_BEGINS <= byte + 256 * written[place + 1] < len(self._bytes):
+                raise RefusedError(StatusError.DATA_RANGE)
 
     def _touched(self, written: dict[int, int]) -> list[Register]:
         found: dict[str, Register] = {}

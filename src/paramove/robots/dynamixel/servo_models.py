@@ -1,8 +1,8 @@
 """Control tables of the servo models: where each number stands, what it begins with, and what may be written.
 
-Addresses and sizes are those of the tables that come with dynamixel-sdk. Initial values, ranges and speeds are from the
-ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250", "XL330-M288-T" and "XL330-M077-T"; speeds, torques and
-currents are those of their tables "Specifications" at the recommended voltage.
+Addresses and sizes are those of the tables that come with dynamixel-sdk, but for `NOT_OF_THE_SDK`. Initial values,
+ranges and speeds are from the ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250", "XL330-M288-T" and
+"XL330-M077-T"; speeds, torques and currents are those of their tables "Specifications" at the recommended voltage.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class ServoModel:
         voltage: Recommended, V.
         stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
         current_unit: Amperes of one unit of current; None for a model that tells load, 0.1 % of the stall torque each.
-        firmware: Version that an emulated servo tells; bus watchdog and clear need 42 or above.
+        firmware: Version that an emulated servo tells. Bus watchdog and clear need 42 or above; fast reads, backup,
+            Startup Configuration and torque on by goal need 45, and 46 in an XL330.
     """
 
     name: str
@@ -87,7 +88,7 @@ class ServoModel:
     current_unit: float | None
     indirect: tuple[IndirectBlock, ...]
     registers: Mapping[str, Register] = field(repr=False)
-    firmware: int = 45
+    firmware: int = 46
 
     @property
     def size(self) -> int:
@@ -121,6 +122,7 @@ WRITABLE: dict[str, tuple[int, Range]] = {
     "Velocity Limit": (350, (0, 1023)),
     "Max Position Limit": (4095, (0, 4095)),
     "Min Position Limit": (0, (0, 4095)),
+    "Startup Configuration": (0, (0, 3)),
     "PWM Slope": (140, (1, 255)),
     "Shutdown": (52, (0, 255)),
     "Torque Enable": (0, (0, 1)),
@@ -143,6 +145,9 @@ WRITABLE: dict[str, tuple[int, Range]] = {
 }
 """Initial value and range of what can be written, for XM430-W350; goals are limited by other registers."""
 
+NOT_OF_THE_SDK = {"Startup Configuration": (60, 1), "Backup Ready": (147, 1)}
+"""Address and size of what the SDK's tables leave out, as in the e-Manual."""
+
 ALL_MODES = frozenset({0, 1, 3, 4, 5, 16})
 X_BLOCKS = (IndirectBlock(168, 224, 28), IndirectBlock(578, 634, 28))
 
@@ -150,11 +155,12 @@ X_BLOCKS = (IndirectBlock(168, 224, 28), IndirectBlock(578, 634, 28))
 def _registers(number: int, **others: tuple[int, Range]) -> dict[str, Register]:
     """Of the SDK's table, with names of `others` written with underscores for spaces."""
     special = {name.replace("_", " "): value for name, value in others.items()}
+    places = {name: (item.address, item.size) for name, item in ControlTable.getControlTable(number).items()}
     found = {"Model Number": Register("Model Number", 0, 2, number)}
-    for name, item in ControlTable.getControlTable(number).items():
+    for name, (address, size) in (places | NOT_OF_THE_SDK).items():
         if name not in found and not name.startswith("Indirect"):
             initial, allowed = special.get(name, WRITABLE.get(name, (0, None)))
-            found[name] = Register(name, item.address, item.size, initial, allowed)
+            found[name] = Register(name, address, size, initial, allowed)
     return found
 
 
@@ -174,7 +180,7 @@ XL430_W250 = ServoModel(
     ),
 )  # fmt: skip
 XL330: dict[str, tuple[int, Range]] = {
-    "Baud Rate": (1, (0, 6)), "Drive Mode": (0, (0, 5)), "Temperature Limit": (70, (0, 100)),
+    "Baud Rate": (1, (0, 6)), "Temperature Limit": (70, (0, 100)),
     "Max Voltage Limit": (70, (31, 70)), "Min Voltage Limit": (35, (31, 70)), "Current Limit": (1750, (0, 1750)),
     "Shutdown": (53, (0, 255)), "Position P Gain": (400, GAIN),
 }  # fmt: skip
