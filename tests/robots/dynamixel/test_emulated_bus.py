@@ -51,9 +51,28 @@ def test_a_fast_read_ends_where_a_servo_is_missing():
     assert list(PacketReader().feed(cut)) == []
 
 
-def test_sync_read_leaves_out_who_is_missing():
-    answer = said(a_bus(), Packet(BROADCAST, Instruction.SYNC_READ, PRESENT + bytes([7, 2])))
-    assert [packet.id for packet in PacketReader().feed(answer)] == [2]
+@pytest.mark.parametrize(("asked", "heard"), [([1, 2], [1, 2]), ([2, 7, 1], [2]), ([7, 1, 2], []), ([1, 1], [1, 1])])
+def test_those_after_a_missing_one_wait_for_it_in_vain(asked, heard):
+    """Each speaks after the one before it in the list (ROBOTIS in DynamixelSDK issue 364)."""
+    sync = said(a_bus(), Packet(BROADCAST, Instruction.SYNC_READ, PRESENT + bytes(asked)))
+    assert [packet.id for packet in PacketReader().feed(sync)] == heard
+    parts = b"".join(bytes([number]) + PRESENT for number in asked)
+    bulk = said(a_bus(), Packet(BROADCAST, Instruction.BULK_READ, parts))
+    assert [packet.id for packet in PacketReader().feed(bulk)] == heard
+
+
+def test_those_after_one_that_does_not_answer_wait_too():
+    bus = a_bus()
+    bus.servos[0].memory["Status Return Level"] = 0
+    assert said(bus, Packet(BROADCAST, Instruction.SYNC_READ, PRESENT + bytes([1, 2]))) == b""
+
+
+def test_a_fast_sync_read_of_the_manual():
+    places = {3: 166.0, 7: 2079.0, 4: 1023.0}
+    bus = EmulatedBus([EmulatedServo(XL330_M288, number, position=place) for number, place in places.items()])
+    question = bytes.fromhex("FFFFFD00FE0A008A8400040003070420F2")
+    answer = b"".join(data for _, data in bus.receive(question, BAUD, 0.0))
+    assert answer == bytes.fromhex("FFFFFD00FE190055 0003A60000008408 00071F08000016CA 0004FF030000D19E")
 
 
 @pytest.mark.parametrize("models", [(XL430_W250, XL330_M288), (XL430_W250, XL430_W250)])
@@ -86,6 +105,29 @@ def test_a_secondary_id_is_obeyed_without_an_answer():
         servo.memory["Secondary(Shadow) ID"] = 9
     assert said(bus, Packet(9, Instruction.WRITE, bytes([65, 0, 1]))) == b""
     assert [servo.memory["LED"] for servo in bus.servos] == [1, 1]
+
+
+def test_a_secondary_id_changes_nothing_that_is_kept_without_power():
+    bus = a_bus()
+    for servo in bus.servos:
+        servo.memory["Secondary(Shadow) ID"] = 9
+    assert said(bus, Packet(9, Instruction.WRITE, bytes([9, 0, 0]))) == b""
+    assert said(bus, Packet(9, Instruction.FACTORY_RESET, b"\xff")) == b""
+    assert [(servo.id, servo.memory["Return Delay Time"]) for servo in bus.servos] == [(1, 250), (2, 250)]
+
+
+@pytest.mark.parametrize("number", [253, 255])
+def test_ids_that_no_servo_can_have_switch_the_secondary_one_off(number):
+    bus = a_bus()
+    for servo in bus.servos:
+        servo.memory["Secondary(Shadow) ID"] = number
+    assert said(bus, Packet(number, Instruction.WRITE, bytes([65, 0, 1]))) == b""
+    assert [servo.memory["LED"] for servo in bus.servos] == [0, 0]
+
+
+@pytest.mark.parametrize(("rate", "heard"), [(57142, 2), (59300, 2), (55800, 0), (115200, 0)])
+def test_a_rate_that_is_nearly_right_is_understood(rate, heard):
+    assert len(a_bus().receive(encoded(Packet(BROADCAST, Instruction.PING)), rate, 1.0)) == heard
 
 
 def test_a_packet_that_was_damaged_is_told_by_its_servo():

@@ -19,9 +19,13 @@ from paramove.robots.dynamixel.packets import (
     checksum,
     encoded,
 )
+from paramove.robots.dynamixel.servo_models import RAM_BEGINS
 
 FOR_SEVERAL = {Instruction.SYNC_READ, Instruction.SYNC_WRITE, Instruction.BULK_READ, Instruction.BULK_WRITE}
 FOR_SEVERAL |= {Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ}
+
+LAST_ID = 252
+RESETS = {Instruction.FACTORY_RESET, Instruction.BACKUP}
 
 Said = tuple[float, bytes]
 """How long after the question an answer begins, s, and its bytes."""
@@ -79,7 +83,7 @@ class EmulatedBus:
 
     def _obey(self, data: bytes, baud_rate: int, now_s: float) -> Iterator[Said]:
         for packet in self._reader.feed(data):
-            hearing = [servo for servo in self.servos if servo.listens and servo.baud_rate == baud_rate]
+            hearing = [servo for servo in self.servos if servo.listens and servo.hears_at(baud_rate)]
             for servo in hearing:
                 servo.hear(now_s)
             yield from self._answers(packet, hearing)
@@ -131,7 +135,7 @@ class EmulatedBus:
                 answer = servo.do(packet.instruction, packet.parameters)
                 if answers:
                     yield delay_s, _encoded(number, answer)
-            elif servo.memory["Secondary(Shadow) ID"] == packet.id:
+            elif servo.memory["Secondary(Shadow) ID"] == packet.id <= LAST_ID and not _changes_eeprom(packet):
                 servo.do(packet.instruction, packet.parameters)
 
     def _for_several(self, packet: Packet, servos: list[EmulatedServo]) -> Iterator[Said]:
@@ -140,16 +144,15 @@ class EmulatedBus:
         parts: list[list[tuple[EmulatedServo, Answer]]] = []
         for number, address, data in _tasks(packet):
             named = [servo for servo in servos if servo.id == number]
-            if not named and fast:
-                break  # those after a missing one wait for it in vain
             if isinstance(data, bytes):
                 for servo in named:
                     servo.do(Instruction.WRITE, address.to_bytes(2, "little") + data)
                 continue
             asked = address.to_bytes(2, "little") + data.to_bytes(2, "little")
             answering = [servo for servo in named if servo.answers(packet.instruction)]
-            if answering:
-                parts.append([(servo, servo.do(Instruction.READ, asked)) for servo in answering])
+            if not answering:
+                break  # each speaks after the one before it: those after a silent one never do
+            parts.append([(servo, servo.do(Instruction.READ, asked)) for servo in answering])
         if fast and parts:
             sizes = [data for _, _, data in _tasks(packet) if isinstance(data, int)]
             yield parts[0][0][0].return_delay_s, _joined(parts, 1 + sum(size + 4 for size in sizes))
@@ -181,6 +184,12 @@ def _tasks(packet: Packet) -> Iterator[tuple[int, int, int | bytes]]:
             if at + 5 + size <= len(words):
                 yield words[at], word(at + 1), words[at + 5 : at + 5 + size]
             at += 5 + size
+
+
+def _changes_eeprom(packet: Packet) -> bool:
+    """Which a servo that is called by its secondary ID does not."""
+    writes = packet.instruction in (Instruction.WRITE, Instruction.REG_WRITE)
+    return packet.instruction in RESETS or (writes and int.from_bytes(packet.parameters[:2], "little") < RAM_BEGINS)
 
 
 def _encoded(number: int, answer: Answer) -> bytes:
