@@ -115,7 +115,7 @@ def test_scan_lists_the_servos(desk):
         "id": 2,
         "model": "xl430_w250",
         "model_number": 1060,
-        "firmware": 45,
+        "firmware": 46,
         "baud_rate": RATE,
         "voltage": 11.1,
         "temperature": 30,
@@ -219,18 +219,18 @@ def test_verify_tells_writes_and_adopts(desk):
     servos = desk.plug_in_koch()
     path = desk.calibrated()
     servos[0].memory["Max Position Limit"] = 4000
-    servos[5].memory["Firmware Version"] = 46
+    servos[5].memory["Firmware Version"] = 47
     done = desk.arm("verify", "--json")
     assert done.exit_code == 3
     found = {(row["joint"], row["what"]): (row["expected"], row["found"]) for row in json.loads(done.stdout)}
     limit = ArmCalibration.load(path, SERIAL).joints["shoulder_pan"].max_counts
-    assert found == {("shoulder_pan", "Max Position Limit"): (limit, 4000), ("gripper", "firmware"): (45, 46)}
+    assert found == {("shoulder_pan", "Max Position Limit"): (limit, 4000), ("gripper", "firmware"): (46, 47)}
     done = desk.arm("verify", "--write")
     assert done.exit_code == 3  # firmware cannot be written
     assert f"shoulder_pan: Max Position Limit 4000 is now {limit}" in done.stderr
     assert "1 difference" in done.stdout
     assert desk.arm("verify", "--adopt").exit_code == 0
-    assert ArmCalibration.load(path, SERIAL).joints["gripper"].firmware == 46
+    assert ArmCalibration.load(path, SERIAL).joints["gripper"].firmware == 47
     assert desk.arm("verify", "--write", "--adopt").exit_code == 2
 
 

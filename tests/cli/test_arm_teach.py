@@ -42,7 +42,7 @@ class Desk:
         joints = {}
         for servo in PLAN.servos:
             joints[servo.joint] = JointCalibration(
-                id=servo.number, model=servo.model, firmware=45, sign=1, operating_mode=3, homing_offset=0,
+                id=servo.number, model=servo.model, firmware=46, sign=1, operating_mode=3, homing_offset=0,
                 zero_counts=2048 + SHIFT, min_counts=200, max_counts=3900,
             )  # fmt: skip
         bus = CalibratedBus(serial=SERIAL, baud_rate=PLAN.baud_rate)

@@ -49,7 +49,7 @@ def test_json_has_every_number(emulator, here):
     assert done.exit_code == 0, done.output
     bus, servo = json.loads(done.stdout)
     assert (bus["part"], bus["level"]) == ("servos", "ok")
-    told = {"id": 7, "model": "xl430_w250", "firmware": 45, "baud_rate": FAST, "voltage": 11.1, "temperature_c": 30}
+    told = {"id": 7, "model": "xl430_w250", "firmware": 46, "baud_rate": FAST, "voltage": 11.1, "temperature_c": 30}
     assert servo["facts"] == {"port": str(here / "by-id" / "usb-adapter"), "hardware_error": 0, **told}
 
 
@@ -91,7 +91,7 @@ def test_what_is_wrong_is_the_exit_code_also_on_a_terminal_without_unicode(emula
     done = CliRunner(charset="ascii").invoke(build("doctor"), words)
     assert done.exit_code == 3
     _, told, wrong, remedy, stopped, *_ = done.output.splitlines()
-    assert told == "+ servo 7          xl430_w250, firmware 45, 1000000 bit/s, 15.0 V, 30 ?C"
+    assert told == "+ servo 7          xl430_w250, firmware 46, 1000000 bit/s, 15.0 V, 30 ?C"
     assert wrong == "x servo 7          measures 15.0 V, its limits are 6.0 to 14.0 V"
     assert remedy == "      switch off, and give it a supply of 11.1 V"
     assert stopped.startswith("x servo 7          has stopped: input voltage out of its limits")

@@ -81,7 +81,7 @@ def test_servos_are_only_asked(wrong):
 
 def test_every_servo_is_listed_with_what_it_tells(findings):
     (two,) = about(findings, "servo 2", Level.OK)
-    assert two.sentence == "xl330_m288, firmware 45, 1000000 bit/s, 9.0 V, 30 °C"
+    assert two.sentence == "xl330_m288, firmware 46, 1000000 bit/s, 9.0 V, 30 °C"
     assert two.facts["voltage"] == 9.0
     listed = [one.facts["id"] for one in findings if "id" in one.facts]
     assert sorted(listed) == [1, 2, 3, 4, 5]
