@@ -2,8 +2,9 @@
 
 import pytest
 
+from paramove.robots.dynamixel.emulated_body import HardwareError
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.packets import Instruction, StatusError
+from paramove.robots.dynamixel.packets import ALERT, Instruction, StatusError
 from paramove.robots.dynamixel.servo_models import MODELS, XL330_M288, XL430_W250, XM430_W350
 
 STORE, RESTORE = bytes.fromhex("01 43 54 52 4C"), bytes.fromhex("02 43 54 52 4C")
@@ -177,6 +178,13 @@ def test_realtime_tick_counts_from_the_start():
     servo.reboot()
     servo.run_to(40.5)
     assert servo.memory["Realtime Tick"] == pytest.approx(500, abs=2)
+
+
+def test_the_answer_to_a_reboot_still_has_the_alert():
+    servo = EmulatedServo(XL330_M288)
+    servo.fail(HardwareError.OVERLOAD)
+    assert servo.do(Instruction.REBOOT).error == ALERT
+    assert servo.do(Instruction.PING).error == 0
 
 
 def test_an_xl330_may_switch_torque_on_by_a_goal():

@@ -75,12 +75,11 @@ class EmulatedServo(ServoBody):
 
     def do(self, instruction: int, parameters: bytes = b"") -> Answer:
         """Follow an instruction for this servo alone."""
+        alert = ALERT if self.memory["Hardware Error Status"] else 0  # also in the last answer before a reboot
         try:
-            data = self._done(instruction, parameters)
-            error = StatusError.NONE
+            return Answer(alert, self._done(instruction, parameters))
         except RefusedError as refused:
-            data, error = b"", refused.error
-        return Answer(error | (ALERT if self.memory["Hardware Error Status"] else 0), data)
+            return Answer(alert | refused.error)
 
     def _done(self, instruction: int, parameters: bytes) -> bytes:
         if instruction == Instruction.PING:
