@@ -361,3 +361,16 @@ def test_a_pulled_plug_ends_the_port_and_a_new_one_has_the_old_link(tmp_path):
         assert again.read(1, LED, 1) == 1  # the servos kept their power
         again.port.closePort()
         client.port.closePort()
+
+
+def test_a_link_never_names_a_terminal_that_another_program_may_have_by_now(tmp_path, monkeypatch):
+    link, there = tmp_path / "usb-emulated", []
+    close = os.close
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:
+        monkeypatch.setattr(
+            "paramove.robots.dynamixel.emulator.os.close",
+            lambda number: there.append(link.is_symlink()) or close(number),
+        )
+        emulator.unplug()
+        assert there[:2] == [False, False]
+        monkeypatch.undo()

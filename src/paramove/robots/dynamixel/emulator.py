@@ -122,10 +122,10 @@ class DynamixelEmulator:
         self._wanted = self.plugged_in = True
 
     def _close(self) -> None:
+        if self._link is not None:  # first: the terminal's name may be another program's as soon as it is closed
+            self._link.unlink(missing_ok=True)
         os.close(self._ours)
         os.close(self._theirs)
-        if self._link is not None:
-            self._link.unlink(missing_ok=True)
         self.plugged_in = False
 
     @property
