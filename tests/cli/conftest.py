@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
+from tests.cli.arm_desk import Bench
 
 
 class Trained(NamedTuple):
@@ -42,3 +43,9 @@ def trained(tmp_path_factory):
         done = call("train", source, "--out", goal, "--leave-out", "none")
         assert done.exit_code == 0, done.output
     return made
+
+
+@pytest.fixture
+def desk(tmp_path):
+    with Bench(tmp_path) as bench:
+        yield bench

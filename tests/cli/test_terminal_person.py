@@ -99,3 +99,11 @@ def test_the_end_of_the_input_ends_it():
 def test_what_is_told_cannot_steer_the_terminal(terminal, capsys):
     TerminalPerson(terminal[1]).tell("servo \x1b[2J")
     assert capsys.readouterr().out == "servo \\x1b[2J\n"
+
+
+def test_a_closed_standard_input_has_ended(monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(QuitError):
+        TerminalPerson().until_done("Hold the arm.", list)
+    with pytest.raises(QuitError), TerminalPerson().pressing():
+        pass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import signal
 from importlib.metadata import version
 
 import typer
@@ -24,19 +25,23 @@ def calibrate(
     for this adapter to the data folder. A file that is there is replaced.
 
     Exit codes: 0 calibrated; 1 ended before, and the old file stays; 69 no adapter, or a servo does not answer;
-    78 what was shown does not fit the description, with the cause.
+    77 the data folder cannot be written, which is told at the start; 78 what was shown does not fit the description,
+    with the cause; 130 Ctrl-C, and the old file stays.
     """
     from paramove.robots.dynamixel.arm_plan import load_plan
+    from paramove.robots.dynamixel.calibration_path import check_can_be_kept
     from paramove.robots.dynamixel.calibration_procedure import ArmCalibrator
 
     with explained():
         plan = load_plan(robot)
     created = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     with open_arm(by_id, serial, data, plan.baud_rate) as arm:
+        check_can_be_kept(arm.path)
         calibrator = ArmCalibrator(arm.chain, plan, arm.adapter.serial, TerminalPerson())
         try:
             calibration = calibrator.run(created, f"paramove {version('paramove')}")
-        except QuitError:
-            raise ended("ended before the calibration was complete: nothing was saved", exit_codes.FAILURE) from None
+        except (QuitError, KeyboardInterrupt) as error:
+            code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.by_signal(signal.SIGINT)
+            raise ended("ended before the calibration was complete: nothing was saved", code) from None
         calibration.save(arm.path)
     typer.echo(f"{arm.path}: {len(calibration.joints)} joints; check it with `paramove arm verify`")

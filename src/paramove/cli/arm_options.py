@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -96,7 +97,7 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
-    """Ends the command with a sentence where a servo, the port or a file is not as it must be."""
+    """Ends the command with a sentence where a servo, the port or a file is not as it must be, and at Ctrl-C."""
     from paramove.robots.dynamixel.servo_chain import ServoError, ServoSilentError
     from paramove.robots.dynamixel.servo_port import PortLostError
 
@@ -109,7 +110,10 @@ def explained() -> Iterator[None]:
     except InputError as error:
         raise ended(str(error), error.exit_code) from error
     except OSError as error:
-        raise ended(str(error), exit_codes.PERMISSION) from error
+        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
+        raise ended(told, exit_codes.PERMISSION) from error
+    except KeyboardInterrupt:
+        raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
 
 
 def ended(sentence: str, code: int) -> typer.Exit:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,6 +15,7 @@ from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
+    from paramove.robots.dynamixel.bus_scan import FoundServo
     from paramove.robots.dynamixel.servo_chain import ServoChain
 
 
@@ -30,7 +33,7 @@ def setup(
     It is found at any ID and usual baud rate. ID, Return Delay Time 0 and baud rate are written with torque off and
     read back.
 
-    Exit codes: 0 all are set up; 1 ended before; 69 no adapter; 78 no such joint or description.
+    Exit codes: 0 all are set up; 1 ended before; 69 no adapter; 78 no such joint or description; 130 Ctrl-C.
     """
     from paramove.robots.dynamixel.arm_plan import load_plan
 
@@ -39,12 +42,15 @@ def setup(
         wanted = _wanted(plan, joints)
     person = TerminalPerson()
     with open_arm(by_id, serial, data, plan.baud_rate) as arm:
+        done: list[PlannedServo] = []
         for servo in wanted:
             try:
-                _set_up(arm.chain, plan, servo, person)
-            except QuitError:
+                _set_up(arm.chain, plan, servo, person, done)
+            except (QuitError, KeyboardInterrupt) as error:
                 left = " ".join(f"--joint {one.joint}" for one in wanted[wanted.index(servo) :])
-                raise ended(f"ended before {servo.joint}; go on with {left}", exit_codes.FAILURE) from None
+                code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.by_signal(signal.SIGINT)
+                raise ended(f"ended before {servo.joint}; go on with {left}", code) from None
+            done.append(servo)
     typer.echo("connect all servos and run `paramove arm scan`, then `paramove arm calibrate`")
 
 
@@ -53,11 +59,13 @@ def _wanted(plan: ArmPlan, joints: list[str] | None) -> list[PlannedServo]:
     unknown = [name for name in joints or () if name not in known]
     if unknown:
         raise InputError(f"{plan.robot} has no joint {unknown[0]!r}, found {', '.join(known)}")
-    return [known[name] for name in joints] if joints else list(plan.servos)
+    return [known[name] for name in dict.fromkeys(joints)] if joints else list(plan.servos)
 
 
-def _set_up(chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: TerminalPerson) -> None:
-    """Asks until the right servo is connected alone and has taken its settings."""
+def _set_up(
+    chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: TerminalPerson, done: Sequence[PlannedServo]
+) -> None:
+    """Asks until the right servo is connected alone and has taken its settings; it is none of those that are done."""
     from paramove.robots.dynamixel.servo_chain import ServoError
     from paramove.robots.dynamixel.servo_setup import only_servo, set_up
 
@@ -65,6 +73,7 @@ def _set_up(chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: Termi
         person.until_done(f"Connect the servo of {servo.joint} ({servo.model}) and no other.", list)
         try:
             found = only_servo(chain)
+            _check_is_new(found, plan, servo, done)
             set_up(chain, found, servo.number, plan.baud_rate, servo.model)
         except (InputError, ServoError) as error:
             person.tell(str(error))
@@ -74,3 +83,13 @@ def _set_up(chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: Termi
             "answers at once; label it"
         )
         return
+
+
+def _check_is_new(found: FoundServo, plan: ArmPlan, servo: PlannedServo, done: Sequence[PlannedServo]) -> None:
+    """Raises InputError for a servo that was left connected: it would get a second ID, and its label be wrong."""
+    for one in done:
+        if (found.number, found.baud_rate) == (one.number, plan.baud_rate):
+            raise InputError(
+                f"the servo with ID {one.number} is that of {one.joint}, which was just set up: connect that of "
+                f"{servo.joint}; if it is another one, press q and run this command with --joint {servo.joint}"
+            )

@@ -23,6 +23,10 @@ from paramove.cli.bus_options import JsonOption, show
 from paramove.supervision import exit_codes
 
 FINDING = 3
+CHOICE = (
+    "--write writes the file's settings to the servos, --adopt takes the servos' into the file; where IDs, models or "
+    "joints differ, the file is of another arm: `paramove arm scan` shows who is there"
+)
 
 
 def verify(
@@ -70,6 +74,7 @@ def verify(
         show(rows, as_json=False)
         typer.echo(f"{arm.path}: {len(rows) or 'no'} difference{'s' * (len(rows) != 1)}")
     if rows:
+        typer.echo(CHOICE, err=True)
         raise typer.Exit(FINDING)
 
 

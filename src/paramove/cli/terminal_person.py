@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import select
 import sys
@@ -26,14 +27,14 @@ class QuitError(Exception):
 
 
 class TerminalPerson:
-    """Asks on the standard output and reads the standard input, never the whole keyboard.
+    """Asks on the standard output and reads the standard input, never the whole keyboard; a closed one has ended.
 
     At a terminal Enter says that something is done, and q ends. Otherwise lines do: an empty one or "q"; after any
     other one more look is taken and printed, and the wait goes on.
     """
 
     def __init__(self, source: IO[Any] | None = None) -> None:
-        self._source = source or sys.stdin
+        self._source = source or sys.stdin or io.StringIO()
 
     def tell(self, sentence: str) -> None:
         """Say something that needs no answer."""
@@ -55,7 +56,10 @@ class TerminalPerson:
         It raises QuitError for q, and at the end of the input. Other programs write keys without Enter between them.
         """
         with contextlib.ExitStack() as opened:
-            descriptor = self._source.fileno()
+            try:
+                descriptor = self._source.fileno()
+            except OSError as error:  # not a file of the system, as a closed input
+                raise QuitError from error
             if self._source.isatty():
                 opened.enter_context(_unbuffered(descriptor))
 

@@ -14,8 +14,10 @@ from functools import cache
 from dynamixel_easy_sdk.control_table import ControlTable
 from dynamixel_easy_sdk.dynamixel_error import DxlRuntimeError
 
+from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_chain import PingedServo, ServoChain
 from paramove.robots.dynamixel.servo_models import MODELS, Register, ServoModel
+from paramove.robots.dynamixel.servo_port import PortLostError
 
 USUAL_BAUD_RATES = (57_600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 """bit/s; the first is set at the factory."""
@@ -168,13 +170,15 @@ def model_name(number: int) -> str:
 def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, ids: Sequence[int] = ALL_IDS) -> BusScan:
     """Ask all servos at each of these baud rates, and where something is not understood these IDs one by one.
 
-    The port is left at the baud rate that it had. Raises PortLostError.
+    The port is left at the baud rate that it had. Raises PortLostError, and InputError for a rate that no servo has.
     """
     before, scan = chain.port.baud_rate, BusScan()
     try:
         for rate in baud_rates:
             try:
                 chain.port.setBaudRate(rate)
+            except (InputError, PortLostError):
+                raise
             except (ValueError, OSError):  # pyserial has both for a rate that an adapter does not have
                 continue
             scan.asked.append(rate)

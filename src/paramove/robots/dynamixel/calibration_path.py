@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from pathlib import Path
@@ -20,3 +21,13 @@ def calibration_path(serial: str, data: Path | None = None) -> Path:
     """
     folder = data or Path(os.environ.get(VARIABLE) or user_data_path("paramove"))
     return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
+
+
+def check_can_be_kept(path: Path) -> None:
+    """Look whether a calibration can be written there, before somebody takes the trouble. Raises OSError."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".part")
+    unfinished.write_bytes(b" ")
+    unfinished.unlink()

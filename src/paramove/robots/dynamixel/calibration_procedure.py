@@ -7,12 +7,19 @@ from typing import Protocol
 
 import numpy as np
 
-from paramove.robots.dynamixel.arm_calibration import ArmCalibration, CalibratedBus, CalibrationError, JointCalibration
+from paramove.robots.dynamixel.arm_calibration import (
+    COUNTS_PER_RAD,
+    LONGEST_TRAVEL,
+    ArmCalibration,
+    CalibratedBus,
+    CalibrationError,
+    JointCalibration,
+)
 from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
 from paramove.robots.dynamixel.bus_scan import FoundServo, looked_at
 from paramove.robots.dynamixel.calibration_sweep import SMALLEST_MOVE, JointSweep, calibrated_joint, remarks
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
-from paramove.robots.dynamixel.servo_models import model_named
+from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.servo_settings import write_settings
 
 ATTEMPTS = 3
@@ -61,8 +68,9 @@ class ArmCalibrator:
         for servo in self._plan.servos:
             for remark in remarks(joints[servo.joint], servo):
                 self._person.tell(remark)
-            write_settings(self._chain, joints[servo.joint])
         self._person.until_done("Move the arm and compare the angles with what you see.", lambda: self._angles(joints))
+        for joint in joints.values():
+            write_settings(self._chain, joint)
         bus = CalibratedBus(serial=self._serial, baud_rate=self._plan.baud_rate)
         return ArmCalibration(created=created, tool=tool, robot=self._plan.robot, bus=bus, joints=joints)
 
@@ -118,7 +126,12 @@ class ArmCalibrator:
                 sweeps[number].add(position)
             return [f"{one.joint}: {one.lowest} to {one.highest}, now {one.present}" for one in sweeps.values()]
 
-        self._person.until_done("Move every joint slowly from one end of its travel to the other.", look)
+        hint = "".join(
+            f" Turn {servo.joint}, which has no ends, by less than {LONGEST_TRAVEL * 360 // PULSES_PER_TURN} deg."
+            for servo in self._plan.servos
+            if (servo.upper - servo.lower) * COUNTS_PER_RAD > LONGEST_TRAVEL
+        )
+        self._person.until_done(f"Move every joint slowly from one end of its travel to the other.{hint}", look)
         look()
         return list(sweeps.values())
 

@@ -26,6 +26,8 @@ from paramove.robots.dynamixel.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH,
 from paramove.robots.dynamixel.serial_adapters import default_by_id, serial_adapters
 
 BITS_PER_BYTE = 10
+SLOWEST, FASTEST = 9_600, 4_500_000
+"""bit/s, of all that Dynamixel servos talk at (e-Manual, "Baud Rate")."""
 LATENCY_S = 0.004
 """Beyond the time of the bytes and the servo's own delay; an adapter with a latency timer of 16 ms needs more."""
 LONGEST_RETURN_DELAY_S = 254 * 2e-6
@@ -68,8 +70,9 @@ class ServoPort:
         self.close()
 
     def open(self) -> None:
-        """Raises InputError, with the remedy, for a port that is missing, forbidden or in use."""
+        """Raises InputError, with the remedy, for a port that is missing, forbidden or in use, or a wrong baud rate."""
         self.close()
+        _check_baud_rate(self.baud_rate)
         try:
             self._serial = serial.Serial(self.name, self.baud_rate, timeout=0, exclusive=True)
             fcntl.ioctl(self._serial.fd, termios.TIOCEXCL)  # others than pyserial, such as the SDK and the Wizard
@@ -96,10 +99,11 @@ class ServoPort:
         return self.baud_rate
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Of the line, from now on."""
+        """Of the line, from now on. Raises InputError for one that servos do not have, and PortLostError."""
+        _check_baud_rate(baudrate)
         self.baud_rate = baudrate
         if self._serial is not None:
-            self._serial.baudrate = baudrate
+            self._do(lambda port: setattr(port, "baudrate", baudrate))
         return True
 
     def clearPort(self) -> None:
@@ -154,6 +158,11 @@ class ServoPort:
         except (OSError, termios.error, TypeError) as error:  # pyserial has all of them for a port that went away
             self.close()
             raise PortLostError(f"{self.name} went away ({_words(error)}): is its cable plugged in?") from error
+
+
+def _check_baud_rate(baud_rate: int) -> None:
+    if not SLOWEST <= baud_rate <= FASTEST:
+        raise InputError(f"servos talk at {SLOWEST} to {FASTEST} bit/s, found {baud_rate}")
 
 
 def _reason(name: str, error: serial.SerialException) -> str:
