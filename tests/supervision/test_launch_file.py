@@ -203,3 +203,13 @@ def test_start_and_stop_waves():
     """)
     assert start == [["world", "tape"], ["arm", "eyes"], ["mind"]]
     assert stop == [["arm"], ["mind"], ["eyes"], ["world"], ["tape"]]
+
+
+def test_a_missing_overlay_is_told_with_those_of_this_launch_file(folder):
+    own = folder / "overlays" / "good"
+    own.mkdir(exist_ok=True)
+    (own / "emulated.yaml").write_text("nodes: {}\n")
+    with pytest.raises(LaunchFileMissingError, match="did you mean 'emulated'"):
+        load(folder, "good", ["emulatd"])
+    with pytest.raises(LaunchFileMissingError, match="there are: .*emulated, slow"):
+        load(folder, "good", ["nothing_like_it"])

@@ -44,6 +44,7 @@ def run(wanted: Wanted, check_only: bool) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # a sentence must not end a run where a letter is unknown
     console = Console(highlight=False, markup=False, emoji=False)
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    launch = None
     try:
         workspace = application.find_workspace(Path.cwd())
         environment = examined(os.environ, workspace)
@@ -66,6 +67,8 @@ def run(wanted: Wanted, check_only: bool) -> int:
         return exit_codes.INPUT_MISSING
     except (LaunchFileError, DomainNameError) as error:
         errors.print(str(error))
+        if launch is not None and (left_out := _left_out(launch)):
+            errors.print(f"note: --with leaves out what is laid over by default; name it too: --with {left_out}")
         return exit_codes.CONFIGURATION
     except DomainError as error:
         errors.print(str(error))
@@ -81,6 +84,12 @@ def run(wanted: Wanted, check_only: bool) -> int:
     except OSError:  # the terminal was closed; flushing it again at exit would fail too
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return outcome.code
+
+
+def _left_out(launch: Launch) -> str:
+    """Overlays that the launch file has by default, if none of them was chosen."""
+    default = launch.file.default_overlays
+    return "" if set(default) & set(launch.overlays) else " --with ".join(default)
 
 
 def _found(launch: Launch, environment: Environment) -> list[str]:

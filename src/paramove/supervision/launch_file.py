@@ -101,7 +101,8 @@ def _with_overlays(
                 paths.append(path)
     else:
         chosen = list(overlays)
-        paths = [path_of(overlay_folder(folder, name, overlay), overlay, "overlay") for overlay in chosen]
+        own = names_in(folder / "overlays" / name)
+        paths = [path_of(overlay_folder(folder, name, overlay), overlay, "overlay", own) for overlay in chosen]
     for path in paths:
         try:
             top = _read(path)
@@ -139,8 +140,12 @@ def names_in(folder: Path) -> list[str]:
     return sorted(file.stem for file in folder.glob("*.yaml"))
 
 
-def path_of(folder: Path, name: str, kind: str) -> Path:
-    """File of a launch file or overlay named on the command line; raises LaunchFileMissingError."""
+def path_of(folder: Path, name: str, kind: str, others: Sequence[str] = ()) -> Path:
+    """File of a launch file or overlay named on the command line; raises LaunchFileMissingError.
+
+    Args:
+        others: Names that are told first where there is none of this name, beside those in the folder.
+    """
     if name.endswith(".yaml"):
         path = Path(name)
     elif _PLAIN_NAME.fullmatch(name):
@@ -152,7 +157,8 @@ def path_of(folder: Path, name: str, kind: str) -> Path:
     except ValueError:  # a NUL byte in it
         there = False
     if not there:
-        message = f"there is no such {kind}; {nearest(path.stem, names_in(folder))}"
+        names = list(dict.fromkeys([*others, *names_in(folder)]))
+        message = f"there is no such {kind}; {nearest(path.stem, names)}"
         raise LaunchFileMissingError(Position(str(path)), message)
     return path
 
