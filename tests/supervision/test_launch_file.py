@@ -211,5 +211,5 @@ def test_a_missing_overlay_is_told_with_those_of_this_launch_file(folder):
     (own / "emulated.yaml").write_text("nodes: {}\n")
     with pytest.raises(LaunchFileMissingError, match="did you mean 'emulated'"):
         load(folder, "good", ["emulatd"])
-    with pytest.raises(LaunchFileMissingError, match="there are: .*emulated, slow"):
+    with pytest.raises(LaunchFileMissingError, match=r"there are: .*emulated, slow"):
         load(folder, "good", ["nothing_like_it"])
