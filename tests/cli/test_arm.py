@@ -148,6 +148,7 @@ def test_verify_tells_writes_and_adopts(desk):
     assert done.exit_code == 3  # firmware cannot be written
     assert f"shoulder_pan: Max Position Limit 4000 is now {limit}" in done.stderr
     assert "1 difference" in done.stdout
+    assert "--adopt takes the servos' into the file" in done.stderr
     assert desk.arm("verify", "--adopt").exit_code == 0
     assert ArmCalibration.load(path, SERIAL).joints["gripper"].firmware == 47
     assert desk.arm("verify", "--write", "--adopt").exit_code == 2

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from paramove.bus.endpoint import TopicTakenError
+from paramove.cli.arm_enable import enable
 from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 
@@ -79,3 +83,10 @@ def test_where_nothing_runs_it_is_told(words):
         done = said(name, "--domain", "other", *(["--yes"] if name == "enable" else []))
         assert done.exit_code == 69
         assert "nothing is running in" in done.stderr
+
+
+def test_a_closed_standard_input_is_no_yes(words, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(typer.Exit) as caught:
+        enable(yes=False)
+    assert (caught.value.exit_code, words["words"]) == (1, [])

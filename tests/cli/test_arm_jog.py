@@ -7,6 +7,7 @@ import os
 import tempfile
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -175,3 +176,14 @@ def test_beside_another_speaker_it_does_not_begin(folder):
     assert done.exit_code == 75
     assert "synthesizer" in done.stderr
     assert "paramove node stop" in done.stderr
+
+
+def test_in_a_narrow_terminal_the_line_is_written_anew_and_ended(folder, monkeypatch):
+    monkeypatch.setattr("paramove.cli.arm_jog.sys", SimpleNamespace(stdout=SimpleNamespace(isatty=lambda: True)))
+    monkeypatch.setattr("paramove.cli.arm_jog.shutil.get_terminal_size", lambda: os.terminal_size((20, 2)))
+    with running(folder, ["1+", "q"]) as arm:
+        done = jogged(monkeypatch, arm, "a")
+    shown = [piece for piece in done.stdout.split("\r")[1:] if not piece.endswith("\n")]
+    assert shown
+    assert all(len(piece) < 20 for piece in shown)
+    assert done.stdout.endswith("\n")

@@ -175,3 +175,12 @@ def test_an_arm_that_cannot_float_is_told_before_anything_is_asked(desk):
     assert done.exit_code == 78
     assert "has no current mode: lead this arm without --float" in done.stderr
     assert "Hold the arm" not in done.stdout
+
+
+def test_a_set_that_cannot_be_written_is_refused_before_the_arm_is_led(desk):
+    desk.calibrate()
+    (desk.folder / "file").write_text("in the place of a folder")
+    done = desk.teach([], name="file/set")
+    assert done.exit_code == 77
+    assert "Hold the arm" not in done.stdout
+    assert f"{desk.folder / 'file'}: Not a directory" in done.stderr

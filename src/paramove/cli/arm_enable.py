@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -26,7 +27,7 @@ def enable(
     Exit codes: 0 armed; 1 you said no; 3 the safety gate refuses, with every reason; 69 nobody answers; 75 another
     program arms this arm.
     """
-    if not yes and not typer.confirm(QUESTION):
+    if not yes and (sys.stdin is None or not typer.confirm(QUESTION)):  # None: it is closed, so nobody can answer
         raise ended("not armed", exit_codes.FAILURE)
     state = _answer(True, domain)
     if not _is(state, True):

@@ -85,6 +85,8 @@ class _Link:
         return self
 
     def __exit__(self, *error: Any) -> None:
+        if self._shown and sys.stdout.isatty():
+            typer.echo()  # the shell goes on in a line of its own
         self._bus.__exit__(*error)
 
     def wait_for_arm(self) -> None:
@@ -155,7 +157,9 @@ class _Link:
         status, sentence = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.sentence
         what = f"{state} {jogging.joint} {sentence}"
         if sys.stdout.isatty():
-            is_long = len(status) + len(sentence) + 2 >= shutil.get_terminal_size().columns
+            columns = shutil.get_terminal_size().columns
+            is_long = len(status) + len(sentence) + 2 >= columns
+            status = status[: max(columns - 3, 1)]  # one that wraps could not be written anew
             if is_long and sentence != self._told:
                 typer.echo(f"\r\x1b[2K{printable(sentence)}")
             self._told = sentence

@@ -110,8 +110,8 @@ def explained() -> Iterator[None]:
     except InputError as error:
         raise ended(str(error), error.exit_code) from error
     except OSError as error:
-        told = f"{error.filename}: {error.strerror}" if error.filename else str(error)
-        raise ended(told, exit_codes.PERMISSION) from error
+        words = error.strerror or str(error)
+        raise ended(f"{error.filename}: {words}" if error.filename else words, exit_codes.PERMISSION) from error
     except KeyboardInterrupt:
         raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import time
 from dataclasses import replace
@@ -52,7 +54,8 @@ def teach(
     Each segment is written as soon as it has ended; theta is where the end effector is then, frame of the arm's base.
 
     Exit codes: 0 ended by q; 1 no segment was recorded; 66 no calibration; 69 no adapter, or a servo does not answer;
-    78 there is a set already, or it has other parameters; 130 Ctrl-C, segments that have ended are kept.
+    77 the set cannot be written; 78 there is a set already, or it has other parameters; 130 Ctrl-C, segments that have
+    ended are kept.
     """
     from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
     from paramove.robots.description import RobotDescription
@@ -61,6 +64,7 @@ def teach(
 
     with explained():
         description = RobotDescription.load(robot)
+        _check_can_be_written(folder)
         teacher = KinestheticTeacher(description, folder, action, subject, append=append)
         baud_rate = description.bus.baud_rate if description.bus is not None else 0
     person = TerminalPerson()
@@ -80,6 +84,15 @@ def teach(
         raise typer.Exit(exit_codes.OK if teacher.written else exit_codes.FAILURE) from None
     except KeyboardInterrupt:
         raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
+
+
+def _check_can_be_written(folder: Path) -> None:
+    """Before somebody leads the arm for nothing. Raises OSError; makes no folder."""
+    place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    number = 0 if place.is_dir() else errno.ENOTDIR
+    if number or not os.access(place, os.W_OK | os.X_OK):
+        number = number or errno.EACCES
+        raise OSError(number, os.strerror(number), str(place))
 
 
 def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescription:

@@ -29,5 +29,7 @@ def check_can_be_kept(path: Path) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".part")
-    unfinished.write_bytes(b" ")
-    unfinished.unlink()
+    try:
+        unfinished.write_bytes(b" ")
+    finally:
+        unfinished.unlink(missing_ok=True)
