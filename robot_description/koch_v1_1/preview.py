@@ -1,4 +1,4 @@
-"""Draws preview.png: the arm before a cube. Usage: python -m robot_description.koch_v1_1.preview"""
+"""Draws preview.png, the arm before a cube, and zero_pose.png. Usage: python -m robot_description.koch_v1_1.preview"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Draws preview.png: the arm before a cube. Usage: python -m robot_description.open_manipulator_x.preview"""
+"""Draws preview.png, the arm before a cube, and zero_pose.png.
+
+Usage: python -m robot_description.open_manipulator_x.preview
+"""
 
 from __future__ import annotations
 
