@@ -73,6 +73,13 @@ def test_a_refusal_names_servo_register_and_reason(chain):
         chain.write(1, REGISTERS["ID"], 5)
 
 
+def test_a_servo_with_a_hardware_error_refuses_torque_and_what_clears_it_is_told(chain, emulator):
+    with emulator.lock:
+        emulator.bus.servos[0].memory["Hardware Error Status"] = 0x20
+    with pytest.raises(ServoRefusedError, match=r"servo 1 .*after a hardware error .*`reboot` clears it"):
+        chain.write(1, REGISTERS["Torque Enable"], 1)
+
+
 def test_a_silent_servo_is_told_with_the_remedy(chain):
     with pytest.raises(ServoSilentError, match=r"servo 7 did not answer \(read ID, 3 attempts\).*scan"):
         impatient(chain).read(7, REGISTERS["ID"])

@@ -41,7 +41,7 @@ TURN_S = 0.003
 """For each ID's answer to a ping of all: so long waits dynamixel-sdk 4.1.0 (`broadcastPing`); a servo alone with ID 5
 was not heard within 10 ms (github.com/ROBOTIS-GIT/Dynamixel2Arduino, issue 106)."""
 REFUSALS = {
-    Status.RESULT_FAIL: "could not do it",
+    Status.RESULT_FAIL: "could not do it, as after a hardware error (`paramove arm scan` shows it, `reboot` clears it)",
     Status.INSTRUCTION: "does not know the instruction",
     Status.CHECKSUM: "heard a damaged packet",
     Status.DATA_RANGE: "says that the value is out of range",
