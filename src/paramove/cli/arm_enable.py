@@ -59,7 +59,8 @@ def _answer(armed: bool, domain: str | None) -> SafetyState:
     try:
         state = arm_by_word(folder, armed, PATIENCE_S)
     except TopicTakenError as error:
-        raise ended(f"{error}: only one program may arm an arm; stop that one first", exit_codes.TEMPORARY) from error
+        remedy = "stop that one first; `paramove arm estop` stops the arm in any case"
+        raise ended(f"{error}: only one program may arm an arm; {remedy}", exit_codes.TEMPORARY) from error
     except BusFolderError as error:
         raise ended(str(error), exit_codes.UNAVAILABLE) from error
     if state is None:
