@@ -65,7 +65,7 @@ def test_unknown_joint_names_the_nearest() -> None:
         ("kpp: 12", "kpq: 12", "kpq"),
         ("kpp: 12", "kpp: [", "robot.yaml"),
         ("joint: right_fingers", "joint: right_finger", "unknown joints: right_finger"),
-        ("name: hoap3", "nam: hoap3", r"name: field required.*; nam: extra inputs are not permitted, found 'hoap3'"),
+        ("name: hoap3", "nam: hoap3", r"name is missing; .*nam: extra inputs are not permitted, found 'hoap3'"),
         ("lower_deg: -91,", "lower_deg: .nan,", r"joints\.0\.lower_deg: input should be a finite number, found nan"),
         ("upper_deg: 31,", "upper_deg: .inf,", r"joints\.0\.upper_deg: input should be a finite number, found inf"),
         ("upper_deg: 31,", "upper_deg: '31 deg',", r"valid number.*found '31 deg'"),
@@ -86,8 +86,8 @@ def test_unknown_joint_names_the_nearest() -> None:
             "open_deg: 60, closed_deg: 60",
             "different angles of the open",
         ),
-        ("    joints: [right_shoulder_pitch, ", "    joints: [", r"arms\.right\.joints\.4: field required"),
-        ("    upper_arm: 0.110\n", "", r"arms\.right\.upper_arm: field required"),
+        ("    joints: [right_shoulder_pitch, ", "    joints: [", r"arms\.right\.joints\.4 is missing"),
+        ("    upper_arm: 0.110\n", "", r"arms\.right\.upper_arm is missing"),
         ("name: right_knee,", "name: right_kn,", "model file .* does not exist"),
     ],
 )
@@ -135,7 +135,7 @@ def test_a_robot_of_servos_has_a_bus_and_a_chain_and_hoap3_has_not() -> None:
         ("gripper: {joint: gripper,", "gripper: {joint: grip,", "the chain names unknown joints: grip"),
         ("open_deg: -80", "open_deg: 51", "different angles of the open and the closed gripper"),
         ("open_deg: -80", "open_deg: -90", r"gripper: -90.0 deg is outside -87.0 to 52.7 deg of joint gripper"),
-        ("hand: [0.126, 0.0, 0.0]", "hand: [0.126, 0.0]", r"chain\.links\.hand\.2: field required"),
+        ("hand: [0.126, 0.0, 0.0]", "hand: [0.126, 0.0]", r"chain\.links\.hand\.2 is missing"),
         ("baud_rate: 1000000", "baud_rate: 0", r"bus\.baud_rate: input should be greater than 0"),
     ],
 )

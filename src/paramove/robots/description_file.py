@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from paramove.input_error import InputError
+from paramove.robots.yaml_findings import findings
 
-MOST_FINDINGS = 5
 POSITION_MODE_MOST = 4095
 
 
@@ -165,23 +165,11 @@ def read_robot_file(path: Path) -> RobotFile:
     except OSError as error:
         raise DescriptionError(f"{path} cannot be read: {error.strerror}") from error
     except ValidationError as error:
-        raise DescriptionError(f"{path}: {_findings(error)}") from error
+        raise DescriptionError(f"{path}: {findings(error)}") from error
     except (YAMLError, UnicodeDecodeError) as error:
         raise DescriptionError(f"{path}: {error}") from error
     _check(path, file)
     return file
-
-
-def _findings(error: ValidationError) -> str:
-    """Each wrong key: where, what was expected, what was found."""
-    found = error.errors()
-    told = [
-        f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'][:1].lower()}{item['msg'][1:]}, "
-        f"found {item['input']!r:.60}"
-        for item in found[:MOST_FINDINGS]
-    ]
-    more = f"; and {len(found) - MOST_FINDINGS} more" if len(found) > MOST_FINDINGS else ""
-    return "; ".join(told) + more
 
 
 def _check(path: Path, file: RobotFile) -> None:

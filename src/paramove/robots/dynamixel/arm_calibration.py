@@ -20,13 +20,13 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
+from paramove.robots.yaml_findings import findings
 
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
@@ -36,7 +36,6 @@ SEAM_MARGIN = 64
 """Counts that a travel must stay away from the encoder's seam, 5.6 degrees: joints sag, and stops give way."""
 LONGEST_TRAVEL = PULSES_PER_TURN - 2 * SEAM_MARGIN
 COUNTS_PER_RAD = PULSES_PER_TURN / (2.0 * math.pi)
-MOST_FINDINGS = 5
 HEADER = """\
 # How the servos of one arm are mounted, written by `paramove arm calibrate`. It may be edited:
 # afterwards `paramove arm verify --sign` renews the line sha256, which tells damage from intent.
@@ -143,7 +142,7 @@ class ArmCalibration(_Part):
         except OSError as error:
             raise CalibrationError(f"{path} cannot be read: {error.strerror}") from error
         except ValidationError as error:
-            raise CalibrationError(f"{path}: {_findings(error)}; {_REMEDY}") from error
+            raise CalibrationError(f"{path}: {findings(error)}; {_REMEDY}") from error
         except (YAMLError, ValueError, RecursionError) as error:  # numbers and dates that are none, too many brackets
             raise CalibrationError(f"{path} is no YAML: {error}; {_REMEDY}") from error
         found.check(str(path))
@@ -237,21 +236,6 @@ def _contradiction(joint: JointCalibration) -> str:
     if joint.operating_mode not in model_named(joint.model).modes:
         return f"{joint.model} has no operating mode {joint.operating_mode}"
     return ""
-
-
-def _findings(error: ValidationError) -> str:
-    return "; ".join(_told(item) for item in error.errors()[:MOST_FINDINGS])
-
-
-def _told(item: ErrorDetails) -> str:
-    where = ".".join(map(str, item["loc"])) or "the file"
-    if item["type"] == "missing":
-        return f"{where} is missing"
-    expected = f"{item['msg'][:1].lower()}{item['msg'][1:]}"
-    if item["type"] in ("model_type", "dict_type"):
-        expected = "expected lines of `name: value`"
-    found = "nothing" if item["input"] is None else f"{item['input']!r:.60}"
-    return f"{where}: {expected}, found {found}"
 
 
 def _writer() -> YAML:
