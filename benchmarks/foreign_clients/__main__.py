@@ -29,6 +29,9 @@ PACKAGES = (
     "rustypot==1.13.1",
     "pypot==5.0.2",
     "dynamixel_api==1.0.3",
+    "dynamixel-python==0.0.8",
+    "dynamixel-controller==0.9.2",
+    "setuptools<81",  # dynamixel-controller imports its pkg_resources
     "dynamixel-sdk==3.8.4",
     "numpy<2",
     "deepdiff",
@@ -39,6 +42,8 @@ CLIENTS = {
     "LeRobot 0.4.4": "with_lerobot.py",
     "pypot 5.0.2": "with_pypot.py",
     "dynamixel_api 1.0.3": "with_dynamixel_api.py",
+    "dynamixel-python 0.0.8": "with_dxl2.py",
+    "dynio 0.9.2": "with_dynio.py",
 }
 TIMEOUT_S = 60.0
 TRIES = 3
@@ -70,7 +75,7 @@ def install(console: Console) -> None:
     if stamp.exists() and stamp.read_text() == wanted:
         return
     with console.status("installs other people's programs into build/foreign_clients"):
-        venv.create(ENVIRONMENT, with_pip=True)
+        venv.create(ENVIRONMENT, clear=True, with_pip=True)
         for packages in (PACKAGES, ("--no-deps", *ALONE)):
             subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", *packages], check=True)
     stamp.write_text(wanted)
