@@ -5,22 +5,20 @@ the line before the block, change that:
 
     <!-- check only: why -->       the targets, sub-commands and options exist, but nothing is started
     <!-- needs a running demo -->  run while the demo runs in the same domain
-    <!-- on an emulated arm -->    run with an emulated Koch v1.1 plugged in, in the order of the page
+    <!-- on an emulated arm -->    run with an emulated Koch v1.1 plugged in, in the order of the page; those of
+                                   "Connect your arm" by `tests/system/test_connect_your_arm.py`
     <!-- in the example: 78 -->    run by `test_examples.py` in a workspace with the files that the page shows; 78 is
                                    the exit code that is expected, 0 if it is left out
 """
 
-import atexit
 import functools
 import itertools
-import os
 import re
 import shlex
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -28,21 +26,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from tests.docs.markdown import MARKERS, PAGES, ROOT, Block, blocks
-from tests.robots.dynamixel.koch_arm import PLAN, hands, koch_servos
+from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks
+from tests.docs.terminal import ENVIRONMENT, attended
+from tests.robots.dynamixel.koch_arm import hands, koch_servos
 from tests.robots.dynamixel.small_arm import LINK
 
 BLOCKS = [block for path in PAGES for block in blocks(path)]
-RUNTIME = tempfile.TemporaryDirectory(prefix="paramove-docs-")  # sockets lie there; short, as their paths must be
-atexit.register(RUNTIME.cleanup)
-ENVIRONMENT = {
-    **os.environ,
-    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-    "XDG_RUNTIME_DIR": RUNTIME.name,
-    "PARAMOVE_DOMAIN": "docs",
-    "COLUMNS": "120",
-    "NO_COLOR": "1",
-}
 
 
 def run(command, seconds=60.0):
@@ -100,9 +89,7 @@ def test_commands_look_at_a_running_demo(block, demo):
     run_block(block)
 
 
-REQUEST = "Enter when it is done, q to end.\n"
-LAST_JOINT = f"  {PLAN.servos[-1].joint}: "
-ON_THE_ARM = {block.path for block in BLOCKS if block.marker == "on an emulated arm"}
+ON_THE_ARM = {block.path for block in BLOCKS if block.marker == "on an emulated arm"} - {CONNECT_YOUR_ARM}
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in sorted(ON_THE_ARM)])
@@ -116,30 +103,6 @@ def test_commands_work_on_an_emulated_arm(page, tmp_path):
                 steps = hands(emulator) if "calibrate" in command else []
                 code, output = attended(command, steps, ENVIRONMENT | places)
                 assert code == 0, f"{block}\n{command}\n{output}"
-
-
-def attended(command, steps, environment):
-    """Exit code and output of a command whose requests a person follows: each is read before the next step is taken."""
-    with subprocess.Popen(
-        ["bash", "-euo", "pipefail", "-c", command],
-        cwd=ROOT,
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as running:
-        said = []
-        for act, line in steps:
-            for answer in iter(running.stdout.readline, ""):
-                said.append(answer)
-                if answer.endswith(REQUEST) or answer.startswith(LAST_JOINT):
-                    break
-            act()
-            running.stdin.write(line)
-            running.stdin.flush()
-        rest, _ = running.communicate(timeout=60)
-    return running.returncode, "".join(said) + rest
 
 
 @pytest.mark.parametrize("block", marked("check only"))

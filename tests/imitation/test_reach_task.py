@@ -58,6 +58,20 @@ def test_begins_where_the_arm_rests_and_not_before() -> None:
     np.testing.assert_allclose(cell.sent[0].points[0].position_rad, rested, rtol=0, atol=1e-12)
 
 
+def test_a_wait_that_takes_longer_is_said_aloud_and_again_for_another_reason() -> None:
+    cell = ServoCell(steps=STEPS[:1])
+    cell.disarm(SafetyState.STATE_DISARMED, "joint 2 is far")
+    cell.tick(10)
+    assert not cell.speech
+    cell.tick(60)
+    cell.disarm(SafetyState.STATE_DISARMED, "joint 3 is far")
+    cell.tick(60)
+    wanted = "waiting until a person arms the arm (paramove arm enable); joint"
+    assert [one.sentence for one in cell.speech] == [f"{wanted} 2 is far", f"{wanted} 3 is far"]
+    cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
+    assert cell.run().task.finished
+
+
 def test_another_arm_than_the_planned_one_ends_the_tasks_with_what_helps() -> None:
     cell = ServoCell()
     cell.task.on_joint_states(JointStates(joints=[JointState(name="elbow_flex", position=0.1)]))

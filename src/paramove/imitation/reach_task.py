@@ -30,6 +30,8 @@ _log = logging.getLogger(__name__)
 
 RESEND_NS = 400_000_000
 SILENT_NS = 10_000_000_000
+TOLD_AFTER_NS = 1_000_000_000
+"""For so long an arm may be unarmed before that is said aloud: where a node arms it, nobody has to hear of it."""
 STALE_TRIES = 3
 _STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REFUSED: "refused"}
 
@@ -127,6 +129,7 @@ class ReachTask:
         self._says = ReachSays()
         self._now_ns = 0
         self._unarmed = self.sentence = "waiting for the arm's driver"
+        self._unarmed_since_ns, self._unarmed_told = 0, ""
         self.failure = ""
         self.finished = False
         self._rehearse()
@@ -202,7 +205,7 @@ class ReachTask:
             self._fail(f"the arm has no joint {absent}: give the reacher the same `robot` as the arm's driver")
             return
         if not self._armed:
-            self.sentence = self._unarmed
+            self._wait()
             return
         if self._at is None:
             self._at = self._joints.settled(self._now_ns)
@@ -216,6 +219,14 @@ class ReachTask:
             self._fail(f"joint {joint} stands {degrees:.1f} deg outside its range; disarm, move it by hand, arm again")
             return
         self._plan(self._at)
+
+    def _wait(self) -> None:
+        """For a driver and an armed arm."""
+        if self.sentence != self._unarmed or not self._unarmed_since_ns:
+            self.sentence, self._unarmed_since_ns = self._unarmed, self._now_ns
+        elif self._now_ns - self._unarmed_since_ns > TOLD_AFTER_NS and self._unarmed_told != self._unarmed:
+            self._unarmed_told = self._unarmed
+            self._tell(self._unarmed)
 
     def _plan(self, start: FloatArray) -> None:
         going_home = self._done >= len(self._steps)

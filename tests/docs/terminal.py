@@ -1,0 +1,58 @@
+"""A terminal in the workspace, and a person who does what a command asks for."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from tests.docs.markdown import ROOT
+from tests.robots.dynamixel.koch_arm import PLAN, Step
+
+RUNTIME = tempfile.TemporaryDirectory(prefix="paramove-docs-")  # sockets lie there; short, as their paths must be
+atexit.register(RUNTIME.cleanup)
+ENVIRONMENT = {
+    **os.environ,
+    "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+    "XDG_RUNTIME_DIR": RUNTIME.name,
+    "PARAMOVE_DOMAIN": "docs",
+    "COLUMNS": "120",
+    "NO_COLOR": "1",
+}
+REQUEST = "Enter when it is done, q to end.\n"
+LAST_JOINT = f"  {PLAN.servos[-1].joint}: "
+
+
+def started(command: str, environment: Mapping[str, str]) -> subprocess.Popen[str]:
+    """A line typed in bash, whose output is read and whose input is written."""
+    return subprocess.Popen(
+        ["bash", "-euo", "pipefail", "-c", command],
+        cwd=ROOT,
+        env=dict(environment),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def attended(command: str, steps: Iterable[Step], environment: Mapping[str, str]) -> tuple[int, str]:
+    """Exit code and output of a command whose requests a person follows: each is read before the next step is taken."""
+    with started(command, environment) as running:
+        assert running.stdin is not None
+        assert running.stdout is not None
+        said = []
+        for act, line in steps:
+            for answer in iter(running.stdout.readline, ""):
+                said.append(answer)
+                if answer.endswith(REQUEST) or answer.startswith(LAST_JOINT):
+                    break
+            act()
+            running.stdin.write(line)
+            running.stdin.flush()
+        rest, _ = running.communicate(timeout=60)
+    return running.returncode, "".join(said) + rest

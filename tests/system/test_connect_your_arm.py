@@ -1,0 +1,107 @@
+"""The page "Connect your arm", from new servos to the first reach: real processes, real bytes on an emulated bus."""
+
+import json
+
+import pytest
+
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.emulated_arm import EmulatedArm
+from paramove.robots.dynamixel.emulated_servo import EmulatedServo
+from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.servo_models import MODELS
+from tests.docs.markdown import CONNECT_YOUR_ARM, blocks
+from tests.docs.terminal import ENVIRONMENT, attended, started
+from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands
+from tests.robots.dynamixel.small_arm import LINK
+
+COMMANDS = [
+    command for block in blocks(CONNECT_YOUR_ARM) if block.marker == "on an emulated arm" for command in block.commands
+]
+SETUP, SCAN, CALIBRATE, VERIFY, EMULATED, REAL, ENABLE, STOP = COMMANDS
+EEPROM_END = 64
+
+pytestmark = pytest.mark.slow
+
+
+def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tmp_path):
+    link = tmp_path / "by-id" / LINK
+    link.parent.mkdir()
+    places = {"PARAMOVE_SERIAL_BY_ID": str(link.parent), "PARAMOVE_DATA": str(tmp_path / "data")}
+    environment = ENVIRONMENT | places | {"PARAMOVE_DOMAIN": "connect"}
+    servos = [EmulatedServo(MODELS[one.model]) for one in PLAN.servos]
+    with DynamixelEmulator(servos, link) as emulator:
+        typed(SETUP, environment, [(connecting(emulator, [servo]), "\n") for servo in servos])
+        connecting(emulator, servos)()
+        rows = [line.split() for line in typed(SCAN, environment).splitlines()]
+        assert [row[:2] for row in rows[-len(servos) :]] == [[str(one.number), one.model] for one in PLAN.servos]
+        typed(CALIBRATE, environment, hands(emulator))
+        assert "no differences" in typed(VERIFY, environment)
+    (calibration,) = (tmp_path / "data" / "calibration").iterdir()
+    launch = REAL.replace("/dev/serial/by-id/NAME", str(link)).replace("=FILE", f"={calibration}")
+    assert str(link) in launch
+    assert str(calibration) in launch
+
+    with EmulatedArm(RobotDescription.load(KOCH), link=link, held=True) as arm:
+        screw_on(servos, arm)
+        with started(f"{launch} --runs {tmp_path / 'runs'}", environment) as running:
+            heard(running, "waiting until a person arms the arm (paramove arm enable)")
+            assert "ARMED: the arm may move" in typed(ENABLE, environment, said="y\n")
+            heard(running, "all 2 tasks are done")
+            assert running.wait(30) == 0
+        with started(f"{launch} --runs {tmp_path / 'runs'}", environment) as running:
+            heard(running, "waiting until a person arms the arm")
+            typed(ENABLE, environment, said="y\n")
+            heard(running, "task 1 of 2")
+            typed(STOP, environment)
+            heard(running, "FAILED", "the arm's driver stopped the motion: stopped from the terminal by a person")
+            assert running.wait(30) != 0
+
+
+def test_the_application_reaches_and_carries_an_object_without_an_arm(launcher):
+    code, shown = launcher.run(*EMULATED.split()[2:], timeout_s=300)
+    assert code == 0, shown
+    assert "SUCCESS: 2 of 2 tasks done" in shown
+    summary = json.loads((launcher.latest / "run.json").read_text())
+    assert [one["task"] for one in summary["tasks"]] == ["reach", "place"]
+    assert (launcher.latest / "tasks.png").stat().st_size > 10_000
+
+
+def typed(command, environment, steps=(), said=""):
+    """Output of a command that must end well; `said` answers what it asks without a line's end."""
+    if said:
+        with started(command, environment) as running:
+            output, _ = running.communicate(said, timeout=60)
+            code = running.returncode
+    else:
+        code, output = attended(command, steps, environment)
+    assert code == 0, f"{command}\n{output}"
+    return output
+
+
+def heard(running, *words):
+    """Read on until a line has all these words."""
+    seen = []
+    for line in running.stdout:
+        seen.append(line)
+        if all(word in line for word in words):
+            return
+    raise AssertionError(f"{words} was not said:\n{''.join(seen)}")
+
+
+def connecting(emulator, servos):
+    """A person plugs in these and no others."""
+
+    def act():
+        with emulator.lock:
+            emulator.bus.servos = list(servos)
+
+    return act
+
+
+def screw_on(servos, arm):
+    """What was kept in these servos is kept in those that move the arm."""
+    with arm.emulator.lock:
+        for known, mounted in zip(servos, arm.emulator.bus.servos, strict=True):
+            for name, register in known.model.registers.items():
+                if register.address < EEPROM_END:
+                    mounted.memory[name] = known.memory[name]
