@@ -1,11 +1,10 @@
 """The page "Connect your arm", from new servos to the first reach: real processes, real bytes on an emulated bus."""
 
+import contextlib
 import json
 
 import pytest
 
-from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated_arm import EmulatedArm
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_models import MODELS
@@ -47,14 +46,13 @@ def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tm
     assert str(link) in launch
     assert str(calibration) in launch
 
-    with EmulatedArm(RobotDescription.load(KOCH), link=link, held=True) as arm:
-        screw_on(servos, arm)
-        with started(launch, environment) as running:
+    with mounted(servos, link):
+        with launched(launch, environment) as running:
             heard(running, "waiting until a person arms the arm (paramove arm enable)")
             assert "ARMED: the arm may move" in typed(ENABLE, environment, said="y\n")
             heard(running, "all 2 tasks are done")
             assert running.wait(30) == 0
-        with started(launch, environment) as running:
+        with launched(launch, environment) as running:
             heard(running, "waiting until a person arms the arm")
             typed(ENABLE, environment, said="y\n")
             heard(running, "task 1 of 2")
@@ -104,10 +102,28 @@ def connecting(emulator, servos):
     return act
 
 
-def screw_on(servos, arm):
-    """What was kept in these servos is kept in those that move the arm."""
-    with arm.emulator.lock:
-        for known, mounted in zip(servos, arm.emulator.bus.servos, strict=True):
-            for name, register in known.model.registers.items():
-                if register.address < EEPROM_END:
-                    mounted.memory[name] = known.memory[name]
+@contextlib.contextmanager
+def launched(command, environment):
+    """An application, which ends with the test."""
+    with started(f"exec {command}", environment) as running:
+        try:
+            yield running
+        finally:
+            if running.poll() is None:
+                running.terminate()
+
+
+@contextlib.contextmanager
+def mounted(servos, link):
+    """Servos that keep what these keep move an arm, in a process: this one, with all its tests, makes long pauses."""
+    kept = []
+    for servo in servos:
+        registers = servo.model.registers.items()
+        kept.append({name: servo.memory[name] for name, one in registers if one.address < EEPROM_END})
+    with started(f"exec python -m tests.system.mounted_servos {KOCH} {link}", ENVIRONMENT) as arm:
+        arm.stdin.write(f"{json.dumps(kept)}\n")
+        arm.stdin.flush()
+        heard(arm, "plugged in")
+        yield
+        arm.communicate(timeout=30)
+        assert arm.returncode == 0
