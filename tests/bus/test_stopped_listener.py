@@ -149,4 +149,4 @@ def test_images_for_a_stopped_listener_do_not_pile_up_in_the_speaker(
     for number in range(300):  # ten seconds of 30 Hz
         publisher.publish(image, 0, number)
     grown = psutil.Process().memory_info().rss - before
-    assert grown <= 8 * 2**20, f"{grown / 2**20:.1f} MB for 300 MB said"
+    assert grown <= 16 * 2**20, f"{grown / 2**20:.1f} MB for 300 MB said"  # six that wait, and those under way

@@ -20,7 +20,7 @@ SETUP, SCAN, CALIBRATE, VERIFY, EMULATED, REAL, ENABLE, STOP = COMMANDS
 EEPROM_END = 64
 PATIENCE = "".join(
     f" --set arm_driver.patience.{name}={value}"
-    for name, value in {"silent_s": 0.5, "watchdog_s": 0.5, "read_s": 0.1}.items()
+    for name, value in {"silent_s": 1.0, "watchdog_s": 1.0, "read_s": 0.1}.items()
 )
 """As in the overlay `emulated`: what is emulated shares the processors with other tests, and may be late."""
 

@@ -219,6 +219,19 @@ def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port)
     assert fault.sentence.endswith("check cables and the motors' power")
 
 
+def test_the_loop_does_not_wait_for_an_arm_that_is_silent(arm, emulator, port, monkeypatch):
+    monkeypatch.setattr("paramove.robots.dynamixel.late_answers.REST_S", 100.0)
+    arm.measured()
+    sound = arm.measured()
+    port.latency_s = 0.005
+    with emulator.lock:
+        for _ in range(20):  # without an end if each of them waited
+            reading = arm.measured()
+            assert arm.look_after() is None
+        assert (reading.at_ns, reading.counts.tolist()) == (sound.at_ns, list(PLACES))
+        assert arm.fault_of_answers(reading).code == "joint_silent"
+
+
 def test_nothing_is_made_up_for_a_joint_that_was_never_heard(arm, emulator, port):
     change(emulator, 2, "ID", 9)
     port.latency_s = 0.03

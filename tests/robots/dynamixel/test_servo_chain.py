@@ -1,5 +1,8 @@
 """Questions to servos over the wire: every answer is the right servo's, and what never came is not made up."""
 
+import time
+from threading import Event
+
 import pytest
 
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
@@ -166,3 +169,44 @@ def test_an_answer_that_comes_several_questions_too_late_is_not_taken_for_anothe
             heard += len(found)
             assert set(found.values()) <= {right}
     assert heard >= least
+
+
+def silenced(chain: ServoChain) -> None:
+    """Ask until it is no use to ask at once again; the servos must be kept from answering."""
+    chain.port.latency_s = 0.005
+    while chain.has_room():
+        assert positions(chain, 1, 2, 3) == {}
+
+
+def test_silent_servos_are_asked_less_often_and_are_heard_as_soon_as_they_talk_again(chain, emulator, monkeypatch):
+    monkeypatch.setattr("paramove.robots.dynamixel.late_answers.REST_S", 100.0)
+    with emulator.lock:
+        silenced(chain)
+        asked = chain.counts.asked
+        assert not chain.has_room()
+    ends_s = time.monotonic() + 20.0
+    while not chain.has_room():
+        assert time.monotonic() < ends_s, "answers that came late were not heard"
+    assert chain.counts.asked == asked
+    chain.port.latency_s = PATIENT_S
+    assert positions(chain, 1, 2, 3) == {number: int(place) for number, place in PLACES.items()}
+
+
+def test_goals_that_are_written_do_not_put_off_the_next_question(chain, emulator):
+    with emulator.lock:
+        silenced(chain)
+        ends_s = time.monotonic() + 20.0
+        while not chain.has_room():
+            assert time.monotonic() < ends_s, "nobody is asked any more"
+            chain.sync_write(REGISTERS["Goal Position"], {1: 1000})
+            Event().wait(0.01)
+
+
+def test_one_silent_servo_does_not_keep_the_others_from_being_asked(chain):
+    chain.port.latency_s = 0.005
+    for _ in range(20):
+        assert positions(chain, 1, 7, 3).items() <= {1: 1000, 3: 3000}.items()
+    chain.port.latency_s = PATIENT_S
+    assert positions(chain, 1, 2, 3).keys() == PLACES.keys()
+    chain.sync_read([1, 7], POSITION)
+    assert chain.has_room()

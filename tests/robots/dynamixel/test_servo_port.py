@@ -153,3 +153,14 @@ def test_a_port_that_is_not_there_or_none_is_told_with_those_that_are(tmp_path, 
         ServoPort(str(file)).open()
     with pytest.raises(InputError, match="is no serial port but something else"):
         ServoPort(str(tmp_path)).open()
+
+
+def test_an_adapter_that_hangs_is_lost_and_can_be_opened_again(emulator, monkeypatch):
+    monkeypatch.setattr("paramove.robots.dynamixel.servo_port.LONGEST_WRITE_S", 0.05)
+    with ServoPort(emulator.port, latency_s=PATIENT_S) as port:
+        with emulator.lock, pytest.raises(PortLostError, match=r"\(it took no byte for 0.05 s\): is its cable plugged"):
+            port.writePort(bytes(200_000))  # far more than any port keeps
+        with pytest.raises(PortLostError, match="not open"):
+            port.writePort(bytes(2))
+        port.open()
+        assert port.writePort(bytes(200)) == 200

@@ -185,7 +185,7 @@ class ServoArm:
 
     def measured(self) -> ArmReading | None:
         """Where the joints are; None until all were heard once. One that does not answer keeps its last position."""
-        answers = self._chain.sync_read(self._numbers, [self._registers["Present Position"]])
+        answers = self._read("Present Position")
         for servo in self.servos:
             if servo.number in answers:
                 self.health[servo.joint].answers = answers[servo.number]
@@ -256,11 +256,17 @@ class ServoArm:
 
     def _told(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
         """Of each servo that answers, its health so far and these registers."""
-        answers = self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
+        answers = self._read(*names)
         for servo in self.servos:
             if servo.number in answers:
                 values = answers[servo.number].values
                 yield servo, self.health[servo.joint], [values[name] for name in names]
+
+    def _read(self, *names: str) -> dict[int, Answered]:
+        """Of the servos that answer. The loop does not wait for an arm that is silent; it goes on telling it goals."""
+        if not self._chain.has_room():
+            return {}
+        return self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
 
     def unheard(self) -> str:
         """Which servos have never answered, in words; "" if all have."""

@@ -8,12 +8,12 @@ for that to the next question.
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dynamixel_sdk import COMM_SUCCESS, Protocol2PacketHandler
 
+from paramove.robots.dynamixel.late_answers import LateAnswers
 from paramove.robots.dynamixel.packets import (
     ALERT,
     BROADCAST,
@@ -31,11 +31,6 @@ PACKET_BYTES = 11
 """Of an answer without data."""
 MOST_BYTES = 4096
 ATTEMPTS = 3
-MOST_OWED, QUIET_S, LONGEST_NOISE_S = 16, 0.05, 1.0
-"""After silences, a read asks for some bytes more: an answer that comes too late then has the wrong length. Lengths of
-so many questions are remembered, until one is answered by all, behind whose answers no earlier one can come; beyond
-that the wire is left alone until it is quiet.
-"""
 PING_DATA = 3
 TURN_S = 0.003
 """For each ID's answer to a ping of all: so long waits dynamixel-sdk 4.1.0 (`broadcastPing`); a servo alone with ID 5
@@ -129,7 +124,13 @@ class ServoChain:
         self.port = port
         self.counts = WireCounts()
         self._sdk = Protocol2PacketHandler()
-        self._owed: deque[int] = deque(maxlen=MOST_OWED)
+        self._late = LateAnswers()
+
+    def has_room(self) -> bool:
+        """Whether a read asks at once; behind many questions that nobody answered it waits for its turn."""
+        if self._late.many:
+            self._hear_late(0.0)
+        return not self._late.rest_s
 
     def ping(self, number: int) -> PingedServo | None:
         """Ask one servo whether it is there."""
@@ -189,7 +190,7 @@ class ServoChain:
         found: dict[int, Answered] = {}
         for order in (1, -1):  # a servo waits for the answer of the one before it: behind a missing one none may answer
             missing = [number for number in numbers if number not in found][::order]
-            if missing:
+            if missing and (order == 1 or self.has_room()):
                 found |= self.read_once(missing, registers)
         return found
 
@@ -210,9 +211,9 @@ class ServoChain:
         self._send(lambda: self._sdk.syncWriteTxOnly(self.port, register.address, register.size, content, len(content)))
 
     def _read(self, numbers: Sequence[int], address: int, size: int) -> dict[int, Packet]:
-        if len(self._owed) == MOST_OWED:
-            self._wait_for_quiet()
-        wide = next(one for one in range(size, size + MOST_OWED + 1) if one not in self._owed)
+        while not self.has_room():
+            self._hear_late(self._late.rest_s)
+        wide = self._late.length_for(size)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
             packet = [0, 0, 0, 0, numbers[0], 7, 0, Instruction.READ, *asked, 0, 0]
@@ -222,30 +223,30 @@ class ServoChain:
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
         )
 
-    def _wait_for_quiet(self) -> None:
-        """So much is owed that an answer to an old question could be taken for one to the next."""
-        ends_s = time.monotonic() + LONGEST_NOISE_S
-        self.port.setPacketTimeoutMillis(1e3 * QUIET_S)
-        while self.port.readPort(MOST_BYTES) and time.monotonic() < ends_s:
-            self.port.setPacketTimeoutMillis(1e3 * QUIET_S)
-        self._owed.clear()
+    def _hear_late(self, wait_s: float) -> None:
+        self.port.setPacketTimeoutMillis(1e3 * wait_s)
+        for packet in PacketReader().feed(self.port.readPort(MOST_BYTES)):
+            if isinstance(packet, Packet) and packet.instruction == Instruction.STATUS:
+                self._late.heard(len(packet.parameters) - 1)
 
     def _exchange(self, send: Callable[[], int], sizes: dict[int, int]) -> dict[int, Packet]:
         """Ask, and wait for the answer of each of these servos with so many bytes of data."""
+        self._late.asked()
         self._send(send)
         self.counts.asked += len(sizes)
         answer_bytes = sum(PACKET_BYTES + size for size in sizes.values())
         self.port.setPacketTimeout(answer_bytes, len(sizes))
-        noisy, stray = self.counts.noisy, self.counts.stray
-        answers = self._trusted(self._answers(dict(sizes)), sizes)
-        if self.counts.stray > stray and not self._owed:  # else they are answers that came too late
+        noisy, stray, owing = self.counts.noisy, self.counts.stray, bool(self._late)
+        found = self._answers(dict(sizes))
+        answers = self._trusted(found, sizes)
+        if self.counts.stray > stray and not owing:  # else they are answers that came too late
             self.counts.noisy = noisy + 1
+        if any(len(packet.parameters) - 1 in sizes.values() for packet in found):
+            self._late.answered()
         missing = len(sizes) - len(answers)
         self.counts.missing += missing
         if missing:
-            self._owed.append(max(sizes.values()))
-        else:
-            self._owed.clear()
+            self._late.missed(max(sizes.values()))
         return answers
 
     def _send(self, send: Callable[[], int]) -> None:
@@ -278,6 +279,7 @@ class ServoChain:
                     found.append(packet)
                 else:
                     self.counts.stray += 1
+                    self._late.heard(len(packet.parameters) - 1)
             if not data and self.port.isPacketTimeout():
                 break
         self.counts.exchanges += 1

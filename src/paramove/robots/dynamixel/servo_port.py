@@ -3,6 +3,7 @@
 
 The SDK's (4.1.0) stays busy for ever after an unplugged cable, waits 34 ms for a servo that is not there, asks the
 clock on the wall, spins while it waits, lets a second program open the port, and sends FF FF FD within a packet bare.
+pyserial's own writing spins for ever at an adapter that hangs.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ SLOWEST, FASTEST = 9_600, 4_500_000
 LATENCY_S = 0.004
 """Beyond the time of the bytes and the servo's own delay; an adapter with a latency timer of 16 ms needs more."""
 LONGEST_RETURN_DELAY_S = 254 * 2e-6
+LONGEST_WRITE_S = 0.5
+"""An adapter that hangs takes some thousand bytes, and then no more."""
 
 
 class PortLostError(OSError):
@@ -116,7 +119,7 @@ class ServoPort:
         content = data[BEFORE_INSTRUCTION:-2]
         if HEADER in content:
             data = encoded(Packet(data[BEFORE_LENGTH - 1], content[0], content[1:]))
-        self._do(lambda port: port.write(data))
+        self._do(lambda port: _write(port, data))
         self._asked_bytes = len(data)
         return len(packet)
 
@@ -158,6 +161,19 @@ class ServoPort:
         except (OSError, termios.error, TypeError) as error:  # pyserial has all of them for a port that went away
             self.close()
             raise PortLostError(f"{self.name} went away ({_words(error)}): is its cable plugged in?") from error
+
+
+def _write(port: Any, data: bytes) -> None:
+    """All of it, as soon as there is room."""
+    ends_s = time.monotonic() + LONGEST_WRITE_S
+    while data:
+        with contextlib.suppress(BlockingIOError):
+            data = data[os.write(port.fd, data) :]
+        left_s = ends_s - time.monotonic()
+        if data and (left_s <= 0.0 or not select.select([], [port.fd], [], left_s)[1]):
+            with contextlib.suppress(termios.error):
+                port.reset_output_buffer()  # else closing it waits for ever, too
+            raise OSError(errno.ETIMEDOUT, f"it took no byte for {LONGEST_WRITE_S:g} s")
 
 
 def _check_baud_rate(baud_rate: int) -> None:
