@@ -1,7 +1,7 @@
 """Questions to servos over the wire: every answer is the right servo's, and what never came is not made up."""
 
 import time
-from threading import Event
+from threading import Event, Timer
 
 import pytest
 
@@ -210,3 +210,10 @@ def test_one_silent_servo_does_not_keep_the_others_from_being_asked(chain):
     assert positions(chain, 1, 2, 3).keys() == PLACES.keys()
     chain.sync_read([1, 7], POSITION)
     assert chain.has_room()
+
+
+def test_a_pause_of_the_machine_is_no_silent_servo(chain, emulator):
+    chain.port.latency_s = 0.005
+    emulator.lock.acquire()
+    Timer(0.06, emulator.lock.release).start()
+    assert chain.read(1, REGISTERS["Present Position"]) == 1000

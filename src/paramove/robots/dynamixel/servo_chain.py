@@ -30,7 +30,8 @@ from paramove.robots.dynamixel.servo_port import BITS_PER_BYTE, ServoPort
 PACKET_BYTES = 11
 """Of an answer without data."""
 MOST_BYTES = 4096
-ATTEMPTS = 3
+ATTEMPTS_S = (0.0, 0.02, 0.2)
+"""So much longer than an answer needs, each attempt waits: machines and adapters make pauses, servos do not."""
 PING_DATA = 3
 TURN_S = 0.003
 """For each ID's answer to a ping of all: so long waits dynamixel-sdk 4.1.0 (`broadcastPing`); a servo alone with ID 5
@@ -152,8 +153,8 @@ class ServoChain:
 
     def read(self, number: int, register: Register) -> int:
         """One number of one servo. Raises ServoError."""
-        for _ in range(ATTEMPTS):
-            answers = self._read([number], register.address, register.size)
+        for patience_s in ATTEMPTS_S:
+            answers = self._read([number], register.address, register.size, patience_s)
             if number in answers:
                 _check(number, answers[number], f"read {register.name}")
                 return _values([register], answers[number])[register.name]
@@ -162,9 +163,11 @@ class ServoChain:
     def write(self, number: int, register: Register, value: int) -> None:
         """Write one number of one servo. Raises ServoError."""
         data = list(_bytes(register, value))
-        for _ in range(ATTEMPTS):
+        for patience_s in ATTEMPTS_S:
             answers = self._exchange(
-                lambda: self._sdk.txPacket(self.port, _write_packet(number, register.address, data)), {number: 0}
+                lambda: self._sdk.txPacket(self.port, _write_packet(number, register.address, data)),
+                {number: 0},
+                patience_s,
             )
             if number in answers:
                 _check(number, answers[number], f"write {register.name} = {value}")
@@ -210,14 +213,14 @@ class ServoChain:
         content = [byte for number, value in values.items() for byte in (number, *_bytes(register, value))]
         self._send(lambda: self._sdk.syncWriteTxOnly(self.port, register.address, register.size, content, len(content)))
 
-    def _read(self, numbers: Sequence[int], address: int, size: int) -> dict[int, Packet]:
+    def _read(self, numbers: Sequence[int], address: int, size: int, patience_s: float = 0.0) -> dict[int, Packet]:
         while not self.has_room():
             self._hear_late(self._late.rest_s)
         wide = self._late.length_for(size)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
             packet = [0, 0, 0, 0, numbers[0], 7, 0, Instruction.READ, *asked, 0, 0]
-            return self._exchange(lambda: self._sdk.txPacket(self.port, packet), {numbers[0]: wide})
+            return self._exchange(lambda: self._sdk.txPacket(self.port, packet), {numbers[0]: wide}, patience_s)
         sizes = dict.fromkeys(numbers, wide)
         return self._exchange(
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
@@ -229,13 +232,13 @@ class ServoChain:
             if isinstance(packet, Packet) and packet.instruction == Instruction.STATUS:
                 self._late.heard(len(packet.parameters) - 1)
 
-    def _exchange(self, send: Callable[[], int], sizes: dict[int, int]) -> dict[int, Packet]:
+    def _exchange(self, send: Callable[[], int], sizes: dict[int, int], patience_s: float = 0.0) -> dict[int, Packet]:
         """Ask, and wait for the answer of each of these servos with so many bytes of data."""
         self._late.asked()
         self._send(send)
         self.counts.asked += len(sizes)
         answer_bytes = sum(PACKET_BYTES + size for size in sizes.values())
-        self.port.setPacketTimeout(answer_bytes, len(sizes))
+        self.port.setPacketTimeout(answer_bytes, len(sizes), patience_s)
         noisy, stray, owing = self.counts.noisy, self.counts.stray, bool(self._late)
         found = self._answers(dict(sizes))
         answers = self._trusted(found, sizes)
@@ -313,8 +316,8 @@ def _check(number: int, packet: Packet, what: str) -> None:
 
 def _silent(number: int, what: str) -> ServoSilentError:
     sentence = (
-        f"servo {number} did not answer ({what}, {ATTEMPTS} attempts): check its cable, its power and the baud rate; "
-        "`paramove arm scan` looks for it"
+        f"servo {number} did not answer ({what}, {len(ATTEMPTS_S)} attempts): check its cable, its power and the baud "
+        "rate; `paramove arm scan` looks for it"
     )
     return ServoSilentError(number, sentence)
 
