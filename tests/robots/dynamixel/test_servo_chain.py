@@ -212,8 +212,13 @@ def test_one_silent_servo_does_not_keep_the_others_from_being_asked(chain):
     assert chain.has_room()
 
 
-def test_a_pause_of_the_machine_is_no_silent_servo(chain, emulator):
+@pytest.mark.parametrize(
+    "ask",
+    [lambda chain: chain.read(1, REGISTERS["Present Position"]), lambda chain: chain.ping(1)],
+    ids=["read", "ping"],
+)
+def test_a_pause_of_the_machine_is_no_silent_servo(chain, emulator, ask):
     chain.port.latency_s = 0.005
     emulator.lock.acquire()
     Timer(0.06, emulator.lock.release).start()
-    assert chain.read(1, REGISTERS["Present Position"]) == 1000
+    assert ask(chain) is not None

@@ -235,7 +235,7 @@ def _pinged_in_vain(chain: ServoChain, number: int) -> PingedServo | None:
     """Most likely, and so without much patience."""
     latency_s, chain.port.latency_s = chain.port.latency_s, min(chain.port.latency_s, SHORT_LATENCY_S)
     try:
-        return chain.ping(number)
+        return chain.ping(number, patient=False)
     finally:
         chain.port.latency_s = latency_s
 

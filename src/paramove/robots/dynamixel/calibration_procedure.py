@@ -78,7 +78,7 @@ class ArmCalibrator:
         """The servos by joint. Raises CalibrationError with all that are missing or of another model."""
         found, wrong = {}, []
         for servo in self._plan.servos:
-            pinged = next((one for _ in range(ATTEMPTS) if (one := self._chain.ping(servo.number))), None)
+            pinged = self._chain.ping(servo.number)
             if pinged is None:
                 wrong.append(f"{servo.joint}: expected {servo.model} with ID {servo.number}, none answers")
                 continue

@@ -133,11 +133,14 @@ class ServoChain:
             self._hear_late(0.0)
         return not self._late.rest_s
 
-    def ping(self, number: int) -> PingedServo | None:
-        """Ask one servo whether it is there."""
+    def ping(self, number: int, patient: bool = True) -> PingedServo | None:
+        """Ask one servo whether it is there, as patiently as a read asks, or once."""
         packet = [0, 0, 0, 0, number, 3, 0, Instruction.PING, 0, 0]
-        answers = self._exchange(lambda: self._sdk.txPacket(self.port, packet), {number: PING_DATA})
-        return _pinged(answers[number]) if number in answers else None
+        for patience_s in ATTEMPTS_S if patient else ATTEMPTS_S[:1]:
+            answers = self._exchange(lambda: self._sdk.txPacket(self.port, packet), {number: PING_DATA}, patience_s)
+            if number in answers:
+                return _pinged(answers[number])
+        return None
 
     def ping_all(self) -> list[PingedServo]:
         """All servos that answer at this baud rate, by ID.

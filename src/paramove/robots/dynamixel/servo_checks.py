@@ -140,7 +140,7 @@ def watchdog_fault(servo: JointServo, watchdog_s: float) -> Fault:
 
 
 def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
-    pinged = chain.ping(servo.number) or chain.ping(servo.number)
+    pinged = chain.ping(servo.number)
     if pinged is None:
         sentence = f"{servo} does not answer: check cable, power and ID; {ENDED} `paramove arm scan` looks for it"
         return [Fault("servo_missing", servo.joint, sentence)]

@@ -22,7 +22,7 @@ class ServoLoadedError(InputError):
 
 def servo_before_reboot(chain: ServoChain, number: int) -> FoundServo:
     """The servo as it is. Raises ServoSilentError if it does not answer."""
-    pinged = next((one for _ in range(3) if (one := chain.ping(number)) is not None), None)
+    pinged = chain.ping(number)
     if pinged is None:
         raise ServoSilentError(number, f"servo {number} does not answer; `paramove arm scan` shows who is there")
     return looked_at(chain, pinged)
@@ -59,7 +59,7 @@ def reboot_servo(chain: ServoChain, number: int, patience_s: float = PATIENCE_S)
     chain.reboot(number)
     end_s = time.monotonic() + patience_s
     while time.monotonic() < end_s:
-        pinged = chain.ping(number)
+        pinged = chain.ping(number, patient=False)
         if pinged is not None:
             return looked_at(chain, pinged)
     raise ServoSilentError(number, f"servo {number} does not answer {patience_s:g} s after its reboot: check its power")

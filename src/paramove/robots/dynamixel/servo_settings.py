@@ -162,7 +162,7 @@ def _with_description(calibration: ArmCalibration, plan: ArmPlan) -> list[Differ
 
 
 def _with_servo(chain: ServoChain, name: str, joint: JointCalibration) -> list[Difference]:
-    pinged = next((answer for _ in range(3) if (answer := chain.ping(joint.id)) is not None), None)
+    pinged = chain.ping(joint.id)
     if pinged is None:
         return [Difference(name, "servo", f"ID {joint.id}", None, SERVO)]
     model = model_named(joint.model)
