@@ -5,6 +5,7 @@ The listener is a process of its own that says on its standard output what it ha
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import signal
@@ -148,5 +149,6 @@ def test_images_for_a_stopped_listener_do_not_pile_up_in_the_speaker(
     before = psutil.Process().memory_info().rss
     for number in range(300):  # ten seconds of 30 Hz
         publisher.publish(image, 0, number)
+    ctypes.CDLL(None).malloc_trim(0)  # what is free already does not count
     grown = psutil.Process().memory_info().rss - before
-    assert grown <= 16 * 2**20, f"{grown / 2**20:.1f} MB for 300 MB said"  # six that wait, and those under way
+    assert grown <= 8 * 2**20, f"{grown / 2**20:.1f} MB for 300 MB said"

@@ -2,8 +2,10 @@
 
 import contextlib
 import json
+from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
@@ -18,11 +20,12 @@ COMMANDS = [
 ]
 SETUP, SCAN, CALIBRATE, VERIFY, EMULATED, REAL, ENABLE, STOP = COMMANDS
 EEPROM_END = 64
+OVERLAY = YAML(typ="safe").load(Path("launch/overlays/dynamixel_arm/emulated.yaml"))
 PATIENCE = "".join(
     f" --set arm_driver.patience.{name}={value}"
-    for name, value in {"silent_s": 1.0, "watchdog_s": 1.0, "read_s": 0.1}.items()
+    for name, value in OVERLAY["nodes"]["arm_driver"]["parameters"]["patience"].items()
 )
-"""As in the overlay `emulated`: what is emulated shares the processors with other tests, and may be late."""
+"""What is emulated shares the processors with other tests, and may be late."""
 
 pytestmark = pytest.mark.slow
 
