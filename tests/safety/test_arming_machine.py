@@ -28,6 +28,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.words: list[ArmWord] = []
         self.delivered: list[ArmWord] = []
         self.checks: tuple[Fault, ...] = ()
+        self.checks_ms = 0
         self.plan: tuple[int, np.ndarray] | None = None
         self.pressed = self.heard_pressed = False
         self.source_speaks = True
@@ -38,8 +39,13 @@ class ArmingMachine(RuleBasedStateMachine):
         for _ in range(times):
             self.step()
 
-    @rule(age_ms=st.sampled_from([0, 0, 0, 0, 900, 1100, -1100]), source=st.sampled_from(["a person", "a person", ""]))
-    def somebody_arms(self, age_ms: int, source: str) -> None:
+    @rule(
+        age_ms=st.sampled_from([0, 0, 0, 0, 900, 1100, 3900, -1100]),
+        source=st.sampled_from(["a person", "a person", ""]),
+        checks_ms=st.sampled_from([0, 0, 200, 2950, 3100]),
+    )
+    def somebody_arms(self, age_ms: int, source: str, checks_ms: int) -> None:
+        self.checks_ms = checks_ms
         self.says(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True))
 
     @rule()
@@ -140,12 +146,14 @@ class ArmingMachine(RuleBasedStateMachine):
             self.heard_pressed, self.source_heard_ns = self.pressed, arm.now + ms * MS
         pressed = self.heard_pressed or arm.now + ms * MS - self.source_heard_ns > 500 * MS
         said |= {"word": word, "emergency": emergency, "arming_faults": self.checks, "proposal": self.proposal}
+        said["checks_began_ns"] = arm.now + (ms - self.checks_ms) * MS if self.checks_ms else None
         targets, state, faults = arm.step(ms=ms, **said)
         assert (state is State.ESTOP) == pressed
         if state is State.ARMED and before is not State.ARMED:
             self.expect_a_person_now(word, before, rested)
         elif word is not None and word.armed and word.captured_ns > self.only_later_ns and not pressed:
             self.expect_reasons(word, before, faults)
+        self.checks_ms = 0
         if targets is not None:
             self.expect_a_movement_that_may_be(targets, before, state)
         if state is not State.ARMED:
@@ -159,11 +167,19 @@ class ArmingMachine(RuleBasedStateMachine):
         assert word is not None
         assert word.armed
         assert word.source
-        assert abs(self.arm.now - word.captured_ns) <= 1000 * MS
+        assert self.of_time(word) == set()
         assert word.captured_ns > self.only_later_ns
         assert self.checks == ()
         assert rested
         assert self.arm.core.faults == ()
+
+    def of_time(self, word: ArmWord) -> set[str]:
+        """What its time alone makes wrong with a word."""
+        age_ms = (self.arm.now - word.captured_ns) // MS
+        if age_ms < 0:
+            return {"arming_stale"} if age_ms < -1000 else set()
+        stale, slow = age_ms - self.checks_ms > 1000, min(age_ms, self.checks_ms) > 3000
+        return {name for name, wrong in (("arming_stale", stale), ("arming_slow", slow)) if wrong}
 
     def expect_reasons(self, word: ArmWord, before: State, faults: tuple[str, ...]) -> None:
         """Whoever may not arm is told every check that fails."""
@@ -171,7 +187,7 @@ class ArmingMachine(RuleBasedStateMachine):
         if before not in (State.DISARMED, State.HOLD) or newer or self.arm.core.state is State.DISCONNECTED:
             return
         failing = {fault.code for fault in self.checks}
-        failing |= {"arming_stale"} if abs(self.arm.now - word.captured_ns) > 1000 * MS else set()
+        failing |= self.of_time(word)
         failing |= set() if word.source else {"arming_source"}
         assert failing <= set(faults)
         assert faults

@@ -70,6 +70,32 @@ def test_a_word_to_arm_may_be_a_second_old(age_ms: int, faults: tuple[str, ...])
     assert arm.step(word=ArmWord(arm.now + (10 - age_ms) * MS, "a person", True))[2] == faults
 
 
+@pytest.mark.parametrize(
+    ("age_ms", "checks_ms", "told"),
+    [
+        (4000, 3000, ()),
+        (3000, 3000, ()),
+        (2, 3001, ()),  # said while earlier words were judged
+        (4001, 3000, ("arming_stale",)),
+        (3001, 3001, ("arming_slow",)),
+        (4500, 3100, ("arming_stale", "arming_slow")),
+        (-1001, 3100, ("arming_stale",)),
+        (1001, -5000, ("arming_stale",)),  # checks cannot begin in the future
+    ],
+)
+def test_what_the_checks_take_does_not_make_a_word_old(age_ms: int, checks_ms: int, told: tuple[str, ...]) -> None:
+    arm = SmallArm()
+    arm.step(ms=5000)
+    now = arm.now + 10 * MS
+    word = ArmWord(now - age_ms * MS, "a person", True)
+    assert arm.step(word=word, checks_began_ns=now - checks_ms * MS)[2] == told
+    assert (arm.core.state is State.ARMED) == (told == ())
+    if "arming_slow" in told:
+        slow = f"the checks before arming took {checks_ms} ms, allowed 3000 ms; see what keeps the bus or this computer"
+        assert arm.core.faults[-1] == Fault("arming_slow", "", f"{slow} busy, and say the word again")
+    assert arm.arm()[1] is State.ARMED
+
+
 def test_an_arm_that_is_moved_by_hand_while_held_is_disarmed_at_once() -> None:
     arm = SmallArm()
     assert arm.step(stop=VOLTAGE)[1] is State.HOLD

@@ -165,7 +165,7 @@ class SafetyCore:
             else:
                 self.state = State.DISARMED
         elif self.state in (State.DISARMED, State.HOLD):
-            self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, word, measured))
+            self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, inputs, word, measured))
             if too_often:
                 sentence = f"more arm words than allowed: {self._words.allowed} within 250 ms; wait"
                 self._add(Fault("arming_rate", "", sentence))
@@ -175,14 +175,23 @@ class SafetyCore:
                 self._played = max(0, measured.next_index)
         return None
 
-    def _arming_faults(self, now_ns: int, word: ArmWord, measured: Measured) -> list[Fault]:
+    def _arming_faults(self, now_ns: int, inputs: Inputs, word: ArmWord, measured: Measured) -> list[Fault]:
         """Every check that fails; none means that the gate may be armed."""
         faults = []
         # A word to arm counts only while the person who said it still looks; one to disarm always counts.
-        age_ms, allowed_ms = (now_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
+        began_ns = now_ns if inputs.checks_began_ns is None else inputs.checks_began_ns
+        heard_ns = min(max(began_ns, word.captured_ns), now_ns)  # one said during the checks was heard at once
+        age_ms, allowed_ms = (heard_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
         if abs(age_ms) > allowed_ms:
             sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
             faults.append(Fault("arming_stale", "", sentence))
+        checks_ms, allowed_ms = (now_ns - heard_ns) * 1e-6, self.settings.checks_ms
+        if checks_ms > allowed_ms:
+            sentence = (
+                f"the checks before arming took {checks_ms:.0f} ms, allowed {allowed_ms:.0f} ms; see what keeps the "
+                "bus or this computer busy, and say the word again"
+            )
+            faults.append(Fault("arming_slow", "", sentence))
         if not word.source:
             faults.append(Fault("arming_source", "", "the arm word names no source; say who arms"))
         if not measured.at_rest:

@@ -72,8 +72,8 @@ class Inputs:
     """All that a step may know.
 
     `stop` is a fault that the driver has found, `arming_faults` are those that only forbid arming (ids, models,
-    voltage, …). `emergency` says whether the emergency stop is pressed; None: its source said nothing since the last
-    step.
+    voltage, …), of checks that began at `checks_began_ns` (None: now). `emergency` says whether the emergency stop is
+    pressed; None: its source said nothing since the last step.
     """
 
     measured: Measured | None = None
@@ -82,6 +82,7 @@ class Inputs:
     stop: Fault | None = None
     arming_faults: tuple[Fault, ...] = ()
     emergency: bool | None = None
+    checks_began_ns: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +112,7 @@ class SafetySettings:
     """Ages in ms, angles in rad, rates per second.
 
     Attributes:
+        word_age_ms: Of a word to arm, when it was heard: when the checks began, which may take `checks_ms`.
         following: How far each joint may be from where it is commanded, [J], for up to `following_ms`; inf for a joint
             that may be held off for good, such as fingers by what they hold; None: for no joint.
         emergency_timeout_ms: An emergency stop not heard for so long counts as pressed; None if the robot has none.
@@ -120,6 +122,7 @@ class SafetySettings:
     measured_timeout_ms: float = 500.0
     proposal_age_ms: float = 250.0
     word_age_ms: float = 1000.0
+    checks_ms: float = 3000.0
     lost_rows_ms: float = 500.0
     pose_tolerance: float = float(np.deg2rad(0.5))
     following: FloatArray | None = None

@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import select
+import threading
 import time
 from dataclasses import replace
 
@@ -121,6 +122,15 @@ def test_what_is_wrong_with_the_servos_keeps_it_disarmed(person):
     person.hears_until(lambda: person.safety.faults)
     assert person.codes() == [("servo_settings", "joint2"), ("hardware_error", "joint4")]
     assert person.memory("Torque Enable") == [0] * 5
+
+
+def test_a_word_to_arm_does_not_grow_old_while_the_servos_are_checked(person, monkeypatch):
+    person.waits_for("DISARMED")
+    check = ServoArm.check
+    monkeypatch.setattr(ServoArm, "check", lambda arm: threading.Event().wait(1.2) or check(arm))
+    person.arms()
+    person.waits_for("ARMED")
+    assert person.codes() == []
 
 
 def test_torque_that_was_on_at_the_start_does_not_make_it_jump(person):

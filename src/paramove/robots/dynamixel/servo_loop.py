@@ -35,6 +35,8 @@ HEALTH_STEPS, SUPPLY_STEPS = 10, 100
 REOPEN_S = 0.5
 WATCHDOG_SHARE = 0.5
 """After a silence of the loop of this part of what a servo bears, it is asked whether it has stopped by itself."""
+REST_S = 0.0002
+"""A loop that is late gives up its lock for so long each period: else it takes it again before whoever waits for it."""
 TICK_S = 0.02
 """The driver's logic is asked so often; at once where something is wrong."""
 
@@ -150,7 +152,7 @@ class ServoLoop:
                 with self.lock:
                     self._one_period()
                 self._said()
-                self._stopped.wait(max(0.0, due_s - time.monotonic()))
+                self._stopped.wait(max(REST_S, due_s - time.monotonic()))
             rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
             with self.lock:
                 self._end(rests)
@@ -204,7 +206,9 @@ class ServoLoop:
 
     def _prepare(self) -> ArmReading | None:
         """Check the servos and let them hold where they are, before the gate hears the word to arm."""
-        self.driver.on_arming_checks(self._settings.standing_faults or self._arm.check() or self._arm.take_hold())
+        began_ns = time.monotonic_ns()
+        faults = self._settings.standing_faults or self._arm.check() or self._arm.take_hold()
+        self.driver.on_arming_checks(faults, began_ns)
         return self._arm.measured()
 
     def _fault(self, reading: ArmReading) -> Fault | None:

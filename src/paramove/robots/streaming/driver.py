@@ -90,6 +90,7 @@ class ArmDriver:
         self._asked: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
         self._arming_faults: tuple[Fault, ...] = ()
+        self._checks_began_ns: int | None = None
         self._emergency: bool | None = None
         self._execution: Execution | None = None
         self._statuses: list[TrajectoryStatus] = []
@@ -147,9 +148,9 @@ class ArmDriver:
         """Hear what is wrong with the robot: the next `tick` begins a controlled stop and latches it."""
         self._stop = fault
 
-    def on_arming_checks(self, faults: tuple[Fault, ...]) -> None:
-        """Hear which checks of the robot fail now; while one does, nobody arms."""
-        self._arming_faults = faults
+    def on_arming_checks(self, faults: tuple[Fault, ...], began_ns: int | None = None) -> None:
+        """Hear which checks of the robot fail now, and when they began; while one does, nobody arms."""
+        self._arming_faults, self._checks_began_ns = faults, began_ns
 
     def on_emergency(self, pressed: bool) -> None:
         """Hear the emergency stop; pressed once since the last `tick` is pressed."""
@@ -178,10 +179,10 @@ class ArmDriver:
         proposal = self._proposal(now_ns)
         targets = None
         for word in words:
-            inputs = Inputs(measured, word, proposal, stop, self._arming_faults, self._emergency)
+            inputs = Inputs(measured, word, proposal, stop, self._arming_faults, self._emergency, self._checks_began_ns)
             given, _, _ = self._core.step(now_ns, inputs)
             targets = given or targets
-        self._emergency = None
+        self._emergency = self._checks_began_ns = None
         if self._core.state is not State.DISCONNECTED:  # there a stop waits until the robot is heard again
             self._stop = None
         stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
