@@ -10,7 +10,7 @@ from paramove.bus.node import Bus, NodeConfig, main
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 
-HEARS = tuple(topic for topic in topics.TOPICS if topic.recorded)
+HEARS = topics.RECORDED
 SAYS = ()
 
 REPORT_EVERY = 1500

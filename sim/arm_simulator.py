@@ -32,7 +32,7 @@ HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
 SAYS = (
     topics.CLOCK,
     topics.CAMERA_LIGHT,
-    *topics.CAMERA_LIGHTS[:2],
+    *topics.STEREO_LIGHTS,
     topics.WIRE_HOAP3_STATE,
     topics.TRUTH_LAYOUT,
     topics.TRUTH_STATE,
@@ -61,7 +61,7 @@ def say_of_arm(bus: Bus, simulation: Simulation, every: int = 1) -> None:
     """What is true of the arm in this tick, and what is seen of it in every so many ticks."""
     assert isinstance(simulation, ArmSimulation)
     seen = simulation.tick % every == 0
-    for topic, light in zip(topics.CAMERA_LIGHTS, simulation.arm_lights() if seen else [], strict=False):
+    for topic, light in zip(topics.STEREO_LIGHTS, simulation.arm_lights() if seen else [], strict=False):
         bus.publish(topic, light, simulation.now_ns)
     bus.publish(topics.TRUTH_ARM, simulation.truth_arm(), simulation.now_ns)
 

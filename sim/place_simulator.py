@@ -25,7 +25,7 @@ from sim.place_simulation import PlaceSimulation
 HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
 SAYS = (
     topics.CLOCK,
-    *topics.CAMERA_LIGHTS[:2],
+    *topics.STEREO_LIGHTS,
     topics.WIRE_HOAP3_STATE,
     topics.TRUTH_LAYOUT,
     topics.TRUTH_STATE,

@@ -1,26 +1,37 @@
 """Nodes of a launch file fit together, or the error says where they do not."""
 
+from pathlib import Path
+
 import pytest
 
 from paramove.bus import topics
+from paramove.supervision import interfaces
 from paramove.supervision.interfaces import InterfaceError, read_interface
 from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+
+ROOT = Path(__file__).parents[2]
+NODES = [
+    f"{folder}.{path.stem}"
+    for folder in ("nodes", "sim")
+    for path in sorted((ROOT / folder).glob("*.py"))
+    if "\nHEARS = " in path.read_text()
+]
 
 
 def checked(workspace, text):
     workspace.write(text)
     launch = workspace.load()
-    interfaces = read_interfaces(launch, workspace.root)
-    check_wiring(launch, interfaces, workspace.root)
-    return interfaces
+    read = read_interfaces(launch, workspace.root)
+    check_wiring(launch, read, workspace.root)
+    return read
 
 
 def test_topics_with_a_speaker_pass(workspace):
-    interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
-    assert interfaces["ear"].hears == (topics.SPEECH,)
-    assert interfaces["ear"].parameters == ("loudness", "language")
-    assert clock_speaker(interfaces) is None
+    found = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
+    assert found["ear"].hears == (topics.SPEECH,)
+    assert found["ear"].parameters == ("loudness", "language")
+    assert clock_speaker(found) is None
 
 
 @pytest.mark.parametrize(
@@ -100,3 +111,12 @@ def test_unreadable_interface_is_told(workspace, source, message):
     (workspace.root / "nodes" / "odd.py").write_text(source)
     with pytest.raises(InterfaceError, match=message):
         read_interface("nodes.odd", workspace.root)
+
+
+@pytest.mark.parametrize("module", NODES)
+def test_no_node_has_to_be_imported_to_be_known(module, monkeypatch):
+    """Each of those would make every launch two seconds longer."""
+    asked = []
+    monkeypatch.setattr(interfaces, "_imported", lambda *ask: asked.append(ask) or ((), ()))
+    read_interface(module, ROOT)
+    assert asked == []

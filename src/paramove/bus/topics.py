@@ -148,6 +148,8 @@ TOPICS: tuple[Topic, ...] = tuple(
 )
 """Every topic but the status topics, which exist once per node: see `status`."""
 
+RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+STEREO_LIGHTS = CAMERA_LIGHTS[:2]
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
 """A person's stops: a driver hears all of them."""
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.signal import savgol_filter
 
 from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
 
@@ -42,6 +41,8 @@ def resampled(movement: Movement, rate_hz: float) -> Movement:
 
 def speeds(movement: Movement, point: str = FINGERTIP) -> Floats:
     """Speed of a point in each frame. Shape (T,), m/s; independent of the coordinate frame."""
+    from scipy.signal import savgol_filter  # half a second, which only those who ask for speeds should wait
+
     path = movement.point(point)
     period = float(np.median(np.diff(movement.time)))
     count = int(np.floor(movement.duration / period + 1e-6)) + 1
