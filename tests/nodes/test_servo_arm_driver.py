@@ -28,7 +28,7 @@ from paramove.robots.dynamixel.emulator import DynamixelEmulator
 FOLDER = Path("robot_description/open_manipulator_x")
 ROBOT = RobotDescription.load(FOLDER)
 PATIENT_S = 20.0
-PATIENCE = {"silent_s": 2.0, "watchdog_s": 2.54, "read_s": 1.0}
+PATIENCE = {"silent_s": 2.0, "watchdog_s": 2.54, "read_s": 0.4}
 HEARS = (topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS, topics.ARM_JOINT_STATES_FAST)
 MOVE = """
 import sys
@@ -97,9 +97,8 @@ class Run:
 
 
 @pytest.fixture
-def run(monkeypatch):
+def run():
     """A driver in a thread of its own, armed from a terminal; other programs may keep the emulator waiting."""
-    monkeypatch.setattr("paramove.robots.dynamixel.arm_setup.LATENCY_SHARE", 30.0)
     with tempfile.TemporaryDirectory(prefix="arm-") as name, contextlib.ExitStack() as opened:
         folder, link = Path(name), Path(name) / "usb-emulated_0001-if00-port0"
         emulator = opened.enter_context(DynamixelEmulator(emulated_servos(ROBOT), link))

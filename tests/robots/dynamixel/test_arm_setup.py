@@ -7,18 +7,20 @@ import pytest
 from pydantic import ValidationError
 
 from paramove.input_error import InputError
+from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.arm_calibration import CalibrationError, JointCalibration
 from paramove.robots.dynamixel.arm_setup import ServoArmSetup, calibrated, joint_servos, servo_port, uncalibrated
 from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
+from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.small_arm import calibration
 
 FOLDER = Path("robot_description")
 KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
-PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0)
+PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=0.4)
 
 
 def one_of(place: int) -> JointCalibration:
@@ -65,6 +67,20 @@ def test_in_simulation_its_zeros_are_those_of_the_description(tmp_path):
         arm_sees = Person(arm)
         arm_sees.arms_and_waits()
         np.testing.assert_allclose(arm_sees.angles[-1], KOCH.base_pose, rtol=0, atol=np.deg2rad(0.1))
+
+
+def test_an_arm_whose_servos_are_always_late_is_heard_if_it_may_be_read_slowly(tmp_path):
+    """Each answer comes after the next period's question."""
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    servos = emulated_servos(KOCH)
+    with DynamixelEmulator(servos, link) as late, setup(link, nominal=True).driven_arm(tmp_path) as arm:
+        person = Person(arm)
+        person.arms_and_waits()
+        late.faults = WireFaults(delay_s=0.02)
+        heard = len(person.angles)
+        person.hears_until(lambda: len(person.angles) > heard + 100)
+        assert person.safety.state == SafetyState.STATE_ARMED
+        assert arm.trouble == ""
 
 
 def test_another_arms_calibration_is_refused(tmp_path):

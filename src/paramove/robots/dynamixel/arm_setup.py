@@ -22,7 +22,8 @@ from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.safety.gate_io import Fault
 
 LATENCY_SHARE = 0.8
-"""Of the loop's period: so long it may wait for a servo. A missing one costs periods, one that is late costs none."""
+"""Of the time for reading all servos: so long the loop may wait for one. A missing one costs periods, one that is late
+costs none."""
 
 
 class ServoArmSetup(BaseModel):
@@ -63,7 +64,7 @@ class ServoArmSetup(BaseModel):
             InputError: Its description or calibration is missing or wrong, or is another arm's.
         """
         description = RobotDescription.load(self.robot)
-        port = servo_port(description, str(run_folder / self.port))
+        port = servo_port(description, str(run_folder / self.port), self.patience.read_s)
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
@@ -93,11 +94,17 @@ def calibrated(description: RobotDescription, calibration: ArmCalibration) -> Ro
     return replace(d, units=units, lower=units.lower, upper=units.upper, soft_lower=soft_lower, soft_upper=soft_upper)
 
 
-def servo_port(description: RobotDescription, name: str) -> ServoPort:
-    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus."""
+def servo_port(description: RobotDescription, name: str, read_s: float | None = None) -> ServoPort:
+    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus.
+
+    Args:
+        description: Of the arm.
+        name: Of the port.
+        read_s: That reading all servos may take; None: a period of the loop.
+    """
     if description.bus is None:
         raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
-    return ServoPort(name, description.bus.baud_rate, LATENCY_SHARE * 1e-6 * description.stream.period_us)
+    return ServoPort(name, description.bus.baud_rate, LATENCY_SHARE * (read_s or 1e-6 * description.stream.period_us))
 
 
 def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:

@@ -42,7 +42,7 @@ class Patience:
     Attributes:
         silent_s: By the loop, of a servo.
         watchdog_s: By a servo, of the bus; then it stops by itself. 0.02 to 2.54 s.
-        read_s: By the checks before arming, for reading all servos once; None: a period of the loop.
+        read_s: For reading all servos once, also by the checks before arming; None: a period of the loop.
     """
 
     silent_s: float = 0.050
