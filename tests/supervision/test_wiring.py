@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from paramove.bus import topics
-from paramove.supervision import interfaces
 from paramove.supervision.interfaces import InterfaceError, read_interface
 from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
@@ -22,16 +21,16 @@ NODES = [
 def checked(workspace, text):
     workspace.write(text)
     launch = workspace.load()
-    read = read_interfaces(launch, workspace.root)
-    check_wiring(launch, read, workspace.root)
-    return read
+    interfaces = read_interfaces(launch, workspace.root)
+    check_wiring(launch, interfaces, workspace.root)
+    return interfaces
 
 
 def test_topics_with_a_speaker_pass(workspace):
-    found = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
-    assert found["ear"].hears == (topics.SPEECH,)
-    assert found["ear"].parameters == ("loudness", "language")
-    assert clock_speaker(found) is None
+    interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
+    assert interfaces["ear"].hears == (topics.SPEECH,)
+    assert interfaces["ear"].parameters == ("loudness", "language")
+    assert clock_speaker(interfaces) is None
 
 
 @pytest.mark.parametrize(
@@ -117,6 +116,6 @@ def test_unreadable_interface_is_told(workspace, source, message):
 def test_no_node_has_to_be_imported_to_be_known(module, monkeypatch):
     """Each of those would make every launch two seconds longer."""
     asked = []
-    monkeypatch.setattr(interfaces, "_imported", lambda *ask: asked.append(ask) or ((), ()))
+    monkeypatch.setattr("paramove.supervision.interfaces._imported", lambda *ask: asked.append(ask) or ((), ()))
     read_interface(module, ROOT)
     assert asked == []

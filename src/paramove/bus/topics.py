@@ -150,6 +150,7 @@ TOPICS: tuple[Topic, ...] = tuple(
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 STEREO_LIGHTS = CAMERA_LIGHTS[:2]
+"""What two cameras see of a tracked arm."""
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
 """A person's stops: a driver hears all of them."""
 

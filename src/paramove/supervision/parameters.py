@@ -1,7 +1,7 @@
 """Parameters of nodes, checked by the nodes' own Config before anything starts.
 
 The modules are imported in one process of its own, because they import heavy libraries. Only nodes are asked that are
-given parameters or need some, so this costs under a second for the launch files of this project.
+given parameters or need some, for this is most of what a launch waits for before it starts.
 """
 
 from __future__ import annotations
