@@ -103,7 +103,7 @@ class Rig:
     def arms(self) -> None:
         """Returns when the gate is armed."""
         wait(lambda: self.loop.driver.state in (State.DISARMED, State.HOLD))
-        self.arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
+        self.arm.on_arm_request(ArmRequest(source="benchmark", armed=True, by_person=True), time.monotonic_ns())
         wait(lambda: self.loop.driver.state is State.ARMED)
 
     def moves(self) -> None:
@@ -219,7 +219,7 @@ def drive(description: RobotDescription, port: str) -> None:
     settings = LoopSettings(patience=BUSY)
     with DrivenArm(description, joint_servos(description), servo_port(description, port), settings) as arm:
         wait(lambda: arm._loop.driver.state is State.DISARMED)
-        arm.on_arm_request(ArmRequest(source="benchmark", armed=True), time.monotonic_ns())
+        arm.on_arm_request(ArmRequest(source="benchmark", armed=True, by_person=True), time.monotonic_ns())
         wait(lambda: arm._loop.driver.state is State.ARMED)
         message = JointTrajectory(id="movement", joints=list(description.joint_names))
         target = description.base_pose.copy()

@@ -67,7 +67,7 @@ class World:
                     if self.stopping_s and not self.batch_s:
                         self.batch_s = now_s
                 elif event.message.state == SafetyState.STATE_DISARMED:
-                    self.bus.publish(topics.OPERATOR_ARM, ArmRequest(source="benchmark", armed=True))
+                    self.bus.publish(topics.OPERATOR_ARM, ArmRequest(source="benchmark", armed=True, by_person=True))
                 elif event.message.state == SafetyState.STATE_ARMED and not self.moving_s and link_in(self.folder):
                     self.moving_s = now_s
                     self.bus.publish(topics.ARM_TRAJECTORY, trajectory("one", GOAL, 3.0))

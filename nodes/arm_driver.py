@@ -2,6 +2,7 @@
 
 Hears   arm/trajectory         JointTrajectory        events
         operator/arm           ArmRequest             events, latched
+        operator/arm_at_start  ArmRequest             events, latched
         operator/stop          StopRequest            events, latched
         operator/estop         StopRequest            events, latched
         wire/hoap3/state       Hoap3State             15 Hz   joint units
@@ -17,8 +18,9 @@ from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.driver import ArmDriver
+from paramove.robots.this_launch import ThisLaunch
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS, topics.WIRE_HOAP3_STATE)
+HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
 SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
@@ -30,19 +32,16 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
-    driver = ArmDriver(RobotDescription.load(config.robot))
-    hear = {
-        topics.ARM_TRAJECTORY: driver.on_trajectory,
-        topics.OPERATOR_ARM: driver.on_arm_request,
-        topics.WIRE_HOAP3_STATE: driver.on_robot_state,
-    }
+    launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
+    driver = ArmDriver(RobotDescription.load(config.robot), no_program=lambda: launch.why_no_program(bus.settings))
+    hear = {topics.ARM_TRAJECTORY: driver.on_trajectory, topics.WIRE_HOAP3_STATE: driver.on_robot_state}
+    hear |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.sentence)
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
+            hear[event.topic](event.message, event.captured_ns)
             if event.topic not in topics.STOPS:
-                hear[event.topic](event.message, event.captured_ns)
-                continue
-            driver.on_stop(event.message)  # and at once a tick: a stop does not wait for the next period
+                continue  # a stop does not wait for the next period
         says = driver.tick(bus.now_ns)
         if says.stream is not None:
             bus.publish(topics.WIRE_HOAP3_STREAM, says.stream)

@@ -1,7 +1,7 @@
-"""Operator: in simulation, arms the safety gate once at the start. With `real: true` it refuses to start.
+"""Operator: arms the safety gate of an emulated robot once at the start. With `real: true` it refuses to start.
 
-Hears   arm/safety     SafetyState   15 Hz, latched
-Says    operator/arm   ArmRequest    once, latched
+Hears   arm/safety              SafetyState   15 Hz, latched
+Says    operator/arm_at_start   ArmRequest    until armed, latched
 """
 
 from pydantic import field_validator
@@ -9,9 +9,10 @@ from pydantic import field_validator
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
 from paramove.operator.arming_at_start import REAL_ROBOT, Operator
+from paramove.robots.this_launch import started_before
 
 HEARS = (topics.ARM_SAFETY,)
-SAYS = (topics.OPERATOR_ARM,)
+SAYS = (topics.OPERATOR_ARM_AT_START,)
 
 
 class Config(NodeConfig):
@@ -30,12 +31,12 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
-    operator = Operator(config.arms_at_start, bus.run_folder / "operator_has_armed")
+    operator = Operator(config.arms_at_start, config.arms_at_start and started_before(bus.run_folder, bus.node))
     bus.ready(operator.sentence)
     for heard in bus.latest(topics.ARM_SAFETY):
         request = operator.update(heard.message, bus.now_ns)
         if request is not None:
-            bus.publish(topics.OPERATOR_ARM, request)
+            bus.publish(topics.OPERATOR_ARM_AT_START, request)
 
 
 if __name__ == "__main__":

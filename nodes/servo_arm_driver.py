@@ -2,6 +2,7 @@
 
 Hears   arm/trajectory          JointTrajectory        events
         operator/arm            ArmRequest             events, latched
+        operator/arm_at_start   ArmRequest             events, latched
         operator/stop           StopRequest            events, latched
         operator/estop          StopRequest            events, latched
 Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
@@ -15,8 +16,9 @@ from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.dynamixel.arm_setup import ServoArmSetup
 from paramove.robots.dynamixel.driven_arm import DrivenArm
+from paramove.robots.this_launch import ThisLaunch
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
+HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
 SAYS = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
 
@@ -27,11 +29,12 @@ class Config(NodeConfig, ServoArmSetup):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
-    with config.driven_arm(bus.run_folder) as arm:
+    launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
+    with config.driven_arm(bus.run_folder, launch) as arm:
         bus.when_readable(arm.readable, lambda: say(bus, arm))
         hear = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
-            topics.OPERATOR_ARM: arm.on_arm_request,
+            **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
             **dict.fromkeys(topics.STOPS, arm.on_stop),
         }
         for event in bus.events(*HEARS, tick=True):

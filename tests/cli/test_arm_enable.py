@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from paramove.bus.endpoint import TopicTakenError
 from paramove.cli.arm_enable import enable
 from paramove.cli.main import build
+from paramove.cli.terminal_person import TerminalPerson
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 
 FAULTS = [SafetyFault(code=str(number), sentence=f"reason {number}") for number in (1, 2)]
@@ -37,6 +38,7 @@ def words(tmp_path, monkeypatch):
         return ANSWERS[told["answer"]]
 
     monkeypatch.setattr("paramove.operator.terminal_arming.arm_by_word", arm_by_word)
+    monkeypatch.setattr(TerminalPerson, "is_at_terminal", True)
     return told
 
 
@@ -86,7 +88,17 @@ def test_where_nothing_runs_it_is_told(words):
 
 
 def test_a_closed_standard_input_is_no_yes(words, monkeypatch):
+    monkeypatch.undo()
     monkeypatch.setattr(sys, "stdin", None)
     with pytest.raises(typer.Exit) as caught:
         enable(yes=False)
     assert (caught.value.exit_code, words["words"]) == (1, [])
+
+
+def test_what_has_no_terminal_arms_nothing_but_may_disarm(words, monkeypatch):
+    monkeypatch.setattr(TerminalPerson, "is_at_terminal", False)
+    done = said("enable", "--yes", line="y\n")
+    assert (done.exit_code, words["words"]) == (1, [])
+    assert "only a person at a terminal arms" in done.stderr
+    words["answer"] = "disarmed"
+    assert (said("disable").exit_code, words["words"]) == (0, [False])

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from tests.docs.markdown import ROOT
@@ -27,17 +28,30 @@ REQUEST = "Enter when it is done, q to end.\n"
 LAST_JOINT = f"  {PLAN.servos[-1].joint}: "
 
 
-def started(command: str, environment: Mapping[str, str]) -> subprocess.Popen[str]:
+def started(command: str, environment: Mapping[str, str], source: int = subprocess.PIPE) -> subprocess.Popen[str]:
     """A line typed in bash, whose output is read and whose input is written."""
     return subprocess.Popen(
         ["bash", "-euo", "pipefail", "-c", command],
         cwd=ROOT,
         env=dict(environment),
-        stdin=subprocess.PIPE,
+        stdin=source,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
+
+
+def at_terminal(command: str, keys: str, environment: Mapping[str, str]) -> tuple[int, str]:
+    """Exit code and output of a command whose input is a terminal, at which these keys were pressed."""
+    keyboard, terminal = os.openpty()
+    try:
+        os.write(keyboard, keys.encode())
+        with started(command, environment, terminal) as running:
+            output, _ = running.communicate(timeout=60)
+    finally:
+        os.close(keyboard)
+        os.close(terminal)
+    return running.returncode, output
 
 
 def attended(command: str, steps: Iterable[Step], environment: Mapping[str, str]) -> tuple[int, str]:
@@ -56,3 +70,25 @@ def attended(command: str, steps: Iterable[Step], environment: Mapping[str, str]
             running.stdin.flush()
         rest, _ = running.communicate(timeout=60)
     return running.returncode, "".join(said) + rest
+
+
+def heard(running: subprocess.Popen[str], *words: str) -> None:
+    """Read on until a line has all these words."""
+    seen = []
+    assert running.stdout is not None
+    for line in running.stdout:
+        seen.append(line)
+        if all(word in line for word in words):
+            return
+    raise AssertionError(f"{words} was not said:\n{''.join(seen)}")
+
+
+@contextlib.contextmanager
+def launched(command: str, environment: Mapping[str, str]) -> Iterator[subprocess.Popen[str]]:
+    """An application, which ends with the test."""
+    with started(f"exec {command}", environment) as running:
+        try:
+            yield running
+        finally:
+            if running.poll() is None:
+                running.terminate()

@@ -59,7 +59,7 @@ def test_a_disarmed_driver_refuses_trajectories_and_streams_nothing() -> None:
 
 
 def test_armed_by_a_word_it_streams_batches_that_end_in_a_stop_ramp() -> None:
-    word = ArmRequest(source="a person", armed=True)
+    word = ArmRequest(source="a person", armed=True, by_person=True)
     bus = replayed(
         12,
         {
@@ -78,15 +78,17 @@ def test_armed_by_a_word_it_streams_batches_that_end_in_a_stop_ramp() -> None:
 
 
 def test_a_robot_that_falls_silent_is_told() -> None:
-    bus = replayed(60, {5: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True))]}, until_state=20)
+    bus = replayed(
+        60, {5: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True, by_person=True))]}, until_state=20
+    )
     assert states(bus)[15] == SafetyState.STATE_ARMED
     assert states(bus)[-1] != SafetyState.STATE_ARMED
 
 
 def test_a_disarming_word_is_heard() -> None:
     words = {
-        5: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True))],
-        10: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=False))],
+        5: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True, by_person=True))],
+        10: [(topics.OPERATOR_ARM, ArmRequest(source="a person", armed=False, by_person=True))],
     }
     found = states(replayed(30, words))
     assert found[7] == SafetyState.STATE_ARMED

@@ -206,7 +206,8 @@ def of_arm_driver() -> list[Event]:
     robot, events = FakeRobot(), []
     robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
     more: dict[int, Said] = {
-        5: (topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True)),
+        5: (topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True, by_person=True)),
+        6: (topics.OPERATOR_ARM_AT_START, ArmRequest(source="a program", armed=True)),
         8: (topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)),
         50: (topics.OPERATOR_STOP, StopRequest(source="a person")),
         51: (topics.OPERATOR_ESTOP, StopRequest(source="terminal")),

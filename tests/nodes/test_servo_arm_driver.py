@@ -102,7 +102,7 @@ def run():
     with tempfile.TemporaryDirectory(prefix="arm-") as name, contextlib.ExitStack() as opened:
         folder, link = Path(name), Path(name) / "usb-emulated_0001-if00-port0"
         emulator = opened.enter_context(DynamixelEmulator(emulated_servos(ROBOT), link))
-        config = servo_arm_driver.Config(robot=FOLDER, port=link, nominal=True, patience=PATIENCE)
+        config = servo_arm_driver.Config(robot=FOLDER, port=link, patience=PATIENCE)
         made: list[Bus] = []
 
         def drive() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from pydantic import ValidationError
 
@@ -27,6 +25,7 @@ def test_arms_once_when_the_gate_is_disarmed() -> None:
     assert (request.source, request.reason) == ("operator node", "start of a simulated run")
     assert request.captured.ToNanoseconds() == SECOND
     assert operator.update(said(SafetyState.STATE_DISARMED), SECOND + SECOND // 15) is None
+    assert not request.by_person
     assert operator.update(said(SafetyState.STATE_DISARMED), 2 * SECOND) is not None  # the word was lost
     for state in (SafetyState.STATE_ARMED, SafetyState.STATE_HOLD, SafetyState.STATE_DISARMED):
         assert operator.update(said(state), 9 * SECOND) is None
@@ -41,17 +40,20 @@ def test_without_leave_it_never_arms() -> None:
     assert Operator(arms_at_start=False).update(said(SafetyState.STATE_DISARMED), 0) is None
 
 
-def test_once_an_earlier_process_has_armed_it_arms_no_more(tmp_path: Path) -> None:
-    memory = tmp_path / "armed"
-    first = Operator(arms_at_start=True, memory=memory)
-    assert not memory.exists()
-    assert first.update(said(SafetyState.STATE_DISARMED), 0) is not None
-    assert memory.exists()
-    second = Operator(arms_at_start=True, memory=memory)
-    assert second.update(said(SafetyState.STATE_DISARMED), 0) is None
-    assert second.sentence.startswith("does not arm: an operator of this run has armed before")
-    assert first.sentence == "arms once at the start"
-    assert Operator(arms_at_start=False, memory=memory).sentence == "does not arm"
+@pytest.mark.parametrize("state", ["STOPPING", "HOLD", "ESTOP"])
+def test_after_anything_but_waiting_it_never_arms_even_if_it_had_asked_for_nothing_yet(state: str) -> None:
+    operator = Operator(arms_at_start=True)
+    assert operator.update(said(SafetyState.STATE_DISCONNECTED), 0) is None
+    assert operator.update(said(getattr(SafetyState, f"STATE_{state}")), SECOND) is None
+    for later in range(2, 9):
+        assert operator.update(said(SafetyState.STATE_DISARMED), later * SECOND) is None
+
+
+def test_started_anew_it_arms_no_more() -> None:
+    operator = Operator(arms_at_start=True, restarted=True)
+    assert operator.update(said(SafetyState.STATE_DISARMED), 0) is None
+    assert operator.sentence.startswith("does not arm: it was started before in this run")
+    assert Operator(arms_at_start=False, restarted=True).sentence == "does not arm"
 
 
 def test_a_real_robot_is_for_a_person_to_arm() -> None:

@@ -54,7 +54,7 @@ class SmallArm:
         return targets, state, tuple(fault.code for fault in faults)
 
     def arm(self, **said: object) -> tuple[Targets | None, State, tuple[str, ...]]:
-        return self.step(word=ArmWord(self.now + 10 * MS, "a person", True), **said)
+        return self.step(word=ArmWord(self.now + 10 * MS, "a person", True, by_person=True), **said)
 
     def follow(self, path: np.ndarray, steps: int) -> None:
         """Propose `path` as a driver does, as long as the gate stays armed."""

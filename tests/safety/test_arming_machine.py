@@ -32,6 +32,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.plan: tuple[int, np.ndarray] | None = None
         self.pressed = self.heard_pressed = False
         self.source_speaks = True
+        self.emulated, self.touched = False, False
         self.source_heard_ns = self.only_later_ns = self.arm.now
 
     @rule(times=st.integers(1, 12))
@@ -43,14 +44,16 @@ class ArmingMachine(RuleBasedStateMachine):
         age_ms=st.sampled_from([0, 0, 0, 0, 900, 1100, 3900, -1100]),
         source=st.sampled_from(["a person", "a person", ""]),
         checks_ms=st.sampled_from([0, 0, 200, 2950, 3100]),
+        by_person=st.sampled_from([True, True, False]),
+        emulated=st.booleans(),
     )
-    def somebody_arms(self, age_ms: int, source: str, checks_ms: int) -> None:
-        self.checks_ms = checks_ms
-        self.says(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True))
+    def somebody_arms(self, age_ms: int, source: str, checks_ms: int, by_person: bool, emulated: bool) -> None:
+        self.checks_ms, self.emulated = checks_ms, emulated
+        self.says(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True, by_person))
 
     @rule()
     def somebody_disarms(self) -> None:
-        self.says(ArmWord(self.arm.now + 10 * MS, "a person", False))
+        self.says(ArmWord(self.arm.now + 10 * MS, "a person", False, by_person=True))
 
     @rule(goal=st.sampled_from(range(len(GOALS))), steps=st.integers(0, 25))
     def all_is_well_and_the_arm_moves(self, goal: int, steps: int) -> None:
@@ -58,7 +61,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.pressed, self.source_speaks, self.checks = False, True, ()
         for _ in range(12):
             self.step(ms=50)
-        self.says(ArmWord(self.arm.now + 10 * MS, "a person", True))
+        self.says(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
         assert self.arm.core.state is State.ARMED
         self.a_movement_is_asked_for(goal)
         for _ in range(steps):
@@ -67,7 +70,7 @@ class ArmingMachine(RuleBasedStateMachine):
     @rule(by_button=st.booleans(), steps=st.integers(1, 40))
     def a_word_is_said_before_a_stop_and_heard_after_it(self, by_button: bool, steps: int) -> None:
         self.pressed, self.source_speaks, self.checks = False, True, ()
-        self.words.append(ArmWord(self.arm.now + 10 * MS, "a person", True))
+        self.words.append(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
         self.step()
         if by_button:
             self.the_emergency_stop_is_pressed_or_released(True)
@@ -125,7 +128,7 @@ class ArmingMachine(RuleBasedStateMachine):
         mechanical = (np.full(3, -MECHANICAL), np.full(3, MECHANICAL))
         self.arm.core = SafetyCore(LIMITS, mechanical, EPOCH, self.arm.now, SETTINGS)
         self.plan = None
-        self.heard_pressed = False
+        self.heard_pressed = self.touched = False
         self.source_heard_ns = self.only_later_ns = self.arm.now
         self.step()
 
@@ -147,6 +150,7 @@ class ArmingMachine(RuleBasedStateMachine):
         pressed = self.heard_pressed or arm.now + ms * MS - self.source_heard_ns > 500 * MS
         said |= {"word": word, "emergency": emergency, "arming_faults": self.checks, "proposal": self.proposal}
         said["checks_began_ns"] = arm.now + (ms - self.checks_ms) * MS if self.checks_ms else None
+        said["no_program"] = "" if self.emulated else "it is real"
         targets, state, faults = arm.step(ms=ms, **said)
         assert (state is State.ESTOP) == pressed
         if state is State.ARMED and before is not State.ARMED:
@@ -154,6 +158,8 @@ class ArmingMachine(RuleBasedStateMachine):
         elif word is not None and word.armed and word.captured_ns > self.only_later_ns and not pressed:
             self.expect_reasons(word, before, faults)
         self.checks_ms = 0
+        lost = state is State.DISCONNECTED and before is not State.DISCONNECTED
+        self.touched |= lost or "stop" in said or state not in (State.DISCONNECTED, State.DISARMED)
         if targets is not None:
             self.expect_a_movement_that_may_be(targets, before, state)
         if state is not State.ARMED:
@@ -167,6 +173,7 @@ class ArmingMachine(RuleBasedStateMachine):
         assert word is not None
         assert word.armed
         assert word.source
+        assert word.by_person or (self.emulated and not self.touched)
         assert self.of_time(word) == set()
         assert word.captured_ns > self.only_later_ns
         assert self.checks == ()
@@ -189,6 +196,7 @@ class ArmingMachine(RuleBasedStateMachine):
         failing = {fault.code for fault in self.checks}
         failing |= self.of_time(word)
         failing |= set() if word.source else {"arming_source"}
+        failing |= set() if word.by_person or (self.emulated and not self.touched) else {"arming_program"}
         assert failing <= set(faults)
         assert faults
         assert all(fault.sentence for fault in self.arm.core.faults)

@@ -30,7 +30,7 @@ def measured(now_ns: int, *, at_rest: bool = True, next_index: int = 0, row: int
 
 
 def word(at_ns: int, *, armed: bool = True, source: str = "a person") -> ArmWord:
-    return ArmWord(at_ns, source, armed)
+    return ArmWord(at_ns, source, armed, by_person=True)
 
 
 def proposal(now_ns: int, first: int = 0, rows: int = 300, ahead: int = 400) -> Proposal:

@@ -56,7 +56,7 @@ def test_its_release_disarms_and_moves_nothing(state: State) -> None:
     pose = arm.stream[-1]
     targets, now_state, _ = arm.step(emergency=False, proposal=arm.proposal)
     assert (targets, now_state) == (None, State.DISARMED)
-    word = ArmWord(said_while_pressed, "a person", True)
+    word = ArmWord(said_while_pressed, "a person", True, by_person=True)
     assert arm.step(emergency=False, word=word)[1] is State.DISARMED
     for _ in range(20):
         assert arm.step(proposal=arm.proposal)[0] is None

@@ -56,6 +56,7 @@ def test_data_flows_onwards(sim):
 
 def test_what_is_heard_and_unsaid_is_marked(sim):
     assert {found.topic for found in sim.unsaid} == {
+        "operator/arm",
         "operator/stop",
         "operator/estop",
         "action/estimate",
@@ -72,7 +73,7 @@ def test_text_fits_a_terminal_and_tells_every_topic(sim):
     assert max(map(len, text.splitlines())) <= 100
     for found in sim.edges:
         assert found.topic in text
-    assert "recorder  (nodes.recorder)\n  hears  21 of 26 topics" in text
+    assert "recorder  (nodes.recorder)\n  hears  22 of 27 topics" in text
 
 
 MERMAID = re.compile(

@@ -66,6 +66,21 @@ def test_headless_sets_what_the_file_says_and_settings_win(folder):
     assert launch.file.nodes["a"].parameters == {"video": False, "size": 3}
 
 
+def test_another_connection_needs_an_overlay_that_says_what_it_is(folder):
+    (folder / "arm.yaml").write_text(f"connections: [camera.port]\n{GOOD}")
+    for name in ("slow", "real"):
+        (folder / "overlays" / f"{name}.yaml").write_text("nodes: {camera: {parameters: {port: /dev/one}}}")
+    (folder / "overlays" / "view.yaml").write_text("nodes: {camera: {parameters: {size: 3}}}")
+    for overlays in (None, ["view"], []):
+        with pytest.raises(LaunchFileError, match=r"--set camera\.port=/dev/two: .*--with real"):
+            load(folder, "arm", overlays, ["camera.port=/dev/two"])
+    assert parameters(load(folder, "arm", ["real"], ["camera.port=/dev/two"]))["port"] == "/dev/two"
+    assert parameters(load(folder, "arm", None, ["camera.rate_hz=3"]))["port"] == "/dev/one"
+    (folder / "wrong.yaml").write_text(f"connections: [camer.port]\n{GOOD}")
+    with pytest.raises(LaunchFileError, match=r"'camer\.port' is no node\.parameter; did you mean 'camera'"):
+        load(folder, "wrong")
+
+
 def test_seed_without_a_taker_is_refused(folder):
     (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
     with pytest.raises(LaunchFileError, match="has no 'seed_parameters'"):

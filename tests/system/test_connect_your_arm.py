@@ -11,7 +11,7 @@ from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_models import MODELS
 from tests.docs.markdown import CONNECT_YOUR_ARM, blocks
-from tests.docs.terminal import ENVIRONMENT, attended, started
+from tests.docs.terminal import ENVIRONMENT, at_terminal, attended, heard, launched, started
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands
 from tests.robots.dynamixel.small_arm import LINK
 
@@ -23,7 +23,7 @@ EEPROM_END = 64
 OVERLAY = YAML(typ="safe").load(Path("launch/overlays/dynamixel_arm/emulated.yaml"))
 PATIENCE = "".join(
     f" --set arm_driver.patience.{name}={value}"
-    for name, value in OVERLAY["nodes"]["arm_driver"]["parameters"]["patience"].items()
+    for name, value in OVERLAY["nodes"]["arm_driver"]["parameters"]["emulated"]["patience"].items()
 )
 """What is emulated shares the processors with other tests, and may be late."""
 
@@ -76,23 +76,11 @@ def test_the_application_reaches_and_carries_an_object_without_an_arm(launcher):
 def typed(command, environment, steps=(), said=""):
     """Output of a command that must end well; `said` answers what it asks without a line's end."""
     if said:
-        with started(command, environment) as running:
-            output, _ = running.communicate(said, timeout=60)
-            code = running.returncode
+        code, output = at_terminal(command, said, environment)
     else:
         code, output = attended(command, steps, environment)
     assert code == 0, f"{command}\n{output}"
     return output
-
-
-def heard(running, *words):
-    """Read on until a line has all these words."""
-    seen = []
-    for line in running.stdout:
-        seen.append(line)
-        if all(word in line for word in words):
-            return
-    raise AssertionError(f"{words} was not said:\n{''.join(seen)}")
 
 
 def connecting(emulator, servos):
@@ -103,17 +91,6 @@ def connecting(emulator, servos):
             emulator.bus.servos = list(servos)
 
     return act
-
-
-@contextlib.contextmanager
-def launched(command, environment):
-    """An application, which ends with the test."""
-    with started(f"exec {command}", environment) as running:
-        try:
-            yield running
-        finally:
-            if running.poll() is None:
-                running.terminate()
 
 
 @contextlib.contextmanager

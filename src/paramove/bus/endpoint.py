@@ -50,6 +50,12 @@ def holder_of(path: Path) -> str:
         return ""
 
 
+def owner_of(path: Path) -> int | None:
+    """Process id of the owner of a socket path; None if nobody owns it now."""
+    words = holder_of(path).split()
+    return int(words[1]) if words[:1] == ["pid"] and words[1].isdecimal() and is_held(path) else None
+
+
 def is_held(path: Path) -> bool:
     """Whether a process holds the lock of the socket `path`, without touching lock or socket."""
     try:

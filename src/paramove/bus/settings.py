@@ -25,6 +25,11 @@ def default_folder(domain: str | None = None) -> Path:
     return Path(tempfile.gettempdir()) / f"paramove-{os.getuid()}" / domain
 
 
+def lock_of(folder: Path) -> Path:
+    """The lock that the launcher of a run holds for its bus folder."""
+    return folder.with_name(f"{folder.name}.lock")
+
+
 class BusSettings(BaseModel):
     """One process's view of the bus.
 

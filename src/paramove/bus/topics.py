@@ -130,6 +130,8 @@ ARM_JOINT_STATES_FAST = Topic("arm/joint_states/fast", JointStates, 100, _QUEUE,
 ARM_MOTORS = Topic("arm/motors", MotorStatus, 1, _QUEUE, recorded=True)
 ARM_SAFETY = Topic("arm/safety", SafetyState, 15, _LATCHED, recorded=True)
 OPERATOR_ARM = Topic("operator/arm", ArmRequest, None, _LATCHED, recorded=True)
+OPERATOR_ARM_AT_START = replace(OPERATOR_ARM, name="operator/arm_at_start")
+"""From a program, for an emulated robot: the publisher of `operator/arm` is a person's terminal."""
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
 OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
 """From a terminal: a topic has one speaker, and that of `operator/stop` may be the live page."""
@@ -151,6 +153,8 @@ TOPICS: tuple[Topic, ...] = tuple(
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 STEREO_LIGHTS = CAMERA_LIGHTS[:2]
 """What two cameras see of a tracked arm."""
+ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
+"""Arming requests: a driver subscribes to all of them."""
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
 """A person's stops: a driver hears all of them."""
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from paramove.cli.arm_options import ended
 from paramove.cli.bus_options import DomainOption
+from paramove.cli.terminal_person import TerminalPerson
 from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
@@ -24,10 +24,14 @@ def enable(
 ) -> None:
     """Arm the arm of the running application: from then on it may move, whenever the application wants it to.
 
-    Exit codes: 0 armed; 1 you said no; 3 the safety gate refuses, with every reason; 69 nobody answers; 75 another
-    program arms this arm.
+    It asks a person at a terminal; what runs without one, such as a script in the background, arms nothing.
+
+    Exit codes: 0 armed; 1 you said no, or there is no terminal; 3 the safety gate refuses, with every reason; 69 nobody
+    answers; 75 another program arms this arm.
     """
-    if not yes and (sys.stdin is None or not typer.confirm(QUESTION)):  # None: it is closed, so nobody can answer
+    if not TerminalPerson().is_at_terminal:
+        raise ended("not armed: only a person at a terminal arms; over ssh, use `ssh -t`", exit_codes.FAILURE)
+    if not yes and not typer.confirm(QUESTION):
         raise ended("not armed", exit_codes.FAILURE)
     state = _answer(True, domain)
     if not _is(state, True):

@@ -44,7 +44,8 @@ def jog(
 
     folder = bus_folder(domain)
     try:
-        with _Link(folder, math.radians(step_deg)) as link, TerminalPerson().pressing() as pressed:
+        person = TerminalPerson()
+        with _Link(folder, math.radians(step_deg), person.is_at_terminal) as link, person.pressing() as pressed:
             link.wait_for_arm()
             typer.echo(KEYS)
             while True:
@@ -58,16 +59,16 @@ def jog(
 
 
 class _Link:
-    """The bus as jogging needs it, while it is a context."""
+    """The bus as jogging needs it, while it is a context; by_person: a person presses the keys, and no program."""
 
-    def __init__(self, folder: Path, step: float) -> None:
+    def __init__(self, folder: Path, step: float, by_person: bool) -> None:
         from paramove.bus import topics
         from paramove.bus.visitor import BusVisitor
         from paramove.robots.arming_key import ArmingKey
         from paramove.robots.jogging import Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
-        self._folder, self._topics = folder, topics
+        self._folder, self._topics, self._by_person = folder, topics, by_person
         self._arming = ArmingKey()
         self._sentence, self._shown, self._told = "", "", ""
         self._heard_s = time.monotonic()
@@ -179,4 +180,4 @@ class _Link:
         except TopicTakenError as error:
             self._arming.refuse(f"{error}, and only one program may arm an arm")
             return
-        say_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging"))
+        say_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging", by_person=self._by_person))

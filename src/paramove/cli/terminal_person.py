@@ -36,6 +36,11 @@ class TerminalPerson:
     def __init__(self, source: IO[Any] | None = None) -> None:
         self._source = source or sys.stdin or io.StringIO()
 
+    @property
+    def is_at_terminal(self) -> bool:
+        """Whether a person can press keys: the input is a terminal, and no file, pipe or closed one."""
+        return self._source.isatty()
+
     def tell(self, sentence: str) -> None:
         """Say something that needs no answer."""
         typer.echo(printable(sentence))
@@ -43,7 +48,7 @@ class TerminalPerson:
     def until_done(self, request: str, look: Callable[[], list[str]]) -> None:
         """Ask, and look again and again until it is done. Raises QuitError."""
         asked = f"{printable(request)} Enter when it is done, q to end."
-        if self._source.isatty():
+        if self.is_at_terminal:
             self._keys(asked, look)
         else:
             typer.echo(asked)
@@ -60,7 +65,7 @@ class TerminalPerson:
                 descriptor = self._source.fileno()
             except OSError as error:  # not a file of the system, as a closed input
                 raise QuitError from error
-            if self._source.isatty():
+            if self.is_at_terminal:
                 opened.enter_context(_unbuffered(descriptor))
 
             def pressed(seconds: float) -> str:

@@ -7,6 +7,7 @@ import grp
 import os
 import pwd
 import stat
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,14 +75,26 @@ def _group_name(number: int) -> str:
 def holders(device: Path) -> list[Holder]:
     """Other processes that have a device open; those of other users are seen by root only."""
     real = device.resolve()
-    found = []
+    return [one for one in _with_open(str(real)) if one.pid != os.getpid() and not _serves(one.pid, real)]
+
+
+def serving(terminal: Path) -> list[Holder]:
+    """Processes that hold the other end of a pseudo-terminal; those of other users are seen by root only."""
+    return [one for one in _with_open("/dev/ptmx", "/dev/pts/ptmx") if _serves(one.pid, terminal)]
+
+
+def opened_files(pid: int) -> dict[str, str]:
+    """What each open descriptor of a process leads to, by its number; {} where we may not look."""
+    with contextlib.suppress(OSError):
+        return {one.name: _target(one) for one in Path(f"/proc/{pid}/fd").iterdir()}
+    return {}
+
+
+def _with_open(*names: str) -> Iterator[Holder]:
     for process in psutil.process_iter():
-        if process.pid == os.getpid():
-            continue
-        with contextlib.suppress(OSError, psutil.Error):  # it has just ended, or is not ours to look into
-            if _holds(process.pid, real):
-                found.append(Holder(process.pid, _program(process)))
-    return found
+        if not {*names}.isdisjoint(opened_files(process.pid).values()):
+            with contextlib.suppress(psutil.Error):  # it has just ended
+                yield Holder(process.pid, _program(process))
 
 
 def _program(process: psutil.Process) -> str:
@@ -91,19 +104,19 @@ def _program(process: psutil.Process) -> str:
     return str(words[place] if place < len(words) else process.name())
 
 
-def _holds(pid: int, device: Path) -> bool:
-    folder = Path(f"/proc/{pid}")
-    links = {one.name: _target(one) for one in (folder / "fd").iterdir()}
-    if str(device) not in links.values():
-        return False
-    masters = [number for number, target in links.items() if target.endswith("/ptmx")]
-    return not any(_is_other_end(folder / "fdinfo" / number, device) for number in masters)
+def _serves(pid: int, terminal: Path) -> bool:
+    """Whether a process holds the other end of a pseudo-terminal; then it also holds the terminal itself open."""
+    masters = [number for number, target in opened_files(pid).items() if target.endswith("/ptmx")]
+    return terminal.parent.name == "pts" and any(_index(pid, number) == terminal.name for number in masters)
 
 
-def _is_other_end(info: Path, device: Path) -> bool:
-    """Whether a descriptor is the other end of a pseudo-terminal: who has it serves the terminal and holds it open."""
-    lines = dict(line.split(":", 1) for line in info.read_text(encoding="utf-8").splitlines() if ":" in line)
-    return device.parent.name == "pts" and lines.get("tty-index", "").strip() == device.name
+def _index(pid: int, descriptor: str) -> str:
+    """Number of the pseudo-terminal whose other end it is; "" if it was closed meanwhile."""
+    with contextlib.suppress(OSError):
+        for line in Path(f"/proc/{pid}/fdinfo/{descriptor}").read_text(encoding="utf-8").splitlines():
+            if line.startswith("tty-index:"):
+                return line.partition(":")[2].strip()
+    return ""
 
 
 def _target(descriptor: Path) -> str:

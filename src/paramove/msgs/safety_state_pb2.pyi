@@ -48,16 +48,18 @@ class SafetyFault(_message.Message):
     def __init__(self, code: _Optional[str] = ..., joint: _Optional[str] = ..., sentence: _Optional[str] = ...) -> None: ...
 
 class ArmRequest(_message.Message):
-    __slots__ = ("captured", "source", "armed", "reason")
+    __slots__ = ("captured", "source", "armed", "reason", "by_person")
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
     ARMED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    BY_PERSON_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     source: str
     armed: bool
     reason: str
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., source: _Optional[str] = ..., armed: bool = ..., reason: _Optional[str] = ...) -> None: ...
+    by_person: bool
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., source: _Optional[str] = ..., armed: bool = ..., reason: _Optional[str] = ..., by_person: bool = ...) -> None: ...
 
 class StopRequest(_message.Message):
     __slots__ = ("captured", "source")

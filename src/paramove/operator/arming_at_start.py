@@ -1,8 +1,6 @@
-"""The operator in simulation: arms the gate once at the start of a run, as a person does on a real robot."""
+"""The operator of an emulated robot: arms the gate once at the start of a run, as a person does on a real robot."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 
@@ -10,40 +8,37 @@ REAL_ROBOT = (
     "the operator node does not arm a real robot: a person must, who sees the robot and can reach its motor power "
     "switch; leave this node out or start with the sim overlay"
 )
-ARMED_BEFORE = "an operator of this run has armed before; once the arm is disarmed only a person arms it again"
+BEFORE_ARMED = (SafetyState.STATE_UNSPECIFIED, SafetyState.STATE_DISCONNECTED, SafetyState.STATE_DISARMED)
 TRIES_APART_NS = 1_000_000_000
 
 
 class Operator:
-    """Says one arm word once the gate is disarmed, again each second until it is armed, and never after that.
+    """Publishes one arming request once the gate is disarmed, again each second until it is armed for the first time.
 
-    Waiting for the gate's own word makes the order in which the nodes start irrelevant.
+    Waiting for the gate's own state makes the order in which the nodes start irrelevant. It ends at anything else that
+    the gate reports, such as a stop: then only a person arms. The gate refuses it in that case, too, and wherever it
+    is not verified that the robot is emulated.
 
     Args:
         arms_at_start: False: it never arms.
-        memory: A file that is made with the first arm word. If it exists already, an earlier process of this run has
-            armed, and this one does not: what is disarmed now was disarmed by a fault or by a person.
+        restarted: Whether an earlier process of this run was the operator: this one does not arm.
     """
 
-    def __init__(self, arms_at_start: bool, memory: Path | None = None) -> None:
-        self._memory = memory
-        self._to_arm = arms_at_start and not (memory is not None and memory.exists())
+    def __init__(self, arms_at_start: bool, restarted: bool = False) -> None:
+        self._to_arm = arms_at_start and not restarted
         self.sentence = "arms once at the start" if arms_at_start else "does not arm"
-        if arms_at_start and not self._to_arm:
-            self.sentence = f"does not arm: {ARMED_BEFORE}"
-        self._said_ns: int | None = None
+        if arms_at_start and restarted:
+            self.sentence = "does not arm: it was started before in this run, so only a person arms"
+        self._requested_ns: int | None = None
 
     def update(self, safety: SafetyState, now_ns: int) -> ArmRequest | None:
-        """Hear the gate's state; returns the word to say, if any."""
-        if safety.state == SafetyState.STATE_ARMED:
-            self._to_arm = False
+        """The request to publish in this state of the gate, if any."""
+        self._to_arm &= safety.state in BEFORE_ARMED
         if not self._to_arm or safety.state != SafetyState.STATE_DISARMED:
             return None
-        if self._said_ns is not None and now_ns - self._said_ns < TRIES_APART_NS:
+        if self._requested_ns is not None and now_ns - self._requested_ns < TRIES_APART_NS:
             return None
-        self._said_ns = now_ns
-        if self._memory is not None:
-            self._memory.touch()
+        self._requested_ns = now_ns
         request = ArmRequest(source="operator node", armed=True, reason="start of a simulated run")
         request.captured.FromNanoseconds(now_ns)
         return request

@@ -41,7 +41,7 @@ def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | N
         before = _until(gate, patience_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
-        say_now(says, ArmRequest(source=TERMINAL, armed=armed, reason="a person at a terminal"))
+        say_now(says, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
 
         def is_answer(state: SafetyState) -> bool:
             return obeyed(state, armed) or (armed and _faults(state) not in ([], _faults(before)))

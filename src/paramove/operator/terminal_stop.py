@@ -33,9 +33,8 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
         BusFolderError: The folder cannot be used.
     """
     end_s = time.monotonic() + patience_s
-    asked_ns = time.monotonic_ns()
     request = StopRequest(source=source)
-    request.captured.FromNanoseconds(asked_ns)
+    request.captured.FromNanoseconds(time.monotonic_ns())
     with BusVisitor(folder, "estop") as bus:
         publishers = []
         for topic in topics.STOPS:
@@ -46,7 +45,7 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
         gate = bus.hears(topics.ARM_SAFETY)
         while time.monotonic() < end_s:
             for publisher in publishers:
-                publisher.publish(request, asked_ns, time.monotonic_ns())
+                publisher.publish(request, time.monotonic_ns(), time.monotonic_ns())  # a driver heeds what is new
             gate.revive()
             gate.socket.poll(int(1e3 * SAID_EVERY_S), zmq.POLLIN)
             while (heard := gate.receive()) is not None:

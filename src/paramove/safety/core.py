@@ -1,7 +1,9 @@
 """The one gate between a commanded movement and a motor: a pure function of time and inputs.
 
 No clock, no input or output, no threads. Not armed by default, and it never arms itself: only an arm word that a person
-(in simulation the operator node) said after this gate began, and after its last fault, arms it.
+said after this gate began, and after its last fault, arms it. A program's word does so only for a robot that the driver
+has verified to be emulated by its own launch, and only until this gate was armed, stopped or at fault for the first
+time.
 
 Each step takes the rows proposed for the stream and gives the rows that may be sent. Whatever it gives ends at rest:
 the rows are followed by their own stop ramp, so a sender that dies leaves a robot that stops by itself.
@@ -37,6 +39,9 @@ from paramove.safety.watches import EmergencyWatch, FollowingWatch, RateWatch
 
 FloatArray = NDArray[np.float64]
 
+TOUCHED = "it has been armed, stopped or at fault before"
+"""Why no program may arm an emulated robot either."""
+
 
 class SafetyCore:
     """The gate's state machine for one robot.
@@ -47,6 +52,9 @@ class SafetyCore:
         epoch: Of the stream that this gate serves.
         start_ns: Arm words captured at or before this time are another life's and are not heard.
         clearance: Measures how near parts of the robot come to each other; None: that is not looked at.
+
+    Attributes:
+        untouched: Whether this gate was never armed, stopped or at fault.
     """
 
     def __init__(
@@ -62,6 +70,7 @@ class SafetyCore:
         self.settings = settings or SafetySettings()
         self.state = State.DISCONNECTED
         self.faults: tuple[Fault, ...] = ()
+        self.untouched = True
         self._mechanical = mechanical
         self._now_ns = start_ns
         self._heard_ns = start_ns  # only later arm words count
@@ -85,6 +94,7 @@ class SafetyCore:
             if self.state is State.ESTOP:
                 self.state = State.STOPPING  # and disarmed once it rests
             targets = self._step(now_ns, inputs.measured, replace(inputs, stop=stop))
+        self.untouched &= self.state in (State.DISCONNECTED, State.DISARMED) and stop is None
         return targets, self.state, self.faults
 
     def held(self, next_index: int) -> FloatArray | None:
@@ -147,6 +157,7 @@ class SafetyCore:
             "comes to rest by itself; arm again once it is back"
         )
         self._add(Fault("robot_silent", "", sentence))
+        self.untouched = False
         self.state = State.DISCONNECTED
         self._disarm_after_stop = False
         self._accepted.clear()
@@ -192,6 +203,10 @@ class SafetyCore:
                 "bus or this computer busy, and say the word again"
             )
             faults.append(Fault("arming_slow", "", sentence))
+        no_program = inputs.no_program or ("" if self.untouched else TOUCHED)
+        if no_program and not word.by_person:
+            sentence = f"{word.source} is a program and may not arm: {no_program}; a person may: paramove arm enable"
+            faults.append(Fault("arming_program", "", sentence))
         if not word.source:
             faults.append(Fault("arming_source", "", "the arm word names no source; say who arms"))
         if not measured.at_rest:

@@ -48,11 +48,12 @@ class Measured:
 
 @dataclass(frozen=True)
 class ArmWord:
-    """A word from outside to arm or disarm."""
+    """A word from outside to arm or disarm; not `by_person`: from a program."""
 
     captured_ns: int
     source: str
     armed: bool
+    by_person: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,8 @@ class Inputs:
 
     `stop` is a fault that the driver has found, `arming_faults` are those that only forbid arming (ids, models,
     voltage, …), of checks that began at `checks_began_ns` (None: now). `emergency` says whether the emergency stop is
-    pressed; None: its source said nothing since the last step.
+    pressed; None: its source said nothing since the last step. `no_program` says why no program may arm this robot; ""
+    only where the driver has verified that its own launch emulates the robot.
     """
 
     measured: Measured | None = None
@@ -83,6 +85,7 @@ class Inputs:
     arming_faults: tuple[Fault, ...] = ()
     emergency: bool | None = None
     checks_began_ns: int | None = None
+    no_program: str = "nothing shows that its launch emulates the robot"
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.bus.settings import default_folder
+from paramove.bus.settings import default_folder, lock_of
 
 LONGEST_FOLDER = 70
 """Bytes of a folder's path; a socket's path may have 107 and the longest topic name needs the rest."""
@@ -73,7 +73,7 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
     runtime = _made(folder.parent)
     if len(os.fsencode(folder)) > LONGEST_FOLDER:
         raise DomainError(f"{folder} is too long for sockets; set XDG_RUNTIME_DIR to a shorter path, such as /tmp/r")
-    with (runtime / f"{name}.lock").open("a+", encoding="utf-8") as lock:
+    with lock_of(folder).open("a+", encoding="utf-8") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:

@@ -70,7 +70,7 @@ def load(
     """
     path = path_of(folder, name, "launch file")
     document, chosen = _with_overlays(folder, path.stem, _read(path), overlays)
-    document, findings = with_values(document, settings, seed, headless)
+    document, findings = with_values(document, settings, seed, headless, overlays is not None)
     try:
         file = validated(document)
     except LaunchFileError as error:

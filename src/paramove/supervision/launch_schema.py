@@ -86,6 +86,11 @@ class LaunchFile(_Checked):
     nodes: dict[Name, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
     default_overlays: list[str] = Field(default_factory=list, description="laid over it where --with is not given")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
+    connections: list[str] = Field(
+        default_factory=list,
+        description="node.parameter that says which hardware is used: --set takes it only with an overlay, named by "
+        "--with, that sets it",
+    )
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")
     after_run: Module | None = Field(
         default=None, description="module called with the run folder when all nodes have ended"

@@ -12,7 +12,7 @@ Findings = list[LaunchFileError]
 
 
 def with_values(
-    document: Document, settings: Sequence[str], seed: int | None, headless: bool
+    document: Document, settings: Sequence[str], seed: int | None, headless: bool, named: bool = True
 ) -> tuple[Document, Findings]:
     """The document with the values that `--headless`, `--set` and `--seed` give, and what is wrong with these.
 
@@ -21,6 +21,7 @@ def with_values(
         settings: Each `node.parameter=value`; the value is YAML.
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
+        named: Whether the overlays were named by `--with`.
     """
     findings: Findings = []
     values: list[tuple[str, Any, Position]] = []
@@ -49,9 +50,28 @@ def with_values(
         node, *parameters = target.split(".")
         if node not in _nodes(document):
             findings.append(LaunchFileError(where, f"there is no node '{node}'; {nearest(node, _nodes(document))}"))
+        elif (
+            where.source.startswith("--set")
+            and _is_connection(document, target)
+            and not (named and _value_at(document, node, parameters))
+        ):
+            message = f"say with an overlay what is connected there, such as --with real --set {target}=..."
+            findings.append(LaunchFileError(where, message))
         elif all(parameters) and parameters:  # else `wrong_references` tells of it
             document = document.overlaid(_parameter(node, parameters, value, where))
     return document, findings
+
+
+def _is_connection(document: Document, target: str) -> bool:
+    connections = document.data.get("connections")
+    return isinstance(connections, list) and target in connections
+
+
+def _value_at(document: Document, node: str, parameters: Sequence[str]) -> Any:
+    value: Any = _nodes(document)[node]
+    for key in ("parameters", *parameters):
+        value = value.get(key) if isinstance(value, dict) else None
+    return value
 
 
 def _parameter(node: str, parameters: Sequence[str], value: Any, where: Position) -> Document:
@@ -82,9 +102,11 @@ def wrong_references(document: Document) -> Findings:
     for circle in _circles(after):
         where = ("nodes", circle[0], "after")
         findings.append(document.error(where, f"these nodes wait for each other ('after'): {', '.join(circle)}"))
-    seeds, headless = document.data.get("seed_parameters"), document.data.get("headless")
+    headless = document.data.get("headless")
     targets: list[tuple[str, str, Any]] = [
-        ("seed_parameters", str(index), seed) for index, seed in enumerate(seeds if isinstance(seeds, list) else ())
+        (key, str(index), target)
+        for key in ("seed_parameters", "connections")
+        for index, target in enumerate(document.data[key] if isinstance(document.data.get(key), list) else ())
     ]
     targets += [("headless", target, target) for target in (headless if isinstance(headless, dict) else ())]
     for key, place, target in targets:

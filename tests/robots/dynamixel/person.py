@@ -39,16 +39,16 @@ class Person:
         self.hears_until(lambda: self.safety.state == getattr(SafetyState, f"STATE_{state}"))
 
     def arms(self) -> None:
-        self.arm.on_arm_request(ArmRequest(source="person", armed=True), time.monotonic_ns())
+        self.arm.on_arm_request(ArmRequest(source="person", armed=True, by_person=True), time.monotonic_ns())
 
     def arms_and_waits(self) -> None:
-        """Says the word again whenever it was heard too late: other programs may keep the arm waiting."""
+        """Says the word again whenever it was judged too late: other programs may keep the arm waiting."""
         self.waits_for("DISARMED")
         self.arms()
         self.hears_until(self._is_armed)
 
     def _is_armed(self) -> bool:
-        if any(fault.code == "arming_stale" for fault in self.safety.faults):
+        if any(fault.code in ("arming_stale", "arming_slow") for fault in self.safety.faults):
             self.safety = SafetyState()  # what was told once is answered once
             self.arms()
         return self.safety.state == SafetyState.STATE_ARMED

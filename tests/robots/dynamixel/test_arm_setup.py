@@ -1,5 +1,9 @@
 """A servo arm as a launch file names it: with which zeros it is driven, and what is refused."""
 
+import contextlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +19,7 @@ from paramove.robots.dynamixel.emulated_arm import emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
 from paramove.robots.dynamixel.servo_arm import Patience
 from paramove.robots.dynamixel.wire_faults import WireFaults
+from paramove.robots.this_launch import ThisLaunch
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.small_arm import calibration
 
@@ -31,8 +36,36 @@ def one_of(place: int) -> JointCalibration:
     )  # fmt: skip
 
 
+LIMITS = {"patience": PATIENCE, "nominal": True}
+HERE = ThisLaunch(os.getpid())
+"""The launch that emulates the servos, in the tests of emulated ones."""
+
+
 def setup(port: Path, **parameters) -> ServoArmSetup:
-    return ServoArmSetup(robot=FOLDER / "koch_v1_1", port=port, patience=PATIENCE, **parameters)
+    return ServoArmSetup(robot=FOLDER / "koch_v1_1", port=port, **parameters)
+
+
+ORPHAN = """
+import os, sys
+parent = os.getpid()
+if os.fork():
+    os._exit(0)
+while os.getppid() == parent:
+    os.sched_yield()
+ours, theirs = os.openpty()
+print(os.getpid(), os.ttyname(theirs), flush=True)
+sys.stdin.read()
+"""
+
+
+@contextlib.contextmanager
+def stranger_serves():
+    """Process id of one that this one did not start, as its parent has ended, and the terminal that it serves."""
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", ORPHAN], stdin=pipe, stdout=pipe, text=True) as process:
+        pid, terminal = process.stdout.readline().split()
+        yield int(pid), terminal
+        process.stdin.close()
 
 
 def test_grippers_hold_with_a_limited_current_and_other_joints_by_position():
@@ -52,7 +85,7 @@ def test_no_servo_turns_faster_than_its_joint_may_whatever_it_is_told():
 def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(tmp_path):
     assert uncalibrated(OPEN) == ()
     link = tmp_path / "usb-FTDI_0001-if00-port0"
-    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link).driven_arm(tmp_path) as arm:
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, patience=PATIENCE).driven_arm(tmp_path) as arm:
         person = Person(arm)
         person.waits_for("DISARMED")
         person.arms()
@@ -63,17 +96,51 @@ def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(t
 
 def test_in_simulation_its_zeros_are_those_of_the_description(tmp_path):
     link = tmp_path / "usb-FTDI_0001-if00-port0"
-    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, nominal=True).driven_arm(tmp_path) as arm:
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, emulated=LIMITS).driven_arm(tmp_path, HERE) as arm:
         arm_sees = Person(arm)
         arm_sees.arms_and_waits()
         np.testing.assert_allclose(arm_sees.angles[-1], KOCH.base_pose, rtol=0, atol=np.deg2rad(0.1))
+
+
+def test_limits_of_emulated_servos_are_for_no_others(tmp_path):
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    stranger = ThisLaunch(2**22)
+    with (
+        DynamixelEmulator(emulated_servos(KOCH), link),
+        setup(link, emulated=LIMITS).driven_arm(tmp_path, stranger) as arm,
+    ):
+        person = Person(arm)
+        person.hears_until(lambda: "counts as a real arm" in arm.trouble)
+        person.waits_for("DISARMED")
+        person.arms()
+        person.hears_until(lambda: person.safety.faults)
+        assert {"not_calibrated", "robot_silent"} & {code for code, _ in person.codes()}
+
+
+def test_a_port_that_leads_elsewhere_when_it_is_opened_again_is_not_driven(tmp_path):
+    link = tmp_path / "usb-FTDI_0001-if00-port0"
+    with contextlib.ExitStack() as opened:
+        emulator = opened.enter_context(DynamixelEmulator(emulated_servos(KOCH), link))
+        arm = opened.enter_context(setup(link, emulated=LIMITS).driven_arm(tmp_path, HERE))
+        person = Person(arm)
+        person.arms_and_waits()
+        emulator.unplug()
+        person.hears_until(lambda: "plugged in" in arm.trouble or "no serial port" in arm.trouble)
+        ours, theirs = opened.enter_context(stranger_serves())
+        link.symlink_to(theirs)
+        person.hears_until(lambda: "does not lead to the servos of this launch" in arm.trouble)
+        assert f"pid {ours} " in arm.trouble
+        link.unlink()
+        emulator.plug_in()
+        person.hears_until(lambda: arm.trouble == "")
+        person.waits_for("DISARMED")
 
 
 def test_an_arm_whose_servos_are_always_late_is_heard_if_it_may_be_read_slowly(tmp_path):
     """Each answer comes after the next period's question."""
     link = tmp_path / "usb-FTDI_0001-if00-port0"
     servos = emulated_servos(KOCH)
-    with DynamixelEmulator(servos, link) as late, setup(link, nominal=True).driven_arm(tmp_path) as arm:
+    with DynamixelEmulator(servos, link) as late, setup(link, emulated=LIMITS).driven_arm(tmp_path, HERE) as arm:
         person = Person(arm)
         person.arms_and_waits()
         late.faults = WireFaults(delay_s=0.02)
@@ -105,8 +172,8 @@ def test_a_calibrated_arm_has_its_own_zeros_and_keeps_to_the_travel_that_was_sho
 
 def test_the_line_of_a_stop_button_that_is_not_there_is_pressed_from_the_start(tmp_path):
     link, line = tmp_path / "usb-FTDI_0001-if00-port0", tmp_path / "value"
-    parameters = {"nominal": True, "stop_line": line, "stop_line_pressed": 0}
-    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, **parameters).driven_arm(tmp_path) as arm:
+    parameters = {"emulated": LIMITS, "stop_line": line, "stop_line_pressed": 0}
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, **parameters).driven_arm(tmp_path, HERE) as arm:
         person = Person(arm)
         person.waits_for("ESTOP")
         assert arm.trouble == f"the emergency stop counts as pressed: {line} cannot be read (No such file or directory)"
@@ -128,7 +195,7 @@ def test_where_an_arm_may_go_limp_must_be_told_for_joints_that_it_has(tmp_path):
 def test_with_on_exit_it_goes_limp_there(tmp_path):
     link, rest = tmp_path / "usb-FTDI_0001-if00-port0", {"wrist_flex": 30.0}
     with DynamixelEmulator(emulated_servos(KOCH), link) as emulator:
-        with setup(link, nominal=True, on_exit="rest_then_off", rest_deg=rest).driven_arm(tmp_path) as arm:
+        with setup(link, emulated=LIMITS, on_exit="rest_then_off", rest_deg=rest).driven_arm(tmp_path, HERE) as arm:
             person = Person(arm)
             person.arms_and_waits()
         servo = emulator.bus.servos[KOCH.index("wrist_flex")]

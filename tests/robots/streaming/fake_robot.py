@@ -36,9 +36,9 @@ class FakeRobot:
 class Rig:
     """A driver and a robot in lockstep: state, tick, batch, 67 ms, …"""
 
-    def __init__(self) -> None:
+    def __init__(self, no_program: str = "it is real") -> None:
         self.robot = FakeRobot()
-        self.driver = ArmDriver(HOAP3)
+        self.driver = ArmDriver(HOAP3, no_program=lambda: no_program)
         self.now_ns = 1_000_000_000
         self.statuses: list[TrajectoryStatus] = []
         self.says: DriverSays | None = None
@@ -56,8 +56,8 @@ class Rig:
         self.robot.play()
         return self.says
 
-    def arm(self, armed: bool = True) -> None:
-        request = ArmRequest(source="test", armed=armed)
+    def arm(self, armed: bool = True, by_person: bool = True) -> None:
+        request = ArmRequest(source="test", armed=armed, by_person=by_person)
         self.driver.on_arm_request(request, self.now_ns + 1)
         self.tick()
 

@@ -12,7 +12,7 @@ from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 from paramove.robots.streaming.driver import ArmDriver
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
-from tests.robots.streaming.fake_robot import Rig, armed, trajectory
+from tests.robots.streaming.fake_robot import TICK_NS, Rig, armed, trajectory
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0, "right_wrist": 30.0, "right_fingers": 20.0}
 ACCEPTED, EXECUTING, SUCCEEDED, STOPPED, REFUSED = range(1, 6)
@@ -145,15 +145,32 @@ def test_a_restarted_driver_is_disarmed_even_if_the_old_arm_word_comes_again() -
     old_word_ns = rig.now_ns
     rig.driver = ArmDriver(HOAP3)
 
-    rig.driver.on_arm_request(ArmRequest(source="test", armed=True), old_word_ns)
+    rig.driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), old_word_ns)
     rig.tick()
-    rig.driver.on_arm_request(ArmRequest(source="test", armed=True), old_word_ns)
+    rig.driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), old_word_ns)
     rig.tick()
     assert rig.driver.state is State.DISARMED
     rig.arm()
     rig.send("new life", GOAL)
     rig.run_until_rest()
     assert rig.statuses[-1].state == SUCCEEDED
+
+
+def test_a_program_arms_a_robot_that_is_emulated_and_no_other() -> None:
+    for no_program, state in (("", State.ARMED), ("it is real", State.DISARMED)):
+        rig = Rig(no_program)
+        rig.tick()
+        rig.arm(by_person=False)
+        assert rig.driver.state is state
+
+
+@pytest.mark.parametrize(("ahead_s", "accepted"), [(0.03, True), (0.07, False), (0.9, False), (1e6, False)])
+def test_a_trajectory_from_the_future_is_refused_like_an_old_one(ahead_s: float, accepted: bool) -> None:
+    rig = armed()
+    rig.driver.on_trajectory(trajectory("one", GOAL, 1.0), rig.now_ns + TICK_NS + round(ahead_s * 1e9))
+    rig.tick()
+    assert (rig.statuses[-1].state != REFUSED) is accepted
+    assert accepted or (rig.statuses[-1].code, "age -" in rig.statuses[-1].reason) == ("stale", True)
 
 
 def test_the_same_trajectory_is_played_once_and_answered_again() -> None:

@@ -50,7 +50,9 @@ def test_restarted_in_motion_it_is_disarmed_and_goes_on_from_rest_once_a_person_
     rig = in_motion()
     word_ns = rig.now_ns - 10
     rig.driver = ArmDriver(HOAP3)
-    rig.driver.on_arm_request(ArmRequest(source="test", armed=True), word_ns)  # the latched word of the old life
+    rig.driver.on_arm_request(
+        ArmRequest(source="test", armed=True, by_person=True), word_ns
+    )  # the latched word of the old life
     for _ in range(20):
         rig.tick()
         assert rig.driver.state is State.DISARMED
@@ -121,7 +123,7 @@ def test_an_arm_word_that_waited_too_long_does_not_arm() -> None:
     said_ns = rig.now_ns + 1
     for _ in range(16):
         rig.tick(driver_runs=False)
-    rig.driver.on_arm_request(ArmRequest(source="test", armed=True), said_ns)
+    rig.driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), said_ns)
     rig.tick()
     assert rig.driver.state is State.DISARMED
     assert rig.says is not None

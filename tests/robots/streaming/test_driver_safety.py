@@ -111,7 +111,7 @@ def test_rows_of_another_period_are_driven_by_the_same_driver(period_us: int) ->
         now += 40_000_000
         driver.on_robot_state(reader.state(reader.target, now), now)
         if tick == 1:
-            driver.on_arm_request(ArmRequest(source="test", armed=True), now)
+            driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), now)
         if tick == 3:
             driver.on_trajectory(trajectory("one", GOAL, duration_s=1.0), now)
         says = driver.tick(now)

@@ -11,10 +11,12 @@ from typing import Any
 
 from nodes import arm_driver, operator
 from paramove.bus import topics
+from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator.arming_at_start import Operator
 from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 
@@ -22,9 +24,16 @@ WORKSPACE = Path(__file__).parents[3]
 
 
 class RobotBus:
-    """Runs 60 ticks; the robot answers at once, the operator by the next tick; a trajectory comes at tick 10."""
+    """Runs 60 ticks; the robot answers at once, the operator by the next tick; a trajectory comes at tick 10.
 
-    def __init__(self) -> None:
+    Nothing here is launched, so the operator's request is taken only as a person's.
+    """
+
+    node, run_folder = "arm_driver", Path()
+
+    def __init__(self, by_person: bool) -> None:
+        self.settings = BusSettings(folder=Path("no_bus"))
+        self.by_person = by_person
         self.now_ns = 0
         self.robot = FakeRobot()
         self.operator = Operator(arms_at_start=True)
@@ -41,7 +50,8 @@ class RobotBus:
         if topic is topics.WIRE_HOAP3_STREAM:
             assert self.robot.reader.offer(message), self.robot.reader.refusal
         if topic is topics.ARM_SAFETY and (word := self.operator.update(message, self.now_ns)):
-            self.pending.append((topics.OPERATOR_ARM, word))
+            word.by_person = self.by_person
+            self.pending.append((topics.OPERATOR_ARM_AT_START, word))
 
     def events(self, *wanted: Topic, tick: bool) -> Iterator[Heard | Tick]:
         assert wanted == arm_driver.HEARS
@@ -60,13 +70,24 @@ class RobotBus:
 
 def test_operator_arms_and_the_driver_plays_a_trajectory(monkeypatch: Any) -> None:
     monkeypatch.chdir(WORKSPACE)
-    bus = RobotBus()
+    bus = RobotBus(by_person=True)
     arm_driver.run(bus, arm_driver.Config())
     statuses = [message for topic, message in bus.said if topic is topics.ARM_TRAJECTORY_STATUS]
     assert statuses[0].state == TrajectoryStatus.STATE_ACCEPTED
     assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED
     assert sum(topic is topics.ARM_SAFETY for topic, _ in bus.said) == 60
     assert sum(topic is topics.ARM_JOINT_STATES for topic, _ in bus.said) == 60
+
+
+def test_a_driver_started_by_hand_takes_no_program_for_a_person(monkeypatch: Any) -> None:
+    monkeypatch.chdir(WORKSPACE)
+    bus = RobotBus(by_person=False)
+    arm_driver.run(bus, arm_driver.Config())
+    states = [message for topic, message in bus.said if topic is topics.ARM_SAFETY]
+    assert {state.state for state in states} == {SafetyState.STATE_DISARMED}
+    assert [fault.code for fault in states[-1].faults] == ["arming_program"]
+    assert "operator node is a program" in states[-1].faults[0].sentence
+    assert "started by hand" in states[-1].faults[0].sentence
 
 
 def test_with_a_real_robot_the_operator_refuses_to_start(tmp_path: Path) -> None:
@@ -86,4 +107,4 @@ def test_with_a_real_robot_the_operator_refuses_to_start(tmp_path: Path) -> None
     )
     assert done.returncode == 78, done.stderr
     assert "a person must" in done.stderr
-    assert operator.SAYS == (topics.OPERATOR_ARM,)
+    assert operator.SAYS == (topics.OPERATOR_ARM_AT_START,)

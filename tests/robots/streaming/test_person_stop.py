@@ -25,7 +25,7 @@ def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None
     rig.send("one", GOAL, duration_s=2.0)
     for _ in range(8):
         rig.tick()
-    rig.driver.on_stop(PRESSED)
+    rig.driver.on_stop(PRESSED, rig.now_ns)
     says = rig.tick()
     assert says is not None
     assert says.safety.state == SafetyState.STATE_STOPPING
@@ -50,9 +50,24 @@ def test_pressed_again_it_changes_nothing() -> None:
     for _ in range(8):
         rig.tick()
     for _ in range(30):
-        rig.driver.on_stop(PRESSED)
+        rig.driver.on_stop(PRESSED, rig.now_ns)
         rig.tick()
     assert rig.driver.state is State.HOLD
+    assert faults(rig) == [(PERSON_STOP, SENTENCE)]
+
+
+def test_a_stop_from_before_the_driver_began_is_no_reason_for_how_it_stands() -> None:
+    rig = Rig(no_program="")
+    pressed_ns = rig.now_ns
+    rig.tick()
+    rig.driver.on_stop(PRESSED, pressed_ns)
+    rig.arm(by_person=False)
+    assert rig.driver.state is State.DISARMED
+    assert [code for code, _ in faults(rig)] == ["arming_program"]  # it was stopped all the same
+    rig.arm()
+    assert rig.driver.state is State.ARMED
+    rig.driver.on_stop(PRESSED, rig.now_ns)
+    rig.tick()
     assert faults(rig) == [(PERSON_STOP, SENTENCE)]
 
 
@@ -60,7 +75,7 @@ def test_pressed_again_it_changes_nothing() -> None:
 def test_pressed_before_it_is_armed_only_a_later_arm_word_arms(later: bool) -> None:
     rig = Rig()
     rig.tick()
-    rig.driver.on_stop(PRESSED)
+    rig.driver.on_stop(PRESSED, rig.now_ns)
     if later:
         rig.tick()
         assert rig.driver.state is State.HOLD
@@ -73,7 +88,7 @@ def test_a_stop_wins_against_a_disarm_word() -> None:
     rig.send("one", GOAL, duration_s=2.0)
     for _ in range(8):
         rig.tick()
-    rig.driver.on_stop(PRESSED)
+    rig.driver.on_stop(PRESSED, rig.now_ns)
     rig.arm(armed=False)
     for _ in range(20):
         rig.tick()
@@ -82,7 +97,7 @@ def test_a_stop_wins_against_a_disarm_word() -> None:
 
 def test_pressed_while_the_robot_is_silent_it_is_kept() -> None:
     rig = Rig()
-    rig.driver.on_stop(PRESSED)
+    rig.driver.on_stop(PRESSED, rig.now_ns)
     rig.driver.tick(rig.now_ns)
     assert rig.driver.state is State.DISCONNECTED
     rig.tick()

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.arm_calibration import ArmCalibration
@@ -19,11 +19,26 @@ from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.robots.dynamixel.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.stop_inputs import StopInputs
+from paramove.robots.this_launch import ThisLaunch
 from paramove.safety.gate_io import Fault
 
 LATENCY_SHARE = 0.8
 """Of the time for reading all servos: so long the loop may wait for one. A missing one costs periods, one that is late
 costs none."""
+
+
+class EmulatedLimits(BaseModel):
+    """What is allowed to servos that the launch itself emulates, and to no others.
+
+    Attributes:
+        patience: With silence: they share the processors with everything else, and may be late.
+        nominal: Whether they are even for an arm that everybody assembles differently.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    patience: Patience = Patience()
+    nominal: bool = False
 
 
 class ServoArmSetup(BaseModel):
@@ -42,7 +57,8 @@ class ServoArmSetup(BaseModel):
             pressed.
         on_exit: At a normal end: left as when it is disarmed, or slowly to `rest_deg`, then limp.
         rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
-        nominal: Whether they are even for an arm that everybody assembles differently, as in simulation.
+        emulated: Takes the place of `patience` where the driver verifies, at every open of the port, that this very
+            launch emulates the servos; only then a program may arm them. None: they count as real in any case.
     """
 
     robot: Path
@@ -50,29 +66,41 @@ class ServoArmSetup(BaseModel):
     torque_off: bool = False
     patience: Patience = Patience()
     calibration: Path | None = None
-    nominal: bool = False
+    emulated: EmulatedLimits | None = None
     on_exit: Literal["as_disarmed", "rest_then_off"] = "as_disarmed"
     rest_deg: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
     stop_file: Path | None = None
     stop_line: Path | None = None
     stop_line_pressed: Literal[0, 1] = 1
 
-    def driven_arm(self, run_folder: Path) -> DrivenArm:
+    def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None) -> DrivenArm:
         """The arm, not yet driven.
+
+        Args:
+            run_folder: That relative names start from.
+            launch: That may emulate the servos; None: none does.
 
         Raises:
             InputError: Its description or calibration is missing or wrong, or is another arm's.
         """
         description = RobotDescription.load(self.robot)
-        port = servo_port(description, str(run_folder / self.port), self.patience.read_s)
+        reason = (launch or ThisLaunch()).why_not_servos(run_folder / self.port)
+        emulated = None if reason else self.emulated
+        patience = self.patience if emulated is None else emulated.patience
+        port = servo_port(description, str(run_folder / self.port), patience.read_s)
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
             description = calibrated(description, calibration)
-        faults = () if self.nominal or calibration is not None else uncalibrated(description)
+        is_even = emulated is not None and emulated.nominal
+        faults = () if is_even or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
-        settings = LoopSettings(self.torque_off, self.patience, faults, stop_inputs, self._rest(description))
+        settings = LoopSettings(self.torque_off, patience, faults, stop_inputs, self._rest(description))
+        if emulated is not None:
+            settings = replace(settings, emulated_by=launch)
+        elif self.emulated is not None:
+            settings = replace(settings, caution=f"{port.name} counts as a real arm, which a person arms: {reason}")
         return DrivenArm(description, servos, port, settings)
 
     def _rest(self, description: RobotDescription) -> dict[str, float] | None:

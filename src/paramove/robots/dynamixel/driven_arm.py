@@ -60,7 +60,8 @@ class DrivenArm:
             following=following,
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
-        self._driver = ArmDriver(description, safety, self_collision(description))
+        self._caution = settings.caution
+        self._driver = ArmDriver(description, safety, self_collision(description), settings.why_no_program)
         self.readable, self._written = os.pipe2(os.O_NONBLOCK)
         self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
         self._slow_ns = self._safety_ns = self._motors_ns = 0
@@ -82,7 +83,8 @@ class DrivenArm:
 
     @property
     def trouble(self) -> str:
-        """What is wrong: a lost port, silent servos, low voltage, what presses the emergency stop; "" if nothing is.
+        """What is wrong: a lost port, silent servos, low voltage, what presses the emergency stop, servos that are not
+        emulated though they should be; "" if nothing is.
 
         Raises:
             RuntimeError: The loop has failed; the servos rest by their own watchdog.
@@ -90,7 +92,11 @@ class DrivenArm:
         if self._loop.has_failed:
             raise RuntimeError("the arm's loop has failed, the lines above say why; its servos rest by their watchdog")
         loop = self._loop
-        return loop.lost or loop.arm.unheard() or "; ".join(filter(None, (loop.pressed, *loop.arm.warnings())))
+        return (
+            loop.lost
+            or loop.arm.unheard()
+            or "; ".join(filter(None, (self._caution, loop.pressed, *loop.arm.warnings())))
+        )
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Hear a trajectory; the loop accepts or refuses it within a period."""
@@ -98,14 +104,14 @@ class DrivenArm:
             self._driver.on_trajectory(message, captured_ns)
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
-        """Hear a person's word to arm or disarm."""
+        """Hear an arming request, to arm or disarm."""
         with self._loop.lock:
             self._driver.on_arm_request(message, captured_ns)
 
-    def on_stop(self, message: StopRequest, _captured_ns: int) -> None:
+    def on_stop(self, message: StopRequest, captured_ns: int) -> None:
         """Hear a person's stop: what is played from the next period on is the stop ramp."""
         with self._loop.lock:
-            self._driver.on_stop(message)
+            self._driver.on_stop(message, captured_ns)
         self._loop.tick()
 
     def said(self) -> Iterator[tuple[Topic, Any, int]]:

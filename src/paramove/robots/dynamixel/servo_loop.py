@@ -25,6 +25,7 @@ from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
 from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.robots.streaming.driver import ArmDriver, DriverSays
 from paramove.robots.streaming.stream import StreamReader
+from paramove.robots.this_launch import RESTARTED, ThisLaunch
 from paramove.safety.gate_io import Fault, State
 
 _log = logging.getLogger(__name__)
@@ -37,6 +38,7 @@ WATCHDOG_SHARE = 0.5
 """After a silence of the loop of this part of what a servo bears, it is asked whether it has stopped by itself."""
 REST_S = 0.0002
 """A loop that is late gives up its lock for so long each period: else it takes it again before whoever waits for it."""
+NOT_EMULATED = "its servos are not emulated by this launch"
 TICK_S = 0.02
 """The driver's logic is asked so often; at once where something is wrong."""
 
@@ -52,6 +54,9 @@ class LoopSettings:
         stop_inputs: Files that press the emergency stop.
         rest: Angles by joint, rad, to which the armed arm goes slowly at a normal end, and then goes limp; without time
             or where anything is wrong it holds. None: at the end it is left as when it is disarmed.
+        emulated_by: The launch that was seen to emulate the servos, which is verified at every open of the port; None:
+            they count as real.
+        caution: What a person should know of this arm in any case.
     """
 
     torque_off: bool = False
@@ -59,6 +64,14 @@ class LoopSettings:
     standing_faults: tuple[Fault, ...] = ()
     stop_inputs: StopInputs = field(default_factory=StopInputs)
     rest: Mapping[str, float] | None = None
+    emulated_by: ThisLaunch | None = None
+    caution: str = ""
+
+    def why_no_program(self) -> str:
+        """Why no program may arm the arm; "" if one may."""
+        if self.emulated_by is None:
+            return NOT_EMULATED
+        return RESTARTED if self.emulated_by.restarted else ""
 
 
 class ServoLoop:
@@ -115,7 +128,7 @@ class ServoLoop:
         return self._arm
 
     def __enter__(self) -> Self:
-        self._port.open()
+        self._open()
         self._thread.start()
         return self
 
@@ -232,12 +245,20 @@ class ServoLoop:
             self._reader.offer(says.stream)
         self._says.append(says)
 
+    def _open(self) -> None:
+        """Raises InputError also if what is driven as emulated is so no more."""
+        self._port.open()
+        reason = self._settings.emulated_by and self._settings.emulated_by.why_not_servos(self._port.device)
+        if reason:
+            self._port.close()
+            raise InputError(f"{self._port.name} does not lead to the servos of this launch: {reason}. Launch again")
+
     def _reopen(self) -> None:
         """Under the same name, which is that of the adapter and not of its place."""
         if time.monotonic() < self._reopen_s:
             return
         try:
-            self._port.open()
+            self._open()
         except InputError as error:
             self.lost = str(error)
             self._reopen_s = time.monotonic() + REOPEN_S

@@ -87,6 +87,11 @@ class ServoPort:
         except (ValueError, OSError):  # not every adapter has such a mode
             self.low_latency = False
 
+    @property
+    def device(self) -> Path:
+        """What was opened, whatever `name` leads to by now. Raises PortLostError."""
+        return Path(self._do(lambda port: os.ttyname(port.fd)))
+
     def close(self) -> None:
         """Also after a loss; a second time does nothing."""
         port, self._serial = self._serial, None

@@ -8,6 +8,7 @@ itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.execution import Execution
 from paramove.robots.streaming.robot_report import RobotReport
 from paramove.robots.streaming.stream import StreamWriter
-from paramove.safety.core import SafetyCore
+from paramove.safety.core import TOUCHED, SafetyCore
 from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s
@@ -39,6 +40,8 @@ SAFETY_STATES = {
 }
 # A trajectory heard later than this after it was made is a replay or comes from a queue that was stuck.
 MAX_TRAJECTORY_AGE_S = 1.0
+# One from the future has a clock of its own; a publisher's clock may be ahead by as much as this.
+MAX_TRAJECTORY_LEAD_S = 0.05
 # A driver that did nothing for longer has let the robot run out of rows; what waited for it meanwhile is dropped.
 MAX_STALL_S = 0.5
 # Batches that came too late make the guard longer, for this trajectory, and so a stop as much later.
@@ -66,9 +69,12 @@ class ArmDriver:
         description: Of the robot.
         settings: Of the safety gate.
         clearance: For the gate; None: it does not look how near parts of the robot come to each other.
+        no_program: Why no program may arm the robot, asked whenever one wants to; "" only where it is verified that
+            the launch of this driver emulates the robot.
 
-    The driver begins with its first tick. Arm words and trajectories from before it are not heard, so a restarted
-    driver is disarmed; the stream's epoch is made of that tick's time.
+    The driver begins with its first tick. Arm words, stops and trajectories from before it are not heard, so a
+    restarted driver is disarmed, and what stopped an earlier one is not its reason; the stream's epoch is made of that
+    tick's time. After a stop from before it, too, only a person arms.
     """
 
     def __init__(
@@ -76,8 +82,10 @@ class ArmDriver:
         description: RobotDescription,
         settings: SafetySettings | None = None,
         clearance: Clearance | None = None,
+        no_program: Callable[[], str] = lambda: Inputs.no_program,
     ) -> None:
         self._description = description
+        self._no_program = no_program
         self._settings = settings
         self._clearance = clearance
         self._limits = MotionLimits.of(description)
@@ -89,6 +97,8 @@ class ArmDriver:
         self._words: list[ArmWord] = []
         self._asked: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
+        self._person_stops: list[tuple[int, Fault]] = []
+        self._stopped_before = False
         self._arming_faults: tuple[Fault, ...] = ()
         self._checks_began_ns: int | None = None
         self._emergency: bool | None = None
@@ -102,7 +112,7 @@ class ArmDriver:
     def _begin_at(self, start_ns: int) -> None:
         d = self._description
         epoch = 1 + (start_ns // 1_000_000) % (2**32 - 1)
-        self._now_ns = start_ns
+        self._now_ns = self._began_ns = start_ns
         self._writer = StreamWriter(d, epoch)
         mechanical = (d.lower, d.upper)
         self._core = SafetyCore(self._limits, mechanical, epoch, start_ns, self._settings, self._clearance)
@@ -132,17 +142,22 @@ class ArmDriver:
             self._reported = True
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
-        """Hear a person's (in simulation the operator node's) word."""
-        self._words.append(ArmWord(captured_ns, message.source, message.armed))
+        """Hear the arming request of a person or, for an emulated robot, of a program."""
+        self._words.append(ArmWord(captured_ns, message.source, message.armed, message.by_person))
 
-    def on_stop(self, message: StopRequest) -> None:
+    def on_stop(self, message: StopRequest, captured_ns: int) -> None:
         """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
-        self._stop = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
+        fault = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
+        self._person_stops.append((captured_ns, fault))
 
     @property
     def wants_to_arm(self) -> bool:
-        """Whether a word to arm was heard that no `tick` has judged yet."""
-        return any(word.armed for word in self._words)
+        """Whether a word was heard that may arm and that no `tick` has judged yet."""
+        return any(word.armed and (word.by_person or not self._why_no_program()) for word in self._words)
+
+    def _why_no_program(self) -> str:
+        touched = self._stopped_before or not self._core.untouched
+        return self._no_program() or (TOUCHED if touched else "")
 
     def on_fault(self, fault: Fault) -> None:
         """Hear what is wrong with the robot: the next `tick` begins a controlled stop and latches it."""
@@ -172,6 +187,7 @@ class ArmDriver:
         self._now_ns = now_ns
         self._ticks += 1
         self._judge_asked(stalled_s)
+        self._judge_stops()
         words: list[ArmWord | None] = [*self._words] or [None]
         self._words.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
@@ -179,7 +195,9 @@ class ArmDriver:
         proposal = self._proposal(now_ns)
         targets = None
         for word in words:
-            inputs = Inputs(measured, word, proposal, stop, self._arming_faults, self._emergency, self._checks_began_ns)
+            checks = self._arming_faults, self._emergency, self._checks_began_ns
+            no_program = self._why_no_program() if word is not None and word.armed and not word.by_person else ""
+            inputs = Inputs(measured, word, proposal, stop, *checks, no_program)
             given, _, _ = self._core.step(now_ns, inputs)
             targets = given or targets
         self._emergency = self._checks_began_ns = None
@@ -191,6 +209,15 @@ class ArmDriver:
         joint_states = self._report.joint_states() if self._report and self._reported else None
         self._reported = False
         return DriverSays(stream, joint_states, statuses, self._safety_state(now_ns))
+
+    def _judge_stops(self) -> None:
+        """A stop from before this driver began is no reason for how it stands: what it stopped was another's."""
+        for captured_ns, fault in self._person_stops:
+            if captured_ns < self._began_ns:
+                self._stopped_before = True
+            else:
+                self._stop = fault
+        self._person_stops.clear()
 
     def _judge_asked(self, stalled_s: float) -> None:
         """Accept or refuse what was heard since the last tick."""
@@ -222,8 +249,9 @@ class ArmDriver:
             busy = self._execution.trajectory_id
             raise TrajectoryRefusedError("busy", -1, "", "a second trajectory", f"one at a time; {busy} is executed")
         age_s = (self._now_ns - captured_ns) * 1e-9
-        if age_s > MAX_TRAJECTORY_AGE_S:
-            raise TrajectoryRefusedError("stale", -1, "", f"age {age_s:.2f} s", f"up to {MAX_TRAJECTORY_AGE_S:g} s")
+        if not -MAX_TRAJECTORY_LEAD_S <= age_s <= MAX_TRAJECTORY_AGE_S:
+            allowed = f"{-MAX_TRAJECTORY_LEAD_S:g} to {MAX_TRAJECTORY_AGE_S:g} s"
+            raise TrajectoryRefusedError("stale", -1, "", f"age {age_s:.2f} s", allowed)
         held = self._core.held(report.next_index) if report.epoch == self._writer.epoch else None
         path = check_trajectory(
             list(message.joints),

@@ -1,0 +1,97 @@
+"""Whether a robot is emulated by the very launch that its driver belongs to: only then a program may arm it.
+
+What the system itself knows is the evidence, never a parameter: who has started this process, who holds the other end
+of a pseudo-terminal, who owns a topic.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from paramove.bus import topics
+from paramove.bus.endpoint import owner_of, socket_path
+from paramove.bus.settings import BusSettings, lock_of
+from paramove.diagnosis.devices import opened_files, serving
+
+PSEUDO_TERMINALS = Path("/dev/pts")
+SERIAL_PORTS = "/dev/tty"
+BY_HAND = "its driver was started by hand, not by a launch"
+RESTARTED = "its driver has been restarted"
+
+
+@dataclass(frozen=True)
+class ThisLaunch:
+    """The launch that this process belongs to.
+
+    Attributes:
+        launcher: Its process id; None: this process was started by hand.
+        restarted: Whether another process of this node ran before in this launch.
+    """
+
+    launcher: int | None = None
+    restarted: bool = False
+
+    @classmethod
+    def of(cls, settings: BusSettings, run_folder: Path, node: str) -> ThisLaunch:
+        """That of a node: its parent is the launcher if it holds the lock of the bus folder."""
+        parent = os.getppid()
+        if str(lock_of(settings.folder.resolve())) not in opened_files(parent).values():
+            return cls()
+        return cls(parent, started_before(run_folder, node))
+
+    def why_not_servos(self, port: Path) -> str:
+        """Why a serial port does not lead to servos that this launch emulates; "" if it does.
+
+        It does if the port is a pseudo-terminal whose other end is held by processes of this launch alone, and by none
+        that has a real serial port open, to which it could hand on.
+        """
+        device = port.resolve()
+        if self.launcher is None:
+            return BY_HAND
+        if device.parent != PSEUDO_TERMINALS:
+            return f"{device} is no pseudo-terminal"
+        servers = serving(device)
+        if not servers:
+            return f"nobody is seen at the other end of {device}"
+        for server in servers:
+            if not self._has_started(server.pid):
+                return f"{server} at the other end of {device} does not belong to this launch"
+            if any(_is_serial_port(name) for name in opened_files(server.pid).values()):
+                return f"{server} at the other end of {device} has a serial port open"
+        return ""
+
+    def why_no_program(self, settings: BusSettings) -> str:
+        """Why no program may arm HOAP-3: this launch does not simulate it, or has restarted its driver.
+
+        It is simulated if the process that publishes its state belongs to this launch and makes the time of the run.
+        """
+        if self.launcher is None or self.restarted:
+            return RESTARTED if self.restarted else BY_HAND
+        names = [settings.name_of(topic) for topic in (topics.WIRE_HOAP3_STATE, topics.CLOCK)]
+        robot, clock = (owner_of(socket_path(settings.folder, name)) for name in names)
+        if robot is None or robot != clock:
+            return f"the process that publishes {names[0]} does not publish {names[1]}, as a simulator does"
+        return "" if self._has_started(robot) else f"pid {robot}, which publishes {names[0]}, is not of this launch"
+
+    def _has_started(self, pid: int) -> bool:
+        with contextlib.suppress(psutil.Error):  # it has just ended, or is not ours to look into
+            return self.launcher in (pid, *(one.pid for one in psutil.Process(pid).parents()))
+        return False
+
+
+def started_before(run_folder: Path, node: str) -> bool:
+    """Whether a node was started before in a run; from now on it was. Raises OSError if that cannot be written."""
+    try:
+        (run_folder / f"{node}_has_started").touch(mode=0o600, exist_ok=False)
+    except FileExistsError:
+        return True
+    return False
+
+
+def _is_serial_port(name: str) -> bool:
+    return name.startswith(SERIAL_PORTS) and not name.removeprefix(SERIAL_PORTS).isdecimal() and name != SERIAL_PORTS
