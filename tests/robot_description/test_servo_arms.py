@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
+
 import mujoco
 import numpy as np
 import pytest
@@ -80,6 +82,77 @@ def test_counts_are_those_of_a_servo(robot: RobotDescription) -> None:
     assert (high < PULSES_PER_TURN).all()
     assert robot.bus is not None
     assert robot.bus.baud_rate in BAUD_RATES
+
+
+@each_arm
+def test_the_urdf_puts_every_link_where_the_model_does(robot: RobotDescription) -> None:
+    ours = ArmModel(robot)
+    urdf = mujoco.MjModel.from_xml_path(str(robot.model_path.with_suffix(".urdf")))
+    data, rng = mujoco.MjData(urdf), np.random.default_rng(5)
+    for _ in range(200):
+        ours.place(rng.uniform(robot.lower, robot.upper))
+        for joint in range(urdf.njnt):
+            data.qpos[joint] = ours.data.joint(urdf.joint(joint).name).qpos[0]
+        mujoco.mj_kinematics(urdf, data)
+        for body in range(1, urdf.nbody):
+            there = ours.data.body(urdf.body(body).name)
+            np.testing.assert_allclose(data.xpos[body], there.xpos, rtol=0, atol=1e-9)
+            np.testing.assert_allclose(data.xmat[body], there.xmat, rtol=0, atol=1e-9)
+
+
+@each_arm
+def test_joints_limits_and_inertias_of_the_urdf_are_those_of_the_model(robot: RobotDescription) -> None:
+    ours = ArmModel(robot).model
+    path = robot.model_path.with_suffix(".urdf")
+    urdf, root = mujoco.MjModel.from_xml_path(str(path)), ET.parse(path).getroot()
+    assert {urdf.joint(i).name for i in range(urdf.njnt)} == {ours.joint(i).name for i in range(ours.njnt)}
+    for i in range(urdf.njnt):
+        np.testing.assert_allclose(urdf.jnt_range[i], ours.joint(urdf.joint(i).name).range, rtol=0, atol=1e-8)
+    for i in range(1, urdf.nbody):  # the base stands still: MuJoCo leaves it out
+        body = ours.body(urdf.body(i).name)
+        np.testing.assert_allclose(urdf.body_mass[i], body.mass[0], rtol=1e-8, atol=0)
+        np.testing.assert_allclose(urdf.body_ipos[i], body.ipos, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(inertia(urdf, i), inertia(ours, body.id), rtol=1e-6, atol=1e-12)
+    assert float(root.find("link/inertial/mass").get("value")) == ours.body_mass[1]
+    for name, effort, velocity in zip(robot.joint_names, robot.torque_peak, robot.velocity, strict=True):
+        limit = root.find(f"joint[@name='{name}']/limit")
+        np.testing.assert_allclose(
+            [float(limit.get(one)) for one in ("effort", "velocity")], [effort, velocity], rtol=1e-5, atol=0
+        )
+    for i in range(ours.neq):
+        mimic = root.find(f"joint[@name='{ours.joint(ours.eq_obj1id[i]).name}']/mimic")
+        assert mimic.get("joint") == ours.joint(ours.eq_obj2id[i]).name
+        found = [float(mimic.get(one)) for one in ("offset", "multiplier")]
+        np.testing.assert_allclose(found, ours.eq_data[i, :2], rtol=1e-9, atol=0)
+
+
+def inertia(model: mujoco.MjModel, body: int) -> np.ndarray:
+    """About the centre of mass, in the body's frame, kg m^2."""
+    turned = np.zeros(9)
+    mujoco.mju_quat2Mat(turned, model.body_iquat[body])
+    axes = turned.reshape(3, 3)
+    return axes @ np.diag(model.body_inertia[body]) @ axes.T
+
+
+@each_arm
+def test_sites_of_the_model_are_frames_of_the_urdf(robot: RobotDescription) -> None:
+    ours = ArmModel(robot).model
+    root = ET.parse(robot.model_path.with_suffix(".urdf")).getroot()
+    assert ours.nsite > 0
+    for i in range(ours.nsite):
+        fixed = root.find(f"joint[@name='{ours.site(i).name}_fixed']")
+        assert fixed.find("parent").get("link") == ours.body(ours.site_bodyid[i]).name
+        assert fixed.find("child").get("link") == f"{ours.site(i).name}_frame"
+        place = [float(word) for word in fixed.find("origin").get("xyz").split()]
+        np.testing.assert_allclose(place, ours.site_pos[i], rtol=0, atol=1e-9)
+
+
+@each_arm
+@pytest.mark.parametrize("file", [None, "scene.xml"])
+def test_the_home_key_is_the_base_pose(robot: RobotDescription, file: str | None) -> None:
+    here = ArmModel(robot, file)
+    here.place(robot.base_pose)
+    np.testing.assert_allclose(here.model.key("home").qpos, here.data.qpos, rtol=0, atol=1e-6)
 
 
 def test_servos_and_ids() -> None:
