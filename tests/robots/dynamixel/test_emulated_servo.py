@@ -1,5 +1,7 @@
 """One servo, without a bus: what the e-Manual says of modes, backup, indirect access and start."""
 
+from dataclasses import replace
+
 import pytest
 
 from paramove.robots.dynamixel.emulated_body import HardwareError
@@ -103,7 +105,9 @@ def test_a_servo_may_start_with_torque_and_with_gains_of_the_backup():
     assert write(servo, "Startup Configuration", 4) == StatusError.DATA_RANGE
 
 
-@pytest.mark.parametrize(("model", "last"), [(XM430_W350, 661), (XL330_M288, 227)])
+@pytest.mark.parametrize(
+    ("model", "last"), [(XM430_W350, 661), (XL330_M288, 251), (replace(XL330_M288, firmware=52), 227)]
+)
 def test_indirect_addresses_are_whole_and_of_ram(model, last):
     servo = EmulatedServo(model)
     half = servo.do(Instruction.WRITE, INDIRECT.to_bytes(2, "little") + b"\x41")

@@ -119,6 +119,8 @@ class ServoMemory:
         """Raises RefusedError beyond the end of the table."""
         if size == 0 or address + size > len(self._bytes):
             raise RefusedError(StatusError.ACCESS)
+        if address + size <= FIRST_INDIRECT:
+            return bytes(self._bytes[address : address + size])
         return bytes(self._bytes[self._meant(place)] for place in range(address, address + size))
 
     def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:

@@ -3,6 +3,7 @@
 Addresses and sizes are those of the tables that come with dynamixel-sdk, but for `NOT_OF_THE_SDK`. Initial values,
 ranges and speeds are from the ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250", "XL330-M288-T" and
 "XL330-M077-T"; speeds, torques and currents are those of their tables "Specifications" at the recommended voltage.
+Where an XL330 has its indirect data goes by its firmware, as in the SDK's `xl330_*.model` and `xl330_*_fw52.model`.
 """
 
 from __future__ import annotations
@@ -68,14 +69,14 @@ class ServoModel:
     Attributes:
         name: As in the SDK's file of the model. number: Model Number (0).
         registers: By name.
-        indirect: Where a part of the table may be gathered.
         modes: Values that Operating Mode (11) may take.
         top_speed: Without load at the recommended voltage, rev/min.
         voltage: Recommended, V.
         stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
         current_unit: Amperes of one unit of current; None for a model that tells load, 0.1 % of the stall torque each.
-        firmware: Version that an emulated servo tells. Bus watchdog and clear need 42 or above; fast reads, backup,
-            Startup Configuration and torque on by goal need 45, and 46 in an XL330.
+        firmware: Version that an emulated servo reports. Of an XL330 at most 52: above, ROBOTIS's tables contradict
+            each other. Bus watchdog and clear need 42 or above; fast reads, backup, Startup Configuration and torque
+            on by goal need 45, and 46 in an XL330.
     """
 
     name: str
@@ -86,9 +87,15 @@ class ServoModel:
     stall_torque: float
     stall_amperes: float
     current_unit: float | None
-    indirect: tuple[IndirectBlock, ...]
     registers: Mapping[str, Register] = field(repr=False)
     firmware: int = 46
+
+    @property
+    def indirect(self) -> tuple[IndirectBlock, ...]:
+        """Where a part of the table may be gathered."""
+        if self.number not in XL330_NUMBERS:
+            return X_BLOCKS
+        return XL330_BLOCKS if self.firmware >= XL330_MOVED else XL330_BLOCKS_BEFORE
 
     @property
     def size(self) -> int:
@@ -119,7 +126,7 @@ WRITABLE: dict[str, tuple[int, Range]] = {
     "Min Voltage Limit": (95, (95, 160)),
     "PWM Limit": (885, (0, 885)),
     "Current Limit": (1193, (0, 1193)),
-    "Velocity Limit": (350, (0, 1023)),
+    "Velocity Limit": (200, (0, 1023)),
     "Max Position Limit": (4095, (0, 4095)),
     "Min Position Limit": (0, (0, 4095)),
     "Startup Configuration": (0, (0, 3)),
@@ -150,6 +157,10 @@ NOT_OF_THE_SDK = {"Startup Configuration": (60, 1), "Backup Ready": (147, 1)}
 
 ALL_MODES = frozenset({0, 1, 3, 4, 5, 16})
 X_BLOCKS = (IndirectBlock(168, 224, 28), IndirectBlock(578, 634, 28))
+XL330_NUMBERS = (1190, 1200)
+XL330_MOVED = 52
+"""Firmware from which on the indirect data of an XL330 are at 208 and no longer at 224."""
+XL330_BLOCKS, XL330_BLOCKS_BEFORE = (IndirectBlock(168, 208, 20),), (IndirectBlock(168, 224, 28),)
 
 
 def _registers(number: int, **others: tuple[int, Range]) -> dict[str, Register]:
@@ -165,14 +176,14 @@ def _registers(number: int, **others: tuple[int, Range]) -> dict[str, Register]:
 
 
 XM430_W350 = ServoModel(
-    "xm430_w350", 1020, ALL_MODES, 46.0, 12.0, 4.1, 2.3, 0.00269, X_BLOCKS, _registers(1020)
+    "xm430_w350", 1020, ALL_MODES, 46.0, 12.0, 4.1, 2.3, 0.00269, _registers(1020)
 )  # fmt: skip
 XM430_W210 = ServoModel(
-    "xm430_w210", 1030, ALL_MODES, 77.0, 12.0, 3.0, 2.3, 0.00269, X_BLOCKS,
+    "xm430_w210", 1030, ALL_MODES, 77.0, 12.0, 3.0, 2.3, 0.00269,
     _registers(1030, Velocity_Limit=(330, (0, 1023))),
 )  # fmt: skip
 XL430_W250 = ServoModel(
-    "xl430_w250", 1060, ALL_MODES - {0, 5}, 57.0, 11.1, 1.4, 1.3, None, X_BLOCKS,
+    "xl430_w250", 1060, ALL_MODES - {0, 5}, 57.0, 11.1, 1.4, 1.3, None,
     _registers(
         1060, Temperature_Limit=(72, (0, 100)), Max_Voltage_Limit=(140, (60, 140)), Min_Voltage_Limit=(60, (60, 140)),
         Velocity_Limit=(265, (0, 1023)), Velocity_I_Gain=(1000, GAIN), Position_D_Gain=(4000, GAIN),
@@ -184,15 +195,14 @@ XL330: dict[str, tuple[int, Range]] = {
     "Max Voltage Limit": (70, (31, 70)), "Min Voltage Limit": (35, (31, 70)), "Current Limit": (1750, (0, 1750)),
     "Shutdown": (53, (0, 255)), "Position P Gain": (400, GAIN),
 }  # fmt: skip
-XL330_BLOCKS = (IndirectBlock(168, 208, 20),)
 XL330_M288 = ServoModel(
-    "xl330_m288", 1200, ALL_MODES, 103.0, 5.0, 0.52, 1.47, 0.001, XL330_BLOCKS,
+    "xl330_m288", 1200, ALL_MODES, 103.0, 5.0, 0.52, 1.47, 0.001,
     _registers(
         1200, **XL330, Velocity_Limit=(445, (0, 2047)), Velocity_I_Gain=(1600, GAIN), Velocity_P_Gain=(180, GAIN),
     ),
 )  # fmt: skip
 XL330_M077 = ServoModel(
-    "xl330_m077", 1190, ALL_MODES, 383.0, 5.0, 0.215, 1.47, 0.001, XL330_BLOCKS,
+    "xl330_m077", 1190, ALL_MODES, 383.0, 5.0, 0.215, 1.47, 0.001,
     _registers(
         1190, **XL330, Velocity_Limit=(1620, (0, 2047)), Velocity_I_Gain=(400, GAIN), Velocity_P_Gain=(40, GAIN),
         Position_I_Gain=(400, GAIN),
