@@ -1,6 +1,6 @@
 """How fast a servo arm is stopped by whatever ends its movement, and which loop rates its bus holds.
 
-    python benchmarks/arm.py [--json FILE] [--trials N] [--robot FOLDER]
+    python benchmarks/arm.py [--json FILE] [--trials N] [--robot FOLDER] [--only-replies] [--busy N]
 
 The driver's own loop moves an arm of emulated servos behind a pseudo-terminal whose answers take as long as their bytes
 do. Times are of the wall clock, so other programs lengthen them; the processes share this machine's processors.
@@ -10,11 +10,13 @@ do. Times are of the wall clock, so other programs lengthen them; the processes 
     stop            a person's word reaches the driver; until the first row of the stop ramp is played
     unplugged       until the gate lets nothing pass any more
     loop            periods of the loop, measured at the servos' end
+    replies         of servos that move the arm in its scene, to 4800 reads, next to N programs that never rest
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -30,6 +32,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import serial
 
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
@@ -37,8 +40,9 @@ from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
 from paramove.robots.dynamixel.driven_arm import DrivenArm
-from paramove.robots.dynamixel.emulated_arm import emulated_servos
+from paramove.robots.dynamixel.emulated_arm import EmulatedArm, emulated_servos
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.packets import Instruction, Packet, encoded
 from paramove.robots.dynamixel.servo_arm import Patience
 from paramove.robots.dynamixel.servo_loop import LoopSettings
 from paramove.safety.gate_io import State
@@ -49,6 +53,8 @@ MOVEMENT_S = 4.0
 UNDER_WAY_S = 1.0
 PATIENT_S = 10.0
 LOOP_S = 10.0
+READS, SDK_TIMEOUT_MS = 4800, 34.0
+"""ROBOTIS's SDK waits so long for an answer: twice 16 ms and 2."""
 BUSY = Patience(silent_s=0.25, read_s=0.1)
 """For what does not measure silence: other programs may take the processors for a while."""
 
@@ -56,8 +62,9 @@ BUSY = Patience(silent_s=0.25, read_s=0.1)
 class Emulation:
     """Emulated servos in a process of their own, as real ones have their own processors."""
 
-    def __init__(self, folder: Path, baud_rate: int, link: Path) -> None:
+    def __init__(self, folder: Path, baud_rate: int, link: Path, *options: str) -> None:
         command = [sys.executable, __file__, "--robot", str(folder), "--emulate", str(link), "--baud", str(baud_rate)]
+        command += options
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.does("ready")
 
@@ -74,10 +81,15 @@ class Emulation:
         self._process.communicate("end\n")
 
 
-def emulate(description: RobotDescription, link: Path, baud_rate: int) -> None:
+def emulate(description: RobotDescription, link: Path, baud_rate: int, world: bool) -> None:
     """What that process does: one answer for each word."""
     bus = description.bus.model_copy(update={"baud_rate": baud_rate})
-    with DynamixelEmulator(emulated_servos(replace(description, bus=bus)), link) as emulator:
+    description = replace(description, bus=bus)
+    with contextlib.ExitStack() as opened:
+        if world:
+            emulator = opened.enter_context(EmulatedArm(description, link=link, held=True)).emulator
+        else:
+            emulator = opened.enter_context(DynamixelEmulator(emulated_servos(description), link))
         for line in sys.stdin:
             word = line.strip()
             if word == "end":
@@ -249,12 +261,77 @@ def periods_ms(description: RobotDescription, folder: Path, baud_rate: int, rate
     return 1e3 * np.diff(arrivals)
 
 
+def replies_ms(description: RobotDescription, folder: Path, busy: int) -> list[float]:
+    """From a question until its answer is whole; each servo in turn, 6 ms after the last one's."""
+    times = []
+    with tempfile.TemporaryDirectory() as place:
+        link = Path(place) / "port"
+        emulation = Emulation(folder, 1_000_000, link, "--world")
+        loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(busy)]
+        with contextlib.suppress(PermissionError):  # what is measured is not how late this program is itself
+            os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+        with serial.Serial(str(link), 1_000_000, timeout=PATIENT_S) as port:
+            for i in range(READS):
+                servo = description.servo_ids[i % len(description.servo_ids)]
+                begun_s = time.monotonic()
+                port.write(encoded(Packet(servo, Instruction.READ, bytes([132, 0, 4, 0]))))
+                if len(port.read(15)) == 15:
+                    times.append(1e3 * (time.monotonic() - begun_s))
+                time.sleep(0.006)
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        for loop in loops:
+            loop.kill()
+        emulation.end()
+    return times
+
+
+def replies(description: RobotDescription, folder: Path, busy: int) -> dict[str, float]:
+    """Measured, printed and as numbers."""
+    times = replies_ms(description, folder, busy)
+    median, p99 = np.percentile(times, [50, 99])
+    late = READS - sum(one <= SDK_TIMEOUT_MS for one in times)
+    say(
+        f"replies next to {busy} busy programs: median {median:.1f} ms, 99 % {p99:.1f}, worst {max(times):.1f}, "
+        f"{late} of {READS} after {SDK_TIMEOUT_MS:.0f} ms"
+    )
+    return {"median_ms": median, "p99_ms": p99, "worst_ms": max(times), "late": late, "reads": READS}
+
+
+def stops_and_loops(description: RobotDescription, folder: Path, trials: int) -> dict[str, Any]:
+    """Measured, printed and as numbers."""
+    found: dict[str, Any] = {}
+    for name, measured in (
+        ("stop", stop_ms(description, folder, trials)),
+        ("command loss", command_loss_ms(description, folder, trials)),
+        ("unplugged", unplugged_ms(description, folder, trials)),
+        ("driver killed", killed_ms(description, folder, max(3, trials // 4))),
+    ):
+        median, p99 = np.percentile(measured, [50, 99])
+        found[name] = {"median_ms": median, "p99_ms": p99, "worst_ms": max(measured), "trials": len(measured)}
+        goal = GOALS_MS[name]
+        say(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
+    for baud_rate, rate_hz in ((1_000_000, 100), (4_000_000, 200)):
+        periods = periods_ms(description, folder, baud_rate, rate_hz)
+        median, p99 = np.percentile(periods, [50, 99])
+        late = float((periods > 1.5e3 / rate_hz).mean())
+        held = 1e3 / periods.mean()
+        found[f"loop {rate_hz} Hz"] = {"rate_hz": held, "median_ms": median, "p99_ms": p99, "late_share": late}
+        say(
+            f"loop {rate_hz} Hz at {baud_rate // 1_000_000} Mbit/s: {held:.1f} Hz, period median {median:.2f} ms, "
+            f"99 % {p99:.2f}, half a period late {late:.1%}"
+        )
+    return found
+
+
 def main() -> None:
     """Measures, prints a table and writes the numbers if asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--robot", type=Path, default=ROOT / "robot_description" / "open_manipulator_x")
+    parser.add_argument("--only-replies", action="store_true")
+    parser.add_argument("--busy", type=int, default=2, help="programs that never rest while replies are measured")
+    parser.add_argument("--world", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--drive", help=argparse.SUPPRESS)
     parser.add_argument("--emulate", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--baud", type=int, default=1_000_000, help=argparse.SUPPRESS)
@@ -264,31 +341,13 @@ def main() -> None:
         drive(description, arguments.drive)
         return
     if arguments.emulate:
-        emulate(description, arguments.emulate, arguments.baud)
+        emulate(description, arguments.emulate, arguments.baud, arguments.world)
         return
     load, trials = os.getloadavg()[0], arguments.trials
     say(f"{description.name}, {len(os.sched_getaffinity(0))} processors, load {load:.1f} before")
-    found: dict[str, Any] = {}
-    for name, measured in (
-        ("stop", stop_ms(description, arguments.robot, trials)),
-        ("command loss", command_loss_ms(description, arguments.robot, trials)),
-        ("unplugged", unplugged_ms(description, arguments.robot, trials)),
-        ("driver killed", killed_ms(description, arguments.robot, max(3, trials // 4))),
-    ):
-        median, p99 = np.percentile(measured, [50, 99])
-        found[name] = {"median_ms": median, "p99_ms": p99, "worst_ms": max(measured), "trials": len(measured)}
-        goal = GOALS_MS[name]
-        say(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
-    for baud_rate, rate_hz in ((1_000_000, 100), (4_000_000, 200)):
-        periods = periods_ms(description, arguments.robot, baud_rate, rate_hz)
-        median, p99 = np.percentile(periods, [50, 99])
-        late = float((periods > 1.5e3 / rate_hz).mean())
-        held = 1e3 / periods.mean()
-        found[f"loop {rate_hz} Hz"] = {"rate_hz": held, "median_ms": median, "p99_ms": p99, "late_share": late}
-        say(
-            f"loop {rate_hz} Hz at {baud_rate // 1_000_000} Mbit/s: {held:.1f} Hz, period median {median:.2f} ms, "
-            f"99 % {p99:.2f}, half a period late {late:.1%}"
-        )
+    found: dict[str, Any] = {"replies": replies(description, arguments.robot, arguments.busy)}
+    if not arguments.only_replies:
+        found |= stops_and_loops(description, arguments.robot, trials)
     if arguments.json:
         arguments.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
 

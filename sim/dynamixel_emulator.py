@@ -22,7 +22,8 @@ class Config(NodeConfig):
     """`port`: a link to the port, `control`: a socket for faults, '' for none; both in the run folder or absolute.
 
     `scene`: a file beside the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose;
-    `held`: whether the servos hold from the start.
+    `held`: whether the servos hold from the start; `servo_rules_only`: whether only what servos themselves reject is
+    counted, not goals that jump.
     """
 
     robot: Path = Path("robot_description/koch_v1_1")
@@ -32,6 +33,7 @@ class Config(NodeConfig):
     posture_deg: dict[str, float] = Field(default_factory=dict)
     seed: int = Field(default=0, ge=0)
     held: bool = True
+    servo_rules_only: bool = False
 
 
 def run(bus: Bus, config: Config) -> None:
@@ -39,7 +41,9 @@ def run(bus: Bus, config: Config) -> None:
     robot = RobotDescription.load(config.robot)
     control = bus.run_folder / config.control if config.control else None
     link = bus.run_folder / config.port
-    with EmulatedArm(robot, config.scene, link, control, config.posture_deg, config.seed, config.held) as arm:
+    with EmulatedArm(
+        robot, config.scene, link, control, config.posture_deg, config.seed, config.held, config.servo_rules_only
+    ) as arm:
         bus.ready(arm.sentence)
         for event in bus.events(tick=True):
             if isinstance(event, Tick):

@@ -3,8 +3,8 @@
     python benchmarks/foreign_clients [--link /tmp/paramove_servos]
 
 Installs them into build/foreign_clients (once), starts three emulated servos in a process of their own for each, and
-prints what each has done. They wait 34 ms or so for an answer and do not ask again, which on a busy machine is too
-little, so each has three tries. The exit code is 1 if one was never satisfied.
+prints what each has done, and what of it the servos reject. They wait 34 ms or so for an answer and do not ask again,
+which on a busy machine is too little, so each has three tries. The exit code is 1 if one was never satisfied.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ def main() -> int:
     link: Path = parser.parse_args().link
     console = Console()
     install(console)
-    table = Table("program", "what it has done", "satisfied", "tries")
+    table = Table("program", "what it has done", "satisfied", "tries", "rejected")
     satisfied = True
     for name, script in CLIENTS.items():
         with console.status(name):
-            done, said, n_tries = False, "", 0
+            done, said, rejected, n_tries = False, "", "", 0
             while not done and n_tries < TRIES:
-                done, said = tried(script, link)
+                done, said, rejected = tried(script, link)
                 n_tries += 1
-        table.add_row(name, said, "yes" if done else "[red]no[/]", str(n_tries))
+        table.add_row(name, said, "yes" if done else "[red]no[/]", str(n_tries), rejected)
         satisfied &= done
     console.print(table)
     return 0 if satisfied else 1
@@ -81,8 +81,8 @@ def install(console: Console) -> None:
     stamp.write_text(wanted)
 
 
-def tried(script: str, link: Path) -> tuple[bool, str]:
-    """Whether a client is satisfied with fresh servos, and its last line."""
+def tried(script: str, link: Path) -> tuple[bool, str, str]:
+    """Whether a client is satisfied with fresh servos, its last line, and what the servos reject."""
     servos = subprocess.Popen([sys.executable, HERE / "servos.py", link], stdout=subprocess.PIPE, text=True)
     try:
         assert servos.stdout is not None
@@ -91,12 +91,12 @@ def tried(script: str, link: Path) -> tuple[bool, str]:
             [PYTHON, HERE / script, link], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired:
-        return False, f"was not ready after {TIMEOUT_S:g} s"
+        return False, f"was not ready after {TIMEOUT_S:g} s", ""
     finally:
         servos.send_signal(signal.SIGTERM)
-        servos.wait()
+        rejected, _ = servos.communicate()
     said = ran.stdout if ran.returncode == 0 else ran.stderr
-    return ran.returncode == 0, (said.strip() or "nothing").splitlines()[-1]
+    return ran.returncode == 0, (said.strip() or "nothing").splitlines()[-1], rejected.strip()
 
 
 if __name__ == "__main__":

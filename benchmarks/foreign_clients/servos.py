@@ -1,4 +1,4 @@
-"""Three emulated servos at 1 Mbit/s behind a pseudo-terminal, until this program is told to end."""
+"""Three emulated servos at 1 Mbit/s behind a pseudo-terminal, until told to end; prints what they have rejected."""
 
 import signal
 import sys
@@ -10,7 +10,8 @@ from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
 
 chain = [EmulatedServo(model, 1 + i, 1_000_000) for i, model in enumerate((XL430_W250, XL330_M288, XL330_M288))]
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
-with DynamixelEmulator(chain, Path(sys.argv[1])) as emulator:
+with DynamixelEmulator(chain, Path(sys.argv[1]), servo_rules_only=True) as emulator:
     sys.stdout.write(f"{emulator.port}\n")
     sys.stdout.flush()
     signal.sigwait({signal.SIGTERM})
+    sys.stdout.write(", ".join(f"{count} {kind}" for kind, count in sorted(emulator.bus.judge.counts.items())) + "\n")

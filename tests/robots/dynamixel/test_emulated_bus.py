@@ -37,6 +37,7 @@ def test_sync_write_of_the_manual():
 def test_bulk_read_of_the_manual():
     bus = a_bus()
     bus.servos[0].voltage, bus.servos[1].temperature = 11.9, 36.0
+    bus.run_to(0.0)
     question = bytes.fromhex("FFFFFD00FE0D009201900002000292000100 1A05".replace(" ", ""))
     answer = b"".join(data for _, data in bus.receive(question, BAUD, 0.0))
     assert answer == bytes.fromhex("FFFFFD000106005500 7700C369" + "FFFFFD000205005500 248BA9")

@@ -1,5 +1,7 @@
 """The judge finds what should not be sent, only that, and before it has an effect."""
 
+from dataclasses import replace
+
 import pytest
 from dynamixel_sdk import PacketHandler
 from hypothesis import given
@@ -12,12 +14,15 @@ from paramove.robots.dynamixel.packets import BROADCAST, Instruction, Packet, Pa
 from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
 
 BAUD = 57600
-TORQUE, GOAL, ID, WATCHDOG, VELOCITY, LIMIT = 64, 116, 7, 98, 104, 48
+TORQUE, LED, GOAL, ID, WATCHDOG, VELOCITY, LIMIT = 64, 65, 116, 7, 98, 104, 48
 
 
-def a_bus(**speeds):
-    bus = EmulatedBus([EmulatedServo(XL430_W250, 1), EmulatedServo(XL330_M288, 2)])
-    bus.judge = WireJudge(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
+def a_bus(servo_rules_only=False, **speeds):
+    models = (XL430_W250, XL330_M288, replace(XL330_M288, firmware=52))
+    servos = [EmulatedServo(model, 1 + i) for i, model in enumerate(models)]
+    bus = EmulatedBus(servos, servo_rules_only=servo_rules_only)
+    if speeds:
+        bus.judge = WireJudge(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
     return bus
 
 
@@ -84,6 +89,41 @@ def test_without_a_rate_the_speed_of_the_servo_counts():
     assert kinds(bus) == ["step"]
 
 
+@pytest.mark.parametrize(("number", "addresses", "data"), [(1, 168, 224), (1, 578, 634), (2, 168, 224), (3, 168, 208)])
+def test_a_jump_through_indirect_data_is_found(number, addresses, data):
+    """ROBOTIS's ROS 2 driver sends all goals so."""
+    bus = a_bus()
+    for i, place in enumerate((*range(GOAL, GOAL + 4), LED, 132)):  # the last one is of Present Position
+        bus.receive(write(addresses + 2 * i, place, 2, number), BAUD, 1.0)
+    bus.receive(write(TORQUE, 1, number=number), BAUD, 1.0)
+    bus.receive(write(data, 2048 + 100, 4, number), BAUD, 1.5)
+    bus.receive(write(data, 2048, 5, number), BAUD, 2.0)  # LED too
+    assert kinds(bus) == []
+    bus.receive(write(data, 4000, 4, number), BAUD, 2.01)
+    assert kinds(bus) == ["step"]
+    assert bus.judge.findings[0].id == number
+    bus.receive(write(data, 4000, 2, number), BAUD, 2.1)
+    bus.receive(write(data + 5, 7, 1, number), BAUD, 2.1)
+    assert kinds(bus) == ["step", "register", "register"]
+
+
+def test_of_an_ordinary_client_only_what_servos_reject_is_found():
+    """It switches torque on with the goal elsewhere and jumps; as ROBOTIS's samples do."""
+    found = []
+    for servo_rules_only in (False, True):
+        bus = a_bus(servo_rules_only)
+        bus.servos[0].memory["Hardware Error Status"] = 0x01  # of the voltage: Shutdown does not name it
+        for data in (write(GOAL, 0, 4), write(TORQUE, 1), write(GOAL, 4095, 4), write(GOAL, 0, 4)):
+            bus.receive(data, BAUD, 1.0)
+        found.append(kinds(bus))
+        bus.receive(write(ID, 7) + write(GOAL, 5000, 4) + b"hello" + write(132, 5, 4), BAUD, 2.0)
+        bus.receive(write(TORQUE, 0), BAUD, 2.0)
+        bus.servos[0].memory["Hardware Error Status"] = 0x20
+        bus.receive(write(TORQUE, 1), BAUD, 2.0)
+    assert found == [["torque", "shut_down", "step", "step"], []]
+    assert kinds(bus) == ["eeprom", "limit", "noise", "register", "shut_down"]
+
+
 def test_goals_beyond_limits_are_found():
     bus = a_bus()
     bus.receive(write(LIMIT, 3000, 4), BAUD, 1.0)
@@ -108,6 +148,7 @@ def test_eeprom_with_torque_on_a_tripped_watchdog_and_a_shut_down_servo_are_foun
     bus.receive(write(TORQUE, 1) + write(ID, 3), BAUD, 1.0)
     assert kinds(bus) == ["eeprom"]
     bus.receive(write(WATCHDOG, 1), BAUD, 1.0)
+    bus.run_to(2.0)
     bus.receive(write(GOAL, 2048, 4), BAUD, 2.0)
     assert kinds(bus) == ["eeprom", "watchdog"]
     bus.receive(write(TORQUE, 0), BAUD, 2.1)

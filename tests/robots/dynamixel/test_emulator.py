@@ -320,6 +320,53 @@ def test_a_hardware_error_is_told_with_every_answer(client):
     assert client.handler.read1ByteTxRx(client.port, 1, ERROR_STATUS) == (0x20, COMM_SUCCESS, 0x80)
 
 
+class SlowWorld:
+    """Each millisecond of it takes twenty of the processor."""
+
+    def shafts(self):
+        return [(2048.0, 0.0)]
+
+    def step(self, efforts, blocked):
+        end_s = time.thread_time() + 0.02
+        while time.thread_time() < end_s:
+            pass
+
+
+def test_no_answer_waits_for_a_world_that_is_behind_and_other_programs_run_before_it():
+    with DynamixelEmulator([EmulatedServo(XL430_W250)], mechanics=SlowWorld()) as emulator:
+        client = Client(emulator)
+        began_s = time.monotonic()
+        client.until(lambda: emulator.bus.now_s > 0.02)
+        for _ in range(3):
+            assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
+        with emulator.lock:
+            assert emulator.bus.now_s < 0.5 * (time.monotonic() - began_s)
+
+        def is_like_any_other():
+            emulator._stopped.wait(0.02)  # and not asks on: the two threads share one interpreter
+            return os.sched_getscheduler(emulator._thread.native_id) == os.SCHED_OTHER
+
+        client.until(is_like_any_other, 30.0)
+        client.port.closePort()
+
+
+@pytest.mark.parametrize("allowed", [True, False])
+def test_servos_run_before_other_programs_where_the_system_allows_it(allowed, monkeypatch):
+    asked = []
+
+    def sets(pid, policy, parameter):
+        asked.append((pid, policy, parameter.sched_priority))
+        if not allowed:
+            raise PermissionError
+
+    monkeypatch.setattr(os, "sched_setscheduler", sets)
+    with DynamixelEmulator([EmulatedServo(XL430_W250)]) as emulator:
+        client = Client(emulator)
+        assert client.handler.ping(client.port, 1)[1] == COMM_SUCCESS
+        client.port.closePort()
+    assert (0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 1) in asked
+
+
 def test_a_link_names_the_port_as_long_as_it_is_there(tmp_path):
     link = tmp_path / "usb-emulated"
     with DynamixelEmulator([EmulatedServo(XL430_W250)], link) as emulator:

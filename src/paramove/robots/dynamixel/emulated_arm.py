@@ -35,6 +35,7 @@ class EmulatedArm:
         posture_deg: Of joints at the start; others begin in the base pose.
         seed: Of faults on the wire, when there are any.
         held: Whether the servos hold at the start, as a program before has left them; else the arm falls at once.
+        servo_rules_only: Whether the judge finds only what the servos themselves reject.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class EmulatedArm:
         posture_deg: Mapping[str, float] | None = None,
         seed: int = 0,
         held: bool = False,
+        servo_rules_only: bool = False,
     ) -> None:
         pose = dict(zip(robot.joint_names, robot.base_pose.tolist(), strict=True))
         for name, degrees in (posture_deg or {}).items():
@@ -63,13 +65,15 @@ class EmulatedArm:
         self._joints = dict(zip(robot.servo_ids, joints, strict=True))
         self._objects = _free_bodies(self.mechanics.model)
         self._link, self._control, self._seed, self._held = link, control, seed, held
+        self._servo_rules_only = servo_rules_only
         self._open = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
         with contextlib.ExitStack() as opened:
             if self._link is not None:
                 self._link.parent.mkdir(parents=True, exist_ok=True)
-            self.emulator = opened.enter_context(DynamixelEmulator(self._servos, self._link, self.mechanics))
+            emulator = DynamixelEmulator(self._servos, self._link, self.mechanics, self._servo_rules_only)
+            self.emulator = opened.enter_context(emulator)
             self.emulator.faults = WireFaults(seed=self._seed)
             with self.emulator.lock:
                 for servo in self._servos if self._held else ():

@@ -37,19 +37,23 @@ class EmulatedBus:
     Args:
         servos: In the order of the chain.
         mechanics: What they move, in the same order; without, each carries nothing.
+        servo_rules_only: Whether the judge finds only what the servos themselves reject.
 
     Attributes:
         servos: Those on the bus.
         judge: Of all that arrives; may be replaced.
+        now_s: Time of the servos and of what they move, s.
     """
 
-    def __init__(self, servos: Sequence[EmulatedServo], mechanics: Mechanics | None = None) -> None:
+    def __init__(
+        self, servos: Sequence[EmulatedServo], mechanics: Mechanics | None = None, servo_rules_only: bool = False
+    ) -> None:
         self.servos = list(servos)
         self.mechanics = mechanics
         self._chain = tuple(servos) if mechanics is not None else ()
-        self.judge = WireJudge(self.servos)
+        self.judge = WireJudge(self.servos, servo_rules_only=servo_rules_only)
         self._reader = PacketReader()
-        self._now_s = self._heard_s = 0.0
+        self.now_s = self._heard_s = 0.0
         self._baud_rate = 0
         if mechanics is not None:
             for servo, (shaft, _) in zip(self._chain, mechanics.shafts(), strict=True):
@@ -57,18 +61,19 @@ class EmulatedBus:
 
     def begin(self, now_s: float) -> None:
         """The time of all servos is this one, s, from now on."""
-        self._now_s = now_s
+        self.now_s = now_s
         for servo in self.servos:
             servo.begin(now_s)
 
     def add(self, servo: EmulatedServo) -> None:
         """One more, which moves nothing."""
-        servo.begin(self._now_s)
+        servo.begin(self.now_s)
         self.servos.append(servo)
 
     def receive(self, data: bytes, baud_rate: int, now_s: float) -> list[tuple[float, bytes]]:
         """What the servos say to these bytes: for each answer, how long after now_s it begins, s, and its bytes.
 
+        The bytes came at now_s, s; the servos answer at once, as they are in their own time, which `run_to` brings on.
         Bytes at another baud rate than before, or after a pause in the middle of a packet, begin anew.
         """
         if baud_rate != self._baud_rate or (self._reader.waits and now_s - self._heard_s > 0.1):
@@ -76,27 +81,26 @@ class EmulatedBus:
             self.judge.give_up(now_s)
         self._baud_rate, self._heard_s = baud_rate, now_s
         said: list[tuple[float, bytes]] = []
-        self.run_to(now_s)
         for piece in self.judge.pieces(data, now_s):
-            said += self._obey(piece, baud_rate, now_s)
+            said += self._obey(piece, baud_rate)
         return said
 
-    def _obey(self, data: bytes, baud_rate: int, now_s: float) -> Iterator[Said]:
+    def _obey(self, data: bytes, baud_rate: int) -> Iterator[Said]:
         for packet in self._reader.feed(data):
             hearing = [servo for servo in self.servos if servo.listens and servo.hears_at(baud_rate)]
             for servo in hearing:
-                servo.hear(now_s)
+                servo.hear(self.now_s)
             yield from self._answers(packet, hearing)
 
     def run_to(self, now_s: float) -> None:
         """All servos, and what they move, go on until this time, s."""
-        while self.mechanics is not None and self._now_s + STEP_S <= now_s:
-            self._now_s += STEP_S
+        while self.mechanics is not None and self.now_s + STEP_S <= now_s:
+            self.now_s += STEP_S
             efforts = [servo.effort() for servo in self._chain]
             self.mechanics.step(efforts, [servo.blocked for servo in self._chain])
             for servo, (shaft, velocity) in zip(self._chain, self.mechanics.shafts(), strict=True):
                 servo.moved(shaft, velocity)
-        self._now_s = max(self._now_s, now_s) if self.mechanics is None else self._now_s
+        self.now_s = max(self.now_s, now_s) if self.mechanics is None else self.now_s
         for servo in self.servos:
             if servo in self._chain:
                 servo.present()

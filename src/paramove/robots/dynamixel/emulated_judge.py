@@ -62,6 +62,8 @@ class WireJudge:
         servos: Whose state decides what may be sent; a list that changes is followed.
         fastest: Pulses per second that a stream of goals may ask of the servo of an id; without, what it can do without
             load.
+        servo_rules_only: Whether only that is found which the servos themselves reject or cannot read; an arm's driver
+            should also keep goals from jumping, which the programs of others do all the time.
 
     Attributes:
         findings: The first thousand, in the order in which they came.
@@ -69,8 +71,13 @@ class WireJudge:
         packets: How many were sound.
     """
 
-    def __init__(self, servos: Sequence[EmulatedServo], fastest: Mapping[int, float] | None = None) -> None:
-        self.servos = servos
+    def __init__(
+        self,
+        servos: Sequence[EmulatedServo],
+        fastest: Mapping[int, float] | None = None,
+        servo_rules_only: bool = False,
+    ) -> None:
+        self.servos, self.servo_rules_only = servos, servo_rules_only
         self.fastest = dict(fastest or {})
         self.findings: list[Finding] = []
         self.counts: Counter[str] = Counter()
@@ -179,25 +186,21 @@ class WireJudge:
                     self._register(servo, name, value)
 
     def _registers(self, servo: EmulatedServo, address: int, data: bytes) -> Iterator[tuple[str, int]]:
-        """Those that these bytes cover; indirect data are not followed."""
-        end = address + len(data)
-        first_indirect = min(block.addresses for block in servo.model.indirect)
-        if address >= first_indirect:
-            return
+        """Those that these bytes cover; indirect data are of the register for which they stand."""
+        end = min(block.addresses for block in servo.model.indirect)
+        written = {meant: byte for i, byte in enumerate(data) if (meant := _meant(servo, address + i)) < end}
         covered = 0
         for one in servo.model.registers.values():
-            first, last = max(one.address, address), min(one.address + one.size, end)
-            if first >= last:
-                continue
-            covered += last - first
-            if last - first < one.size:
+            places = range(one.address, one.address + one.size)
+            part = bytes(written[place] for place in places if place in written)
+            covered += len(part)
+            if part and len(part) < one.size:
                 self._find("register", f"{len(data)} bytes at {address} are only a part of {one.name}", servo.id)
-            elif one.allowed is None:
+            elif part and one.allowed is None:
                 self._find("register", f"{one.name} can only be read", servo.id)
-            else:
-                part = data[one.address - address : one.address - address + one.size]
+            elif part:
                 yield one.name, int.from_bytes(part, "little", signed=one.signed)
-        if covered < len(data):
+        if covered < len(written):
             self._find("register", f"{len(data)} bytes at {address}: not all of them belong to a register", servo.id)
 
     def _register(self, servo: EmulatedServo, name: str, value: int) -> None:
@@ -223,22 +226,22 @@ class WireJudge:
             return
         position = servo.position % PULSES_PER_TURN if memory["Operating Mode"] == POSITION_MODE else servo.position
         away = memory["Goal Position"] - memory.homing - position
-        if memory["Operating Mode"] in (3, 4, 5) and abs(away) > NEAR:
+        if not self.servo_rules_only and memory["Operating Mode"] in (3, 4, 5) and abs(away) > NEAR:
             self._find(
                 "torque",
                 f"torque comes on with the goal {away:.0f} pulses away: first write Present Position",
                 servo.id,
             )
-        if memory["Hardware Error Status"]:
-            sentence = f"torque comes on although Hardware Error Status is {memory['Hardware Error Status']:#04x}"
-            self._find("shut_down", sentence, servo.id)
+        error = memory["Hardware Error Status"]
+        if servo.is_shut_down or (error and not self.servo_rules_only):
+            self._find("shut_down", f"torque comes on although Hardware Error Status is {error:#04x}", servo.id)
 
     def _goal(self, servo: EmulatedServo, goal: int) -> None:
         memory = servo.memory
         low, high = memory["Min Position Limit"], memory["Max Position Limit"]
         if memory["Operating Mode"] == 3 and not low <= goal <= high:
             self._find("limit", f"Goal Position {goal} is outside of {low} to {high}", servo.id)
-        if not memory["Torque Enable"]:
+        if self.servo_rules_only or not memory["Torque Enable"]:
             return
         present = _Course(servo.position + memory.homing, -RATE_WINDOW_S)
         last = self._courses.get(servo.id, present)
@@ -261,6 +264,14 @@ class WireJudge:
 
 def _word(data: bytes) -> int:
     return int.from_bytes(data[:2], "little")
+
+
+def _meant(servo: EmulatedServo, place: int) -> int:
+    """Address at which a byte has its effect, if it is one of the indirect data."""
+    for block in servo.model.indirect:
+        if block.data <= place < block.data + block.count:
+            return _word(servo.memory.read(block.addresses + 2 * (place - block.data), 2))
+    return place
 
 
 def _crc(data: bytes) -> int:

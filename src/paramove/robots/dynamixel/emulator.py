@@ -28,6 +28,10 @@ from paramove.robots.dynamixel.wire_faults import WireFaults
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
 IDLE_S = 0.005
+"""Between two looks at a quiet line, and of the servos' time at most before what was heard is answered."""
+LATE_S = 0.02
+"""So much the servos' time may be behind; what the system does not let them have beyond, passes them by."""
+FIRST = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
 MOST_BYTES = 4096
 TCGETS2 = 0x802C542A
 """Settings of a line with its rates as numbers (Linux, asm-generic/ioctls.h). Python's `termios` reads only rates that
@@ -42,12 +46,15 @@ class DynamixelEmulator:
     """Serves a bus at `port` while it is open.
 
     Answers take as long as their bytes, those of the question and Return Delay Time (9) say. What the line's baud rate
-    is, the client has set as at any serial port; servos at another one hear nothing.
+    is, the client has set as at any serial port; servos at another one hear nothing. Real servos have processors of
+    their own: where the system allows it, the thread that serves the port runs before all other programs.
 
     Args:
         servos: In the order of the chain.
         link: A symbolic link to make to the port, so that its name does not change from run to run.
         mechanics: What the servos move, in the same order; without, each carries nothing.
+        servo_rules_only: Whether the judge finds only what the servos themselves reject, not jumps: for the programs of
+            others.
 
     Raises:
         InputError: Something else is in the place of the link, or another emulator serves it.
@@ -58,9 +65,13 @@ class DynamixelEmulator:
     """
 
     def __init__(
-        self, servos: Sequence[EmulatedServo], link: Path | None = None, mechanics: Mechanics | None = None
+        self,
+        servos: Sequence[EmulatedServo],
+        link: Path | None = None,
+        mechanics: Mechanics | None = None,
+        servo_rules_only: bool = False,
     ) -> None:
-        self.bus = EmulatedBus(servos, mechanics)
+        self.bus = EmulatedBus(servos, mechanics, servo_rules_only)
         self.faults = WireFaults()
         self.lock = threading.Lock()
         """Held while the servos hear and move; hold it to look at them."""
@@ -144,25 +155,31 @@ class DynamixelEmulator:
             self._error = error
 
     def _serve_until_stopped(self) -> None:
+        lost_s = 0.0
+        _go_first(True)
         while not self._stopped.is_set():
             if self._wanted != self.plugged_in:
                 self._open() if self._wanted else self._close()
                 self._moved.set()
-            heard = self._hear()
+            behind_s = self._now_s() - lost_s - self.bus.now_s
+            heard, now_s = self._hear(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
             with self.lock:
-                now_s = self._now_s()
-                self.bus.run_to(now_s)
+                behind_s = now_s - lost_s - self.bus.now_s
+                if behind_s > LATE_S:
+                    lost_s += behind_s - LATE_S
+                    _go_first(time.thread_time() < 0.5 * now_s)  # not a world that is too slow for this machine
+                self.bus.run_to(min(now_s - lost_s, self.bus.now_s + IDLE_S))
                 answers = self.bus.receive(heard, self.baud_rate, now_s) if heard else []
             if heard:
-                self._say(heard, self.faults.told(heard, answers))
+                self._say(heard, self.faults.told(heard, answers), now_s)
 
-    def _hear(self) -> bytes:
-        """What the client has written, waiting a little for it."""
+    def _hear(self, within_s: float) -> bytes:
+        """What the client has written, waiting so long for it."""
         if not self.plugged_in:
-            self._stopped.wait(IDLE_S)
+            self._stopped.wait(within_s)
             return b""
-        ready, _, _ = select.select([self._ours], [], [], IDLE_S)
-        if not ready:
+        ready, _, _ = select.select([self._ours], [], [], within_s)
+        if not ready and within_s > 0.0:
             self._forget_who_was_killed()
         return os.read(self._ours, MOST_BYTES) if ready else b""
 
@@ -178,9 +195,9 @@ class DynamixelEmulator:
             fcntl.ioctl(self._theirs, termios.TIOCNXCL)
             fcntl.flock(self._theirs, fcntl.LOCK_UN)
 
-    def _say(self, question: bytes, answers: list[tuple[float, bytes]]) -> None:
+    def _say(self, question: bytes, answers: list[tuple[float, bytes]], heard_s: float) -> None:
         byte_s = BITS_PER_BYTE / self.baud_rate if self.baud_rate else 0.0
-        free_s = self._now_s() + len(question) * byte_s  # it was there at once; on a wire it takes its time
+        free_s = heard_s + len(question) * byte_s  # it was there at once; on a wire it takes its time
         for delay_s, answer in answers:
             free_s += delay_s + len(answer) * byte_s
             early_s = free_s - self._now_s()
@@ -188,6 +205,12 @@ class DynamixelEmulator:
                 self._stopped.wait(early_s)
             with contextlib.suppress(BlockingIOError):  # a client that never reads loses what its port cannot hold
                 os.write(self._ours, answer)
+
+
+def _go_first(first: bool) -> None:
+    """Where the system allows it, the calling thread runs before all others, or like any other."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, FIRST if first else os.SCHED_OTHER, os.sched_param(int(first)))
 
 
 def _claim(link: Path) -> socket.socket:
