@@ -22,9 +22,9 @@ class Launcher:
         self.environment = os.environ | {"XDG_RUNTIME_DIR": runtime, "PARAMOVE_DOMAIN": "test"}
         self.started = []
 
-    def start(self, *arguments):
+    def start(self, *arguments, **options):
         command = [sys.executable, "-m", "paramove.cli.main", "launch", *arguments, "--runs", str(self.folder)]
-        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **options}
         self.started.append(subprocess.Popen(command, cwd=ROOT, env=self.environment, **options))
         return self.started[-1]
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
+import threading
 import webbrowser
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -37,6 +39,11 @@ class AnnouncingView:
         self._run_folder = run_folder
         self._told = False
 
+    @property
+    def closed_by(self) -> signal.Signals | None:
+        """As the other view."""
+        return self._view.closed_by
+
     def changed(self, node: SupervisedNode) -> None:
         """As the other view."""
         self._view.changed(node)
@@ -55,7 +62,7 @@ class AnnouncingView:
             self._told = True
             self._view.story(f"live page: {link}")
             if _has_display():
-                webbrowser.open(link)
+                threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()  # it may take seconds
         self._view.refresh(nodes)
 
     def close(self) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import os
-import signal
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -20,6 +18,7 @@ from paramove.supervision.environment import Environment, examined
 from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
 from paramove.supervision.limits import LimitError
 from paramove.supervision.positions import LaunchFileError
+from paramove.supervision.queued_output import QueuedOutput
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, View
 from paramove.supervision.view import LineView, TableView
@@ -39,9 +38,12 @@ class Wanted:
 
 
 def run(wanted: Wanted, check_only: bool) -> int:
-    """Runs an application, or only checks it; returns the exit code."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a sentence must not end a run where a letter is unknown
+    """Runs an application, or only checks it; returns the exit code. Never waits for the terminal."""
+    with QueuedOutput() as output:
+        return _run(wanted, check_only, output)
+
+
+def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
     console = Console(highlight=False, markup=False, emoji=False)
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
     launch = None
@@ -60,7 +62,7 @@ def run(wanted: Wanted, check_only: bool) -> int:
             console.print("\n".join(_found(launch, environment)), soft_wrap=True)
             return exit_codes.OK
         outcome, folder = application.run(
-            launch, workspace, lambda folder: _view(console, folder, environment, wanted.headless), wanted.runs
+            launch, workspace, lambda folder: _view(console, output, folder, environment, wanted.headless), wanted.runs
         )
     except (LaunchFileMissingError, application.NoWorkspaceError) as error:
         errors.print(str(error))
@@ -79,10 +81,9 @@ def run(wanted: Wanted, check_only: bool) -> int:
     except OSError as error:
         errors.print(_about_files(error, (wanted.runs or workspace / "runs").resolve(), environment))
         return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
-    try:
-        console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
-    except OSError:  # the terminal was closed; flushing it again at exit would fail too
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if output.dropped:
+        errors.print("note: the terminal took nothing for a while, so lines are missing; `paramove logs` shows them")
+    console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
     return outcome.code
 
 
@@ -119,13 +120,13 @@ def _about_files(error: OSError, runs: Path, environment: Environment) -> str:
 
 def _verdict(outcome: Outcome) -> str:
     """What the last line begins with; a run that a person ended did not fail."""
-    if outcome.code in map(exit_codes.by_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)):
+    if outcome.code in exit_codes.INTERRUPTED:
         return ""
     return "done: " if outcome.code == exit_codes.OK else "FAILED: "
 
 
-def _view(console: Console, folder: RunFolder, environment: Environment, headless: bool) -> View:
+def _view(console: Console, output: QueuedOutput, folder: RunFolder, environment: Environment, headless: bool) -> View:
     console.print(f"run folder {folder.path}", soft_wrap=True)
     console.print(f"domain {environment.domain}, sockets in {environment.sockets}", soft_wrap=True)
-    view = TableView(console) if console.is_terminal and not headless else LineView(console)
+    view = (TableView if console.is_terminal and not headless else LineView)(console, output)
     return AnnouncingView(view, folder.path)

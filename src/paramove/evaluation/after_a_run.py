@@ -10,6 +10,7 @@ from rich.console import Console
 
 from paramove.evaluation.recorded_run import RunFolderError
 from paramove.supervision import exit_codes
+from paramove.supervision.queued_output import QueuedOutput
 
 Evaluate = Callable[[argparse.Namespace, Console], bool | None]
 
@@ -17,7 +18,7 @@ Evaluate = Callable[[argparse.Namespace, Console], bool | None]
 def evaluated(
     module: str, described: str | None, flags: Mapping[str, str], evaluate: Evaluate, arguments: Sequence[str] | None
 ) -> int:
-    """Reads the command's arguments and evaluates; returns the exit code.
+    """Reads the command's arguments and evaluates; returns the exit code. Never waits for the terminal.
 
     Args:
         module: whose command it is. described: its help.
@@ -29,9 +30,11 @@ def evaluated(
     parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
     for flag, told in flags.items():
         parser.add_argument(flag, action="store_true", help=told)
-    try:
-        success = evaluate(parser.parse_args(arguments), Console(highlight=False, emoji=False))
-    except RunFolderError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        return exit_codes.INPUT_MISSING
+    options = parser.parse_args(arguments)
+    with QueuedOutput():
+        try:
+            success = evaluate(options, Console(highlight=False, emoji=False))
+        except RunFolderError as error:
+            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+            return exit_codes.INPUT_MISSING
     return exit_codes.JUDGED_A_FAILURE if success is False else exit_codes.OK

@@ -30,8 +30,12 @@ NEVER_RESTARTED = frozenset({USAGE, INPUT_MISSING, PERMISSION, CONFIGURATION})
 
 
 def by_signal(number: int) -> int:
-    """Exit code of a process that a signal ended: 130 for SIGINT, 143 for SIGTERM, 129 for SIGHUP."""
+    """Exit code of a process that a signal ended: 130 SIGINT, 143 SIGTERM, 129 SIGHUP, 141 SIGPIPE."""
     return 128 + number
+
+
+INTERRUPTED = frozenset(map(by_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)))
+"""A person ended the run; it is neither a success nor a failure."""
 
 
 def describe(code: int) -> str:
@@ -63,5 +67,9 @@ def _describe_signal(number: int) -> str:
 
 def interrupted(number: int) -> str:
     """Why a run ended that a signal to the launcher has ended."""
-    reasons = {signal.SIGINT: "stopped by Ctrl-C", signal.SIGHUP: "stopped because the terminal was closed"}
+    reasons = {
+        signal.SIGINT: "stopped by Ctrl-C",
+        signal.SIGHUP: "stopped because the terminal was closed",
+        signal.SIGPIPE: "stopped because the program that read its output has ended",
+    }
     return reasons.get(signal.Signals(number), f"stopped by {signal.Signals(number).name}")

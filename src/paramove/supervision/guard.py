@@ -26,13 +26,14 @@ def main() -> None:
             groups.add(int(line[1:]))
         elif line.startswith("-"):
             groups.discard(int(line[1:]))
-    if groups:
-        _tell(f"paramove: the launcher was killed; its {len(groups)} processes are ended")
     end_groups(groups, GRACE_S)
+    if groups:
+        _tell(f"paramove: the launcher was killed; its {len(groups)} processes were ended")
 
 
 def _tell(sentence: str) -> None:
-    """On standard error, which is the launcher's; nobody may listen any more."""
+    """On standard error, which is the launcher's. A terminal that takes nothing within 1 s ends this process."""
+    signal.alarm(1)
     with contextlib.suppress(OSError):
         os.write(2, f"{sentence}\n".encode())
 

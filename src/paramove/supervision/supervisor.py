@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import sys
 import time
 from collections.abc import Iterable, Mapping
@@ -43,7 +44,11 @@ class Outcome:
 
 
 class View(Protocol):
-    """Shows a run to a person."""
+    """Shows a run to a person. No call waits for a terminal."""
+
+    @property
+    def closed_by(self) -> signal.Signals | None:
+        """The signal that stands for why nobody can see the run any more, SIGHUP or SIGPIPE; None before."""
 
     def changed(self, node: SupervisedNode) -> None:
         """A node's state has changed."""
@@ -111,7 +116,7 @@ class Supervisor:
                 self._kill_all()
                 listener.close()
                 self._view.close()
-            if self._file.after_run and self._interrupts.first is None:
+            if self._file.after_run and self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
                 outcome = self._judge(self._file.after_run, outcome)
             self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
@@ -165,6 +170,7 @@ class Supervisor:
         poll.poll(TURN_S * 1e3)
         if not self._interrupts.urgent:
             _drain(self._interrupts.wake_fd)
+        self._refuse_suspension()
         self._control.serve()
         listener.listen()
         now_s = time.monotonic()
@@ -174,8 +180,8 @@ class Supervisor:
 
     def _outcome(self, limit_s: float) -> Outcome | None:
         """The outcome if the run has come to its end."""
-        if self._interrupts.first is not None:
-            number = self._interrupts.first
+        number = self._interrupts.first or self._view.closed_by
+        if number is not None:
             return Outcome(exit_codes.by_signal(number), exit_codes.interrupted(number))
         for node in self.nodes.values():
             if node.state is State.FINISHED and node.settings.ends_run:
@@ -194,6 +200,11 @@ class Supervisor:
         if time.monotonic() > limit_s:
             return Outcome(exit_codes.TIME_LIMIT, f"not at its end within {self._file.time_limit_s:g} s")
         return None
+
+    def _refuse_suspension(self) -> None:
+        if self._interrupts.suspended:
+            self._interrupts.suspended = False
+            self._view.problem("Ctrl-Z does nothing, as the nodes would go on without supervision; Ctrl-C ends the run")
 
     def _stuck(self) -> list[str]:
         """Nodes that wait for one that was given up."""
@@ -237,6 +248,7 @@ class Supervisor:
                 judge.kill()
             elif self._interrupts.first is not None:
                 judge.terminate()
+            self._refuse_suspension()
             select.select([judge.pidfd], [], [], TURN_S)
             code = judge.ended()
         if self._interrupts.first is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Iterable
 
@@ -12,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from paramove.supervision.processes import printable
+from paramove.supervision.queued_output import QueuedOutput
 from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 
 _STYLES = {
@@ -29,12 +31,22 @@ REFRESH_S = 0.5
 
 
 class LineView:
-    """One line per event, for logs and pipes. A terminal that was closed is no error: the run has to end in order."""
+    """One line per event, for logs and pipes.
 
-    def __init__(self, console: Console) -> None:
+    Args:
+        console: Prints.
+        output: To which it does so, if that may have to wait for a terminal.
+    """
+
+    def __init__(self, console: Console, output: QueuedOutput | None = None) -> None:
         self._console = console
+        self._output = output
         self._begun_s = time.monotonic()
-        self._closed = False
+
+    @property
+    def closed_by(self) -> signal.Signals | None:
+        """As the output says."""
+        return self._output.closed_by if self._output is not None else None
 
     def changed(self, node: SupervisedNode) -> None:
         """`12.3 s  camera  ready  sentence`."""
@@ -57,20 +69,15 @@ class LineView:
         """Nothing to close."""
 
     def _line(self, text: Text) -> None:
-        if self._closed:
-            return
         stamp = Text(f"{time.monotonic() - self._begun_s:7.1f} s  ", style="dim")
-        try:
-            self._console.print(Text.assemble(stamp, text), soft_wrap=True)
-        except OSError:
-            self._closed = True
+        self._console.print(Text.assemble(stamp, text), soft_wrap=True)
 
 
 class TableView(LineView):
     """The story scrolls above a table of the nodes; states are told in the table only."""
 
-    def __init__(self, console: Console) -> None:
-        super().__init__(console)
+    def __init__(self, console: Console, output: QueuedOutput | None = None) -> None:
+        super().__init__(console, output)
         self._live = Live(console=console, auto_refresh=False)
         self._live.start()
         self._gauges: dict[str, _Gauge] = {}
@@ -83,24 +90,18 @@ class TableView(LineView):
             super().changed(node)
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
-        """Draws the table anew, at most twice a second."""
+        """Draws the table anew, at most twice a second and no faster than the terminal takes it."""
         self._nodes = list(nodes)
         now_s = time.monotonic()
-        if self._closed or now_s - self._refreshed_s < REFRESH_S:
+        if now_s - self._refreshed_s < REFRESH_S or (self._output is not None and self._output.is_behind):
             return
         self._refreshed_s = now_s
-        try:
-            self._live.update(self._table(self._nodes, now_s), refresh=True)
-        except OSError:
-            self._closed = True
+        self._live.update(self._table(self._nodes, now_s), refresh=True)
 
     def close(self) -> None:
         """Leaves the last table standing."""
-        try:
-            self._live.update(self._table(self._nodes, time.monotonic()), refresh=True)
-            self._live.stop()
-        except OSError:
-            self._closed = True
+        self._live.update(self._table(self._nodes, time.monotonic()), refresh=True)
+        self._live.stop()
 
     def _table(self, nodes: Iterable[SupervisedNode], now_s: float) -> Table:
         table = Table(box=None, pad_edge=False, expand=True)

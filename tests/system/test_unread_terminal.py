@@ -1,0 +1,76 @@
+"""A servo arm in motion comes to rest within a second where nobody reads what its launcher writes."""
+
+import itertools
+import json
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from paramove.bus import topics
+from paramove.bus.visitor import BusVisitor
+from paramove.recording.parts import PartedRecording
+from tests.supervision.conftest import until
+from tests.supervision.test_unread_terminal import full_pipe, stopped_terminal
+
+MOVING = 0.2  # rad/s of the fastest joint, by its servo
+AT_REST = 0.005  # m/s of the gripper, by the simulated world
+LIMIT_S = 1.0
+
+
+def await_motion(launcher):
+    """Returns when a joint of the arm is moving."""
+    log = launcher.latest / "events.jsonl"
+    until(log.exists, "the run begins")
+    for node in ("arm_driver", "reacher"):
+        started = f'"event": "ready", "node": "{node}"'
+        until(lambda started=started: started in log.read_text(), f"{node} is ready")
+    with BusVisitor(Path(launcher.environment["XDG_RUNTIME_DIR"]) / "paramove" / "test", "onlooker") as bus:
+        states = bus.hears(topics.ARM_JOINT_STATES)
+
+        def moving():
+            states.revive()
+            heard = states.receive()
+            return heard is not None and max(abs(joint.velocity) for joint in heard.message.joints) > MOVING
+
+        until(moving, "the arm is moving")
+
+
+def gripper_speeds(recording):
+    """By the simulated world: the time on the bus clock, ns, and m/s since the time before."""
+    read = PartedRecording(recording).read((topics.TRUTH_STATE.name,))
+    truth = [(one.log_ns, np.array(one.message.gripper)) for one in read]
+    return [
+        (at_ns, np.linalg.norm(gripper - before) / ((at_ns - before_ns) * 1e-9))
+        for (before_ns, before), (at_ns, gripper) in itertools.pairwise(truth)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("make", "code"), [(full_pipe, 130), (stopped_terminal, 130), (os.pipe, 141)], ids=["full", "stopped", "closed"]
+)
+def test_the_arm_rests_within_a_second_and_all_ends_in_order(launcher, make, code):
+    reader, writer = make()
+    process = launcher.start("dynamixel_arm", stdout=writer, stderr=writer)
+    os.close(writer)
+    await_motion(launcher)
+    asked_ns = time.monotonic_ns()
+    if code == 141:
+        os.close(reader)
+    else:
+        process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == code
+    folder = launcher.latest.resolve()
+    speeds = gripper_speeds(folder / "truth.mcap")
+    assert max(speed for at_ns, speed in speeds if asked_ns - 1e9 < at_ns < asked_ns) > AT_REST
+    assert (max(at_ns for at_ns, speed in speeds if speed > AT_REST) - asked_ns) * 1e-9 < LIMIT_S
+    assert speeds[-1][1] < AT_REST
+    assert list(folder.glob("*.part")) == []
+    events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    ended = [event["node"] for event in events if event["event"] == "ended" and event["node"] != "judge"]
+    assert (ended[0], ended[-1]) == ("arm_driver", "recorder")
+    for pid in (event["pid"] for event in events if event["event"] == "started"):
+        assert not Path(f"/proc/{pid}").exists()
