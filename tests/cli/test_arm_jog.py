@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import subprocess
+import sys
 import tempfile
 import threading
 from pathlib import Path
@@ -24,6 +26,7 @@ from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.robots.jogging import Jogging
 from paramove.safety.gate_io import PERSON_STOP
+from tests.supervision.test_unread_terminal import stopped_terminal
 
 HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
 STOPPED = SafetyFault(code=PERSON_STOP, sentence="stopped by a person")
@@ -149,6 +152,23 @@ def test_an_arm_that_still_stops_is_armed_once_it_rests(folder, monkeypatch):
     assert done.exit_code == 0, done.output
     assert arm.heard == ["arm from the terminal", "pan", "stop", "arm from the terminal"]
     assert "the arm still stops: it is armed once it rests" in done.stdout
+
+
+def test_a_terminal_that_takes_nothing_keeps_no_key_from_the_arm(folder):
+    terminal, end = stopped_terminal()
+    command = [sys.executable, "-m", "paramove.cli.main", "arm", "jog"]
+    with running(folder, [" ", "q"]) as arm:
+        jog = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=end, stderr=end)
+        arm.write = lambda text: os.write(jog.stdin.fileno(), text.encode())
+        arm.write("a")
+        try:
+            assert jog.wait(60) == 0
+        finally:
+            jog.kill()
+            jog.communicate()
+            os.close(end)
+            os.close(terminal)
+    assert arm.heard == ["arm from the terminal", "stop"]
 
 
 def test_a_driver_that_is_gone_is_told(folder, monkeypatch):

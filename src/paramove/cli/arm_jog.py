@@ -18,6 +18,7 @@ from paramove.cli.bus_options import DomainOption, bus_folder
 from paramove.cli.terminal_person import QuitError, TerminalPerson
 from paramove.supervision import exit_codes
 from paramove.supervision.processes import printable
+from paramove.supervision.queued_output import QueuedOutput
 
 if TYPE_CHECKING:
     from paramove.bus.publisher import Publisher
@@ -45,13 +46,18 @@ def jog(
     folder = bus_folder(domain)
     try:
         person = TerminalPerson()
-        with _Link(folder, math.radians(step_deg), person.is_at_terminal) as link, person.pressing() as pressed:
+        with (
+            QueuedOutput() as output,  # after Ctrl-S, keys must still stop the arm
+            _Link(folder, math.radians(step_deg), person.is_at_terminal) as link,
+            person.pressing() as pressed,
+        ):
             link.wait_for_arm()
             typer.echo(KEYS)
             while True:
                 link.press(pressed(PERIOD_S))
                 link.exchange()
-                link.show()
+                if not output.is_behind:
+                    link.show()
     except TopicTakenError as error:
         raise ended(f"{error}: stop that node first (`paramove node stop`)", exit_codes.TEMPORARY) from error
     except QuitError:

@@ -25,6 +25,7 @@ from paramove.cli.arm_options import (
 from paramove.cli.terminal_person import QuitError, TerminalPerson
 from paramove.supervision import exit_codes
 from paramove.supervision.processes import printable
+from paramove.supervision.queued_output import QueuedOutput
 
 if TYPE_CHECKING:
     from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
@@ -69,7 +70,8 @@ def teach(
         baud_rate = description.bus.baud_rate if description.bus is not None else 0
     person = TerminalPerson()
     try:
-        with open_arm(by_id, serial, data, baud_rate) as arm:
+        # After Ctrl-S, the servos must still get the currents that carry the arm.
+        with QueuedOutput(), open_arm(by_id, serial, data, baud_rate) as arm:
             limp = (FloatingArm if floats else LimpArm)(arm.chain, _of_this_arm(description, arm))
             person.until_done("Hold the arm, it becomes limp.", list)
             try:

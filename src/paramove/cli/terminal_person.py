@@ -130,4 +130,4 @@ def _unbuffered(descriptor: int) -> Iterator[int]:
     try:
         yield descriptor
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        termios.tcsetattr(descriptor, termios.TCSANOW, before)  # without waiting until all is shown
