@@ -54,6 +54,22 @@ def test_a_stop_that_is_pressed_afterwards_counts_more():
     assert not key.tick(1.1)
 
 
+def test_a_key_after_a_stop_arms_although_the_gate_was_last_heard_armed():
+    """What the gate published before the stop comes in only after its answer, or is the last that is known."""
+    key, before, answer = hearing("ARMED"), gate("ARMED"), gate("STOPPING", "stopped by a person")
+    before.captured.FromNanoseconds(1)
+    answer.captured.FromNanoseconds(2)
+    key.cancel()
+    key.stopped(answer)
+    key.hear(before)
+    key.press(1.0)
+    assert not key.tick(1.0)
+    rests = gate("HOLD", "stopped by a person")
+    rests.captured.FromNanoseconds(3)
+    key.hear(rests)
+    assert key.tick(1.1)
+
+
 @pytest.mark.parametrize(
     ("state", "sentences", "told"),
     [

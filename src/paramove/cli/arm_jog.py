@@ -122,7 +122,8 @@ class _Link:
             self._told = ""  # what keeps it from being armed is told again
         elif key == " ":
             self._arming.cancel()
-            answer = stop_arm(self._folder, TERMINAL, STOP_S)
+            if answer := stop_arm(self._folder, TERMINAL, STOP_S):
+                self._arming.stopped(answer)
             self.jogging.sentence = "stopped" if answer else "no answer: use the switch of the motors' power"
 
     def exchange(self) -> None:

@@ -21,6 +21,7 @@ class ArmingKey:
     def __init__(self) -> None:
         self.sentence = ""
         self._gate = SafetyState()
+        self._stopped_ns = 0
         self._pressed_s: float | None = None
         self._said_s: float | None = None
         self._faults_before = ""
@@ -37,6 +38,8 @@ class ArmingKey:
 
     def hear(self, gate: SafetyState) -> None:
         """The gate's state; where it has just stopped the arm, that is told."""
+        if gate.captured.ToNanoseconds() < self._stopped_ns:
+            return
         before, self._gate = self._gate.state, gate
         if gate.state == SafetyState.STATE_ARMED and self._said_s is not None:
             self.sentence, self._said_s = "armed", None
@@ -63,6 +66,10 @@ class ArmingKey:
         elif now_s - self._pressed_s > WAITS_S:
             self.refuse(f"the arm has not come to rest within {WAITS_S:g} s; press a again once it does")
         return False
+
+    def stopped(self, answer: SafetyState) -> None:
+        """The gate has answered a stop of this person: what it published before counts no more."""
+        self._gate, self._stopped_ns = answer, answer.captured.ToNanoseconds()
 
     def cancel(self) -> None:
         """What was pressed before counts no more: somebody wants the arm to stop."""
