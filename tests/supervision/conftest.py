@@ -44,14 +44,16 @@ class Workspace:
     def write(self, text, name="test"):
         (self.root / "launch" / f"{name}.yaml").write_text(text)
 
-    def load(self, *settings, overlays=None, seed=None):
-        return load(self.root / "launch", "test", overlays, settings, seed)
+    def load(self, *settings, overlays=None, seed=None, headless=False):
+        return load(self.root / "launch", "test", overlays, settings, seed, headless)
 
-    def run(self, *settings):
+    def run(self, *settings, headless=False):
         """Runs in this process; returns outcome, run folder and what was shown."""
         with (self.root / "shown.txt").open("w+") as file:
             console = Console(file=file, width=200)
-            outcome, folder = application.run(self.load(*settings), self.root, lambda _: LineView(console))
+            outcome, folder = application.run(
+                self.load(*settings, headless=headless), self.root, lambda _: LineView(console)
+            )
             file.seek(0)
             return outcome, folder, file.read()
 

@@ -168,6 +168,19 @@ nodes:
     assert outcome.code == exit_codes.OK
 
 
+def test_module_called_after_a_headless_run_makes_no_video(workspace):
+    (workspace.root / "nodes" / "judge.py").write_text(
+        "import pathlib, sys\npathlib.Path(sys.argv[1], 'told').write_text(' '.join(sys.argv[2:]))\n"
+    )
+    workspace.write("""
+after_run: nodes.judge
+nodes:
+  main: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0}}
+""")
+    _, folder, _ = workspace.run(headless=True)
+    assert (folder.path / "told").read_text() == "--no-video"
+
+
 def test_run_folder_holds_what_was_run(workspace):
     workspace.write("""
 bus: {clock: simulated, lockstep: true}

@@ -22,8 +22,7 @@ from paramove.evaluation.pointing_run import FARTHEST_M, MEDIAN_M, load_pointing
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    flags = {"--no-video": "write no pointing.mp4"}
-    return evaluated("paramove.evaluation.pointing", __doc__, flags, _evaluate, arguments)
+    return evaluated("paramove.evaluation.pointing", __doc__, {}, _evaluate, arguments)
 
 
 def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:

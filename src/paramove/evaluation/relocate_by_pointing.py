@@ -24,8 +24,7 @@ from paramove.evaluation.relocate_by_pointing_run import GOAL, SCALE, pointed_re
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    flags = {"--no-video": "write no relocations.mp4"}
-    return evaluated("paramove.evaluation.relocate_by_pointing", __doc__, flags, _evaluate, arguments)
+    return evaluated("paramove.evaluation.relocate_by_pointing", __doc__, {}, _evaluate, arguments)
 
 
 def _evaluate(options: argparse.Namespace, console: Console) -> bool:

@@ -36,7 +36,7 @@ def write_summary(evaluation: RunEvaluation) -> Path:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    flags = {"--no-video": "write no demo.mp4", "--no-report": "write run.json alone"}
+    flags = {"--no-report": "write run.json alone"}
     return evaluated("paramove.evaluation.rule_learning", __doc__, flags, _evaluate, arguments)
 
 

@@ -41,6 +41,7 @@ class Launch:
     file: LaunchFile
     document: Document
     seed: int | None = None
+    headless: bool = False
 
     def error(self, path: KeyPath, message: str) -> LaunchFileError:
         """An error at the place where `path` was written."""
@@ -77,7 +78,7 @@ def load(
         findings.append(error)
     findings += wrong_references(document)
     raise_any(findings)
-    return Launch(Path(name).stem, tuple(chosen), file, document, seed)
+    return Launch(Path(name).stem, tuple(chosen), file, document, seed, headless)
 
 
 def _with_overlays(

@@ -83,6 +83,7 @@ class Supervisor:
 
     def __init__(self, launch: Launch, workspace: Path, run_folder: RunFolder, domain: Domain, view: View) -> None:
         self._file = launch.file
+        self._judging = ["--no-video"] if launch.headless else []
         self._workspace = workspace
         self._folder = run_folder
         self._view = view
@@ -240,7 +241,7 @@ class Supervisor:
 
     def _judge(self, module: str, outcome: Outcome) -> Outcome:
         """Calls `after_run` with the run folder; a run that went well succeeds if it says so."""
-        command = [sys.executable, "-m", module, str(self._folder.path)]
+        command = [sys.executable, "-m", module, str(self._folder.path), *self._judging]
         judge = SupervisedProcess(command, folder=self._workspace, environment=self._environment, guard=self._guard)
         code = judge.ended()
         while code is None:
