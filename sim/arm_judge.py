@@ -22,7 +22,7 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
-    with RecordingWriter(next_part(bus.run_folder / "truth.mcap"), "paramove arm judge") as recording:
+    with RecordingWriter(next_part(bus.run_folder / "truth.mcap"), "paramove, judge of an arm") as recording:
         bus.ready("records the truth")
         for heard in bus.events(*HEARS):
             recording.write(heard.topic.name, heard.message, heard.captured_ns, heard.published_ns, heard.sequence)

@@ -146,5 +146,7 @@ def _action(name: str) -> ActionModel:
         )
     model = ParametricHMM.load(path)
     if not isinstance(model, PolynomialPHMM):
-        raise InputError(f"{path}: a {type(model).__name__} found, a polynomial model expected: paramove train --kind")
+        raise InputError(
+            f"{path}: a {type(model).__name__} found, a polynomial model expected: paramove train --model quadratic"
+        )
     return ActionModel.from_file_model(model)

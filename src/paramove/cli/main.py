@@ -8,7 +8,6 @@ so that `paramove topic list` does not wait for what training needs.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -33,12 +32,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "recognize": ("paramove.cli.recognize", "Say which action a movement is, and with which parameters."),
     "synthesize": ("paramove.cli.synthesize", "Make the movement for given parameters."),
     "recover": ("paramove.cli.recover", "Rebuild a recording whose writer was killed or whose bytes are damaged."),
-    "record": ("paramove.cli.record", "Record, inspect and replay what is said on the bus."),
     "evaluate": ("paramove.cli.evaluate", "Repeat experiments and say how well they went."),
     "warm": ("paramove.cli.warm", "Compile kernels and train the reaching model, so that the first run starts fast."),
     "doctor": ("paramove.cli.doctor", "Check this machine and its installation."),
 }
-"""Name -> module and one line of help. A command whose module does not exist is not offered."""
+"""Name -> module and one line of help."""
 
 
 def _version(wanted: bool) -> None:
@@ -62,8 +60,6 @@ def build(wanted: str | None) -> typer.Typer:
     app = typer.Typer(name="paramove", no_args_is_help=True, pretty_exceptions_enable=False)
     app.callback()(_callback)
     for name, (module, sentence) in COMMANDS.items():
-        if importlib.util.find_spec(module) is None:
-            continue
         if name == wanted:
             app.add_typer(importlib.import_module(module).app)
         else:
