@@ -81,7 +81,8 @@ if [ ! -x .venv/bin/python ]; then
     "$python" -m venv .venv
 fi
 say "installs the Python packages of requirements.lock into .venv (about 1 GB; minutes, once)"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --only-binary :all: \
+# --no-compile: Python compiles the modules that are imported; pip would compile all, of which most never are.
+.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes --only-binary :all: \
     --requirement requirements.lock
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 
@@ -101,7 +102,7 @@ fi
 
 # --- Compiled kernels ------------------------------------------------------------------------------------------------
 if [ -f src/paramove/cli/warm.py ]; then
-    say "compiles the numerical kernels (two or three minutes, once)"
+    say "compiles the numerical kernels (one or two minutes, once)"
     .venv/bin/paramove warm
 fi
 

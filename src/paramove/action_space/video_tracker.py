@@ -66,6 +66,16 @@ def _learn(tracker: ActionTracker, observer: ArmObserver, belief: ActionBelief, 
         observer.learn(belief.pose, elapsed_s)
 
 
+def try_out(trial: ArmObserver, camera: CalibratedCamera, poses: Floats) -> None:
+    """An observer of one camera compares postures (N, 9), m, with noise, so that everything is compiled."""
+    noise = np.random.default_rng(0)
+    for _ in range(2):  # the second image is compared with what was learned from the first
+        trial.look([noise.integers(0, 255, (camera.height_px, camera.width_px, 3), dtype=np.uint8)])
+        trial.log_likelihoods(poses)
+        trial.learn(poses[0], 0.1)
+    trial.outline(poses[0], 0)
+
+
 class VideoTracker:
     """Brings the images of one moment together and lets the filter judge them.
 
@@ -90,15 +100,11 @@ class VideoTracker:
 
     def warm_up(self) -> None:
         """Does everything that is compiled once, so that the first image does not wait for a compiler."""
-        noise, first = np.random.default_rng(0), next(iter(self._cameras.values()))
+        tracked = self._tracker.filter
+        moved = tracked.propagation.predicted(tracked.particles, 0.1, np.random.default_rng(0))
+        first = next(iter(self._cameras.values()))
         trial = ArmObserver(self._observer.sizes, [first], self._observer.options, table=self._observer.table)
-        moved = self._tracker.filter.propagation.predicted(self._tracker.filter.particles, 0.1, noise)
-        poses = self._tracker.placement.in_world(moved.poses)
-        for _ in range(2):  # the second image is compared with what was learned from the first
-            trial.look([noise.integers(0, 255, (first.height_px, first.width_px, 3), dtype=np.uint8)])
-            trial.log_likelihoods(poses)
-            trial.learn(poses[0], 0.1)
-        trial.outline(poses[0], 0)
+        try_out(trial, first, self._tracker.placement.in_world(moved.poses))
 
     @property
     def cameras(self) -> tuple[str, ...]:

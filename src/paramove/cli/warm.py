@@ -2,87 +2,145 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import time
+from concurrent.futures import Future, ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 from platformdirs import user_cache_path
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from paramove.observation.cameras import CalibratedCamera
 
 app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def warm() -> None:
-    """Compile the numerical kernels and train the models of the demonstrations; both are kept on disk."""
+    """Compile the numerical kernels and train the models of the demonstrations, on all processors; both are stored."""
     began_s = time.perf_counter()
-    typer.echo("compiling the kernels of hidden Markov models, time warping and tracking ...")
-    _compile()
-    compiled_s = time.perf_counter()
-    typer.echo(f"  {compiled_s - began_s:.1f} s; kept beside the installed package")
-    cache = user_cache_path("paramove")
-    typer.echo(f"training reaching and pointing from synthetic demonstrations (kept in {cache}) ...")
-    trained = _train()
+    processes, cache = len(os.sched_getaffinity(0)), user_cache_path("paramove")
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        typer.echo("compiling the kernels of hidden Markov models, time warping and tracking ...")
+        images, segments = pool.submit(_images), pool.submit(_segments)
+        segments.result()  # the others call its kernels, and would compile them once more
+        _await([images, *(pool.submit(one) for one in (_polynomials, _interpolation, _chains, _warping))])
+        compiled_s = time.perf_counter()
+        typer.echo(f"  {compiled_s - began_s:.1f} s; stored with the installed package")
+        typer.echo(f"training reaching and pointing from synthetic demonstrations (stored in {cache}) ...")
+        before = _stored(cache)
+        _await([pool.submit(_reaching), pool.submit(_tracking)])
+        trained = _stored(cache) != before
     typer.echo(f"  {time.perf_counter() - compiled_s:.1f} s{'' if trained else ', it was there already'}")
 
 
-def _compile() -> None:
-    """Runs everything compiled once, with the types that are used."""
-    import numpy as np
+def _await(work: list[Future[None]]) -> None:
+    for one in work:
+        one.result()
 
-    from paramove.alignment import warp
-    from paramove.hmm import GaussianHMM, LeftRightHMM, TrainingOptions
-    from paramove.phmm import InterpolativePHMM, QuadraticPHMM
+
+def _stored(cache: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in (*cache.glob("reaching_*.npz"), *cache.glob("actions/*.npz"))}
+
+
+def _sequences() -> list[NDArray[np.float64]]:
+    """Three short movements."""
+    import numpy as np
 
     rng = np.random.default_rng(0)
     line = np.linspace(0.0, 1.0, 30)[:, None] + [0.0, 1.0]
-    sequences = [line + 0.01 * rng.standard_normal(line.shape) for _ in range(3)]
+    return [line + 0.01 * rng.standard_normal(line.shape) for _ in range(3)]
+
+
+def _segments() -> None:
+    """Explicit durations."""
+    from paramove.hmm import LeftRightHMM
+
+    sequences = _sequences()
     model = LeftRightHMM(n_states=5, d_min=2, d_max=8).fit(sequences)
     model.log_likelihood(sequences[0])
     model.decode(sequences[0])
-    once = TrainingOptions(max_iterations=1)
+
+
+def _chains() -> None:
+    """Plain chains."""
+    from paramove.hmm import GaussianHMM, TrainingOptions
+
+    sequences, once = _sequences(), TrainingOptions(max_iterations=1)
     GaussianHMM(n_states=5, finish_state=True, options=once).fit(sequences).decode(sequences[0])
     GaussianHMM(n_states=2, topology="ergodic", options=once).fit(sequences)
-    warp(sequences[0], sequences[1], "A")
-    warp(sequences[0], sequences[1], "B")
-    theta = [0.0, 0.5, 1.0]
-    QuadraticPHMM(5, 2, 8, options=once).fit(sequences, theta).estimate(sequences[0])
-    frames = QuadraticPHMM(5, 2, 8, options=once, residuals="independent").fit(sequences, theta)
-    frames.estimate(sequences[0])
-    InterpolativePHMM(5, 2, 8, options=once).fit(sequences, theta).estimate(sequences[0])
-    _track()
 
 
-def _track() -> None:
-    """A tracker of one camera sees one image."""
-    import tempfile
+def _warping() -> None:
+    from paramove.alignment import warp
 
+    first, second, _ = _sequences()
+    warp(first, second, "A")
+    warp(first, second, "B")
+
+
+def _polynomials() -> None:
+    from paramove.hmm import TrainingOptions
+    from paramove.phmm import QuadraticPHMM
+
+    sequences, theta = _sequences(), [0.0, 0.5, 1.0]
+    options: dict[str, Any] = {"options": TrainingOptions(max_iterations=1)}
+    for residuals in ("correlated", "independent"):
+        QuadraticPHMM(5, 2, 8, residuals=residuals, **options).fit(sequences, theta).estimate(sequences[0])
+
+
+def _interpolation() -> None:
+    from paramove.hmm import TrainingOptions
+    from paramove.phmm import InterpolativePHMM
+
+    sequences, once = _sequences(), TrainingOptions(max_iterations=1)
+    InterpolativePHMM(5, 2, 8, options=once).fit(sequences, [0.0, 0.5, 1.0]).estimate(sequences[0])
+
+
+def _camera() -> CalibratedCamera:
     import numpy as np
 
-    from paramove.action_space.setup import TrackingSetup
-    from paramove.observation.cameras import CalibratedCamera, write_cameras
+    from paramove.observation.cameras import CalibratedCamera
 
     place = np.array([[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
     lens = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "cameras.yaml"
-        write_cameras(path, [CalibratedCamera("camera", 320, 240, lens, np.zeros(4), place)])
-        TrackingSetup(cameras=path).video_tracker()
+    return CalibratedCamera("camera", 320, 240, lens, np.zeros(4), place)
 
 
-def _train() -> bool:
-    """True if the model was trained now."""
-    from paramove.action_space.training import table_action
+def _images() -> None:
+    """Postures of an arm are compared with images."""
+    import numpy as np
+
+    from paramove.action_space.video_tracker import try_out
+    from paramove.observation.arm_body import ArmSizes
+    from paramove.observation.arm_observer import ArmObserver
+
+    poses = np.tile([0.0, -0.25, 0.3, 0.1, -0.25, 0.1, 0.35, -0.2, 0.1], (10, 1))
+    try_out(ArmObserver(ArmSizes(), [_camera()]), _camera(), poses)
+
+
+def _reaching() -> None:
     from paramove.imitation.setup import MovementSource
 
-    cache: Path = user_cache_path("paramove")
-    before = _kept(cache)
     MovementSource().trained()
-    table_action("pointing")
-    return _kept(cache) != before
 
 
-def _kept(cache: Path) -> dict[Path, int]:
-    return {path: path.stat().st_mtime_ns for path in (*cache.glob("reaching_*.npz"), *cache.glob("actions/*.npz"))}
+def _tracking() -> None:
+    """A tracker of pointing."""
+    from paramove.action_space.setup import TrackingSetup
+    from paramove.observation.cameras import write_cameras
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cameras.yaml"
+        write_cameras(path, [_camera()])
+        TrackingSetup(cameras=path).video_tracker()
 
 
 if __name__ == "__main__":
