@@ -215,7 +215,7 @@ def contact_sheet(clips: Sequence[Clip], columns: int = SHEET_COLUMNS, all_views
 
 
 def missing(root: Path, kinds: Sequence[Kind]) -> list[tuple[Kind, int]]:
-    """The clips that are not there, or of another version."""
+    """The clips that are not there, or rendered by other code."""
     todo = []
     for kind in kinds:
         for number in range(kind.clips):

@@ -41,7 +41,7 @@ def test_is_trained_once_and_kept(recorded: Path, tmp_path: Path, monkeypatch: p
     first = people_model(NAME, tmp_path)
     assert first.description is not None
     assert (first.description.arrival, first.description.frame, first.degree) == (1.0, "body", 1)
-    assert "table_reach, forward, version" in first.description.source
+    assert "table_reach, forward, sha256" in first.description.source
     assert [path.name for path in tmp_path.glob("*.npz")] == ["reaching_table_reach.npz"]
 
     def trained(*_: object, **__: object) -> None:
@@ -51,6 +51,9 @@ def test_is_trained_once_and_kept(recorded: Path, tmp_path: Path, monkeypatch: p
     np.testing.assert_array_equal(people_model(NAME, tmp_path).coefficients_, first.coefficients_)
     (recorded / NAME / "data.npz").unlink()  # the kept model serves where there are no recordings any more
     np.testing.assert_array_equal(people_model(NAME, tmp_path).coefficients_, first.coefficients_)
+    monkeypatch.setattr(recorded_reaching, "code_digest", lambda *modules: "of another day")
+    with pytest.raises(ModelFileError, match="is trained from recorded people"):
+        people_model(NAME, tmp_path)
 
 
 def test_other_recordings_and_a_damaged_file_train_again(

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from paramove.phmm import LinearPHMM, MovementDescription
+from paramove.phmm import kept_model as kept_models
 from paramove.phmm.kept_model import kept_model, stored_model
+from paramove.source_code import code_digest
+
+CODE = f"code {code_digest(__name__)}"
 
 
 @pytest.fixture
@@ -30,9 +34,9 @@ def test_a_model_is_trained_once_for_each_source(train, tmp_path):
     first = kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
     again = kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
     assert train.times == 1
-    assert first.description == again.description == MovementDescription("waving", source="one person")
+    assert first.description == again.description == MovementDescription("waving", source=f"one person, {CODE}")
     np.testing.assert_array_equal(first.coefficients_, again.coefficients_)
-    assert kept_model(LinearPHMM, "waving", "two persons", train, tmp_path).description.source == "two persons"
+    assert kept_model(LinearPHMM, "waving", "two persons", train, tmp_path).description.source == f"two persons, {CODE}"
     assert train.times == 2
     assert len(list(tmp_path.glob("waving_*.npz"))) == 2
 
@@ -47,14 +51,23 @@ def test_a_file_that_is_damaged_or_of_another_source_is_replaced(train, tmp_path
     assert train.times == 2
     first.description = replace(first.description, source="somebody else")
     first.save(path)
-    assert kept_model(LinearPHMM, "waving", "one person", train, tmp_path).description.source == "one person"
+    assert kept_model(LinearPHMM, "waving", "one person", train, tmp_path).description.source == f"one person, {CODE}"
     assert train.times == 3
+
+
+def test_a_model_of_other_code_is_replaced(train, tmp_path, monkeypatch):
+    kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    monkeypatch.setattr(kept_models, "code_digest", lambda *modules: " ".join(modules))
+    model = kept_model(LinearPHMM, "waving", "one person", train, tmp_path, modules=["paramove.hmm"])
+    assert model.description.source == f"one person, code {__name__} paramove.hmm"
+    assert train.times == 2
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_folder_that_cannot_be_made_costs_the_file_only(train, tmp_path, caplog):
     (tmp_path / "file").write_text("")
     model = kept_model(LinearPHMM, "waving", "one person", train, tmp_path / "file" / "actions")
-    assert model.description.source == "one person"
+    assert model.description.source == f"one person, {CODE}"
     assert "the trained model is not kept" in caplog.text
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.action_space.vocabulary import POSE_SIZES, ActionModel, table_target
 from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
-from paramove.demonstrations.reaching import DEMONSTRATOR_VERSION
 from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
 from paramove.hmm import TrainingOptions
 from paramove.input_error import InputError
@@ -76,7 +76,9 @@ def cached_action(
         return model
 
     told = f"{source}, {kind.__name__}, {n_states} states"
-    return ActionModel.from_file_model(kept_model(PolynomialPHMM, name, told, train, folder), target)
+    shown_by = show.func if isinstance(show, partial) else show
+    model = kept_model(PolynomialPHMM, name, told, train, folder, [shown_by.__module__])
+    return ActionModel.from_file_model(model, target)
 
 
 def table_action_demonstrations(
@@ -92,5 +94,5 @@ def table_action_demonstrations(
 
 def table_action(action: Action = "pointing", seed: int = 0, folder: Path | None = None) -> ActionModel:
     """Pointing or reaching on the table, trained with the synthetic demonstrator and kept in the user's cache."""
-    source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, 5 x 3 places, 4 repetitions"
+    source = f"synthetic demonstrator, seed {seed}, 5 x 3 places, 4 repetitions"
     return cached_action(action, source, lambda: table_action_demonstrations(action, seed), folder=folder)

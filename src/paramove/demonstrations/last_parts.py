@@ -21,8 +21,6 @@ from paramove.demonstrations.synthetic import (
 
 Floats = NDArray[np.float64]
 
-LAST_PARTS_VERSION = 5  # raise it with every change of this module: cached models then train again
-
 FRAMES = 24
 """Of a last part, however long it took."""
 WAY, STAY = 0.5, 0.3

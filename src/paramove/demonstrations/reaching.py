@@ -10,10 +10,9 @@ from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 from paramove.phmm.kept_model import stored_model
+from paramove.source_code import code_digest
 
 Floats = NDArray[np.float64]
-
-DEMONSTRATOR_VERSION = 2  # raise it with every change of the synthetic movements: cached models then train again
 
 
 @dataclass(frozen=True)
@@ -89,9 +88,9 @@ def train_reaching_model(
     """The 2 x 2 x 2 interpolative model of reaching, 80 states of 2 or 3 frames (thesis 5.2.2).
 
     Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it was
-    made with the same arguments, and written there otherwise.
+    made with the same arguments by the present code, and written there otherwise.
     """
-    source = f"synthetic demonstrator {DEMONSTRATOR_VERSION}, seed {seed}, {repetitions} repetitions"
+    source = f"synthetic demonstrator, seed {seed}, {repetitions} repetitions, code {code_digest(__name__)}"
     model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
     stored = stored_model(InterpolativePHMM, cache)
     if (

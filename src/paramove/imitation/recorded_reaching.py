@@ -13,6 +13,7 @@ from paramove.demonstrations.body_frame import BODY
 from paramove.demonstrations.recorded_people import RATE_HZ, Recordings, RecordingsError, data_folder, load_recordings
 from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM
 from paramove.phmm.kept_model import stored_model
+from paramove.source_code import code_digest
 
 ACTIONS = ("reach_forward", "reach_across")
 N_STATES = 40
@@ -21,26 +22,26 @@ REMEDY = (
     "give a trained model by the node's parameter movement.file; or leave out its parameter movement to move as the "
     "synthetic demonstrator does"
 )
-VERSION = 1  # raise it when the same recordings shall give another model: cached models then train again
 
 
 def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
     """The linear model of the data set `name`, trained once and kept in `cache_folder`.
 
-    The kept one is used as long as it was trained from the recordings that are there, or if there are none any more.
+    The kept one is used if the present code trained it, from the recordings that are there or while there are none.
 
     Raises:
         ModelFileError: There are neither recordings nor a kept model, or the recordings do not suit; with the remedy.
     """
     cache = None if cache_folder is None else cache_folder / f"reaching_{name}.npz"
-    kept = stored_model(PolynomialPHMM, cache)
+    kept, code = stored_model(PolynomialPHMM, cache), f"code {code_digest(__name__)}"
+    trained_from = kept.description.source if kept is not None and kept.description is not None else ""
     try:
-        source = f"{name}, {', '.join(ACTIONS)}, version {VERSION}, sha256 {_digest(name)}"
-        if kept is not None and kept.description is not None and kept.description.source == source:
+        source = f"{name}, {', '.join(ACTIONS)}, sha256 {_digest(name)}, {code}"
+        if kept is not None and trained_from == source:
             return kept
         model = train_people_model(load_recordings(name), actions=ACTIONS, n_states=N_STATES)
     except RecordingsError as error:
-        if kept is not None:
+        if kept is not None and trained_from.endswith(code):
             return kept
         raise ModelFileError(
             f"the movement {name!r} is trained from recorded people: {error}. Remedy: {REMEDY}", missing=True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -13,6 +13,7 @@ from platformdirs import user_cache_path
 
 from paramove.phmm.parametric import ParametricHMM
 from paramove.phmm.storage import ModelFileError
+from paramove.source_code import code_digest
 
 Model = TypeVar("Model", bound=ParametricHMM)
 logger = logging.getLogger(__name__)
@@ -30,17 +31,20 @@ def stored_model(kind: type[Model], path: Path | None) -> Model | None:
 
 
 def kept_model(
-    kind: type[Model], name: str, source: str, train: Callable[[], Model], folder: Path | None = None
-) -> Model:
-    """The model of that source which a folder has, by default the user's cache; else trained and kept there.
+    kind: type[Model], name: str, source: str, train: Callable[[], Model], folder: Path | None = None,
+    modules: Sequence[str] = (),
+) -> Model:  # fmt: skip
+    """The model of that source and of the present code in a folder, by default the user's cache; else trained anew.
 
     Args:
         kind: of the model. name: of its file.
         source: what it is trained from and how, which its description then names; another source is another file.
         train: gives one with a description; called only if it is needed.
+        modules: whose code decides what comes out, with all that they import, beside the module of `train`.
     """
     kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
     path = kept_in / f"{name}_{crc32(source.encode()):08x}.npz"
+    source = f"{source}, code {code_digest(train.__module__, *modules)}"
     stored = stored_model(kind, path)
     if stored is not None and stored.description is not None and stored.description.source == source:
         return stored

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.demonstrations.last_parts import FRAMES, LAST_PARTS_VERSION, last_parts
+from paramove.demonstrations.last_parts import FRAMES, last_parts
 from paramove.demonstrations.synthetic import FRAME, Action
 from paramove.hmm import TrainingOptions
 from paramove.phmm import MovementDescription, QuadraticPHMM
@@ -96,5 +96,5 @@ def _trained(action: Action, points: Sequence[str], folder: Path | None) -> Quad
         )  # fmt: skip
         return model.fit(shown.sequences, shown.theta, shown.groups)
 
-    source = f"last parts {LAST_PARTS_VERSION} of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
+    source = f"last parts of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
     return kept_model(QuadraticPHMM, f"last_part_{action}", source, train, folder)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from paramove.evaluation.chapter4.experiments import QUICK, Scale, experiments, modules_behind
+from paramove.evaluation.chapter4.experiments import QUICK, Scale, experiments
 from paramove.evaluation.chapter4.kinds import IPHMM_3, KINDS, QPHMM_3
 from paramove.evaluation.chapter4.summary import Interval, over_seeds
 from paramove.evaluation.chapter4.targets import targets_of
@@ -23,12 +23,6 @@ def test_another_seed_or_scale_is_another_piece() -> None:
     again = {one.label: one.key() for one in experiments([0], replace(QUICK, every=1))}
     changed = {label for label in first if first[label] != again[label]}
     assert changed == {label for label in first if label.startswith("models")}
-
-
-def test_what_a_model_is_made_of_is_found_by_its_imports() -> None:
-    found = modules_behind("paramove.phmm.polynomial")
-    assert {"paramove.phmm.polynomial", "paramove.phmm.parametric", "paramove.phmm.search_kernels"} <= set(found)
-    assert "paramove.phmm.interpolative" not in found
 
 
 def test_slow_models_come_last() -> None:

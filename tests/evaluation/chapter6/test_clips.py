@@ -135,7 +135,7 @@ def test_what_is_missing_or_old_is_refused(clip, monkeypatch, tmp_path):
         read_clips(tmp_path, "pouring")
     with pytest.raises(InputError, match="found 'waving'"):
         read_clips(tmp_path, "waving")
-    monkeypatch.setattr(clips, "CLIPS_VERSION", clips.CLIPS_VERSION + 1)
+    monkeypatch.setattr(clips, "clips_code", lambda: "of today")
     with pytest.raises(InputError, match="renders it again"):
         read_clip(clip.folder)
 

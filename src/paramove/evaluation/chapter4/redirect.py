@@ -35,6 +35,12 @@ MODELS: dict[str, Callable[[], ParametricHMM]] = {
 }
 
 
+def redirects(seed: int, tests: int, only: str) -> dict[str, Any]:
+    """The experiment as plain JSON; beside its rows the jerk of each."""
+    rows = redirect_experiment(seed, tests, only)
+    return {"values": {"jerk": [row["jerk_ratio"] for row in rows]}, "rows": rows}
+
+
 def redirect_experiment(seed: int, tests: int = 40, only: str = "") -> list[dict[str, Any]]:
     """One row per training set (all whose name has `only`) and model: errors in cm, and jerk as multiple of training's.
 

@@ -1,7 +1,8 @@
 """Rendered performances in files: what a tracker may see, and beside it, apart, what is true.
 
 A folder of clips has one folder per clip with `seen.npz` (images, times, measured sizes), `cameras.yaml` (calibrated,
-with small errors), `truth.npz` and `true_cameras.yaml`; and `manifest.yaml`. Only `Clip.truth` reads what is true.
+with small errors), `truth.npz`, `true_cameras.yaml` and `code.txt` (the digest of the code that rendered it: the clips
+of other code are not read); and `manifest.yaml`. Only `Clip.truth` reads what is true.
 
 Images are stored without loss and without the noise of the sensor: each as the PNG of its difference to the one before,
 modulo 256. The noise is added when they are read, always the same for the same clip, view and frame.
@@ -27,18 +28,18 @@ from paramove.evaluation.chapter6.performances import KINDS, Act, Split, split_o
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.cameras import CalibratedCamera, read_cameras, write_cameras
+from paramove.source_code import code_digest
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-CLIPS_VERSION = 1
-"""Raise it with every change of persons, performances, scenes or cameras: clips are then rendered again."""
+FORMAT_VERSION, NOISE_SEED = 1, 1
 TABLE = ((-0.085, -0.66), (0.72, -0.66), (0.72, 0.72), (-0.085, 0.72))
 """Corners (x, y) of the table in all clips, m, as one measures them with a ruler."""
 NOISE_IMAGES = 4
 MOST_PLACES = 2
-SEEN, CAMERAS, TRUTH, TRUE_CAMERAS, MANIFEST = (
-    "seen.npz", "cameras.yaml", "truth.npz", "true_cameras.yaml", "manifest.yaml",
+SEEN, CAMERAS, TRUTH, TRUE_CAMERAS, CODE, MANIFEST = (
+    "seen.npz", "cameras.yaml", "truth.npz", "true_cameras.yaml", "code.txt", "manifest.yaml",
 )  # fmt: skip
 
 
@@ -114,7 +115,7 @@ class Clip:
             yield tuple(next(streams[view]) if view in streams else None for view in range(len(self.cameras)))
 
     def _noisy(self, clean: Iterator[Image], view: int) -> Iterator[Image]:
-        draw = np.random.default_rng([CLIPS_VERSION, view, *self.name.encode()])
+        draw = np.random.default_rng([NOISE_SEED, view, *self.name.encode()])
         for number, image in enumerate(clean):
             if number == 0:
                 noise = draw.normal(0.0, self.noise, (NOISE_IMAGES, image.size)).round().astype(np.int8)
@@ -141,20 +142,25 @@ class Clip:
 
 def clips_folder() -> Path:
     """Where clips are kept unless another folder is named: the user's cache."""
-    return user_cache_path("paramove") / "chapter6" / f"clips_{CLIPS_VERSION}"
+    return user_cache_path("paramove") / "chapter6" / "clips"
+
+
+def clips_code() -> str:
+    """Digest of the code that renders clips, which is part of the clone: `sim`."""
+    return code_digest("sim.performances")
 
 
 def read_clip(folder: Path) -> Clip:
-    """The clip of a folder. Raises InputError where it is missing, half written or of another version."""
+    """The clip of a folder. Raises InputError where it is missing, half written or rendered by other code."""
     if not (folder / SEEN).is_file():
         raise InputError(f"{folder}: no clip there; `python -m sim.performances` renders them", missing=True)
+    rendered_by = (folder / CODE).read_text(encoding="utf-8") if (folder / CODE).is_file() else "unknown code"
+    if rendered_by != clips_code():
+        raise InputError(
+            f"{folder}: a clip of code {rendered_by} found, {clips_code()} expected; `python -m sim.performances` "
+            "renders it again, in the clone"
+        )
     with np.load(folder / SEEN, allow_pickle=False) as file:
-        version = int(file["version"])
-        if version != CLIPS_VERSION:
-            raise InputError(
-                f"{folder}: a clip of version {version} found, {CLIPS_VERSION} expected; "
-                "`python -m sim.performances` renders it again"
-            )
         return Clip(
             folder,
             str(file["name"]),
@@ -191,16 +197,18 @@ def read_clips(folder: Path | None = None, kind: str | None = None, split: Split
 def write_clip(clip: Clip, truth: Truth, images: Mapping[int, Sequence[Image]]) -> None:
     """Writes a clip with its images, by view; `seen.npz` last, so that a clip that has it is whole."""
     clip.folder.mkdir(parents=True, exist_ok=True)
+    (clip.folder / SEEN).unlink(missing_ok=True)
     write_cameras(clip.folder / CAMERAS, clip.cameras)
     write_cameras(clip.folder / TRUE_CAMERAS, truth.cameras)
     np.savez_compressed(clip.folder / TRUTH, **_truth_arrays(truth))
     packed: dict[str, Any] = {}
     for view, pictures in images.items():
         packed[f"view_{view}"], packed[f"offsets_{view}"] = pack(pictures)
+    (clip.folder / CODE).write_text(clips_code(), encoding="utf-8")
     beginning = clip.folder / f"unfinished_{SEEN}"
     np.savez(
         beginning,
-        version=np.array(CLIPS_VERSION),
+        version=np.array(FORMAT_VERSION),
         name=np.array(clip.name),
         kind=np.array(clip.kind),
         number=np.array(clip.number),
@@ -225,7 +233,7 @@ def write_manifest(folder: Path) -> Path:
         )  # fmt: skip
     path = folder / MANIFEST
     with path.open("w", encoding="utf-8") as file:
-        YAML().dump({"version": CLIPS_VERSION, "clips": listed}, file)
+        YAML().dump({"version": FORMAT_VERSION, "clips": listed}, file)
     return path
 
 

@@ -12,10 +12,8 @@ from typing import Any, Literal
 
 import cv2
 
-from paramove.evaluation.chapter4.experiments import modules_behind
 from paramove.evaluation.chapter6.clips import (
     CAMERAS,
-    CLIPS_VERSION,
     SEEN,
     TRUE_CAMERAS,
     TRUTH,
@@ -24,10 +22,10 @@ from paramove.evaluation.chapter6.clips import (
 )
 from paramove.evaluation.chapter6.performances import KINDS, Kind, split_of
 from paramove.evaluation.chapter6.tracking import tracked_clip
-from paramove.evaluation.chapter6.vocabularies import BY_OTHERS, RECORDED_SOURCES, TRAINING_SOURCES, knowledge_of
-from paramove.evaluation.movements.sweep import code_digest
+from paramove.evaluation.chapter6.vocabularies import BY_OTHERS, knowledge_of
 from paramove.input_error import InputError
 from paramove.observation.options import Likelihood
+from paramove.source_code import code_digest
 
 Wanted = Literal["tuning", "held_out", "all"]
 Views = tuple[int, ...]
@@ -40,19 +38,11 @@ TRACKED_KINDS = (*(kind.name for kind in KINDS), BY_OTHERS)
 SIMPLE_KINDS = ("pointing_50fps", "pointing", "pointing_far")
 """Kinds that are also tracked with the simple likelihood (6.21)."""
 
-SOURCES = (
-    *TRAINING_SOURCES,
-    *modules_behind("paramove.action_space.tracker"),
-    *modules_behind("paramove.observation.arm_observer"),
-    "paramove.evaluation.chapter6.tracking",
-    "paramove.evaluation.chapter6.vocabularies",
-)
-"""Code that decides what a track is, beside that of the clips."""
 LIBRARIES = ("numpy", "scipy", "numba")
 
 
 class ClipsMissingError(InputError):
-    """Clips are not there or of another version.
+    """Clips are not there or rendered by other code.
 
     Attributes:
         command: renders them.
@@ -123,8 +113,7 @@ class Piece:
     def key(self) -> str:
         """Name of the file of its result: another one for other images, arguments, code or libraries."""
         parts = [repr((self.kind, self.number, self.views, self.likelihood, self.seed)), _clip_digest(self.folder)]
-        sources = (*SOURCES, *RECORDED_SOURCES) if self.kind in ("recorded", BY_OTHERS) else SOURCES
-        parts += [code_digest(source) for source in sources]
+        parts.append(code_digest(tracked_clip.__module__))
         parts += [f"cv2 {cv2.__version__}", *(f"{name} {version(name)}" for name in LIBRARIES)]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
@@ -188,7 +177,7 @@ def _check_complete(clips: Path, chosen: Sequence[tuple[Kind, int]], named: Path
     if named is not None:
         words.append(f"--out {named}")
     raise ClipsMissingError(
-        f"{clips}: {len(absent)} of {len(chosen)} clips are missing or of another version than {CLIPS_VERSION}",
+        f"{clips}: {len(absent)} of {len(chosen)} clips are missing or rendered by other code",
         " ".join(words),
     )
 

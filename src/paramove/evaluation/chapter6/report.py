@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from paramove.evaluation.chapter4.drawing import drawn
 from paramove.evaluation.chapter6 import drawing
-from paramove.evaluation.chapter6.clips import CLIPS_VERSION, Clip
+from paramove.evaluation.chapter6.clips import Clip, clips_code
 from paramove.evaluation.chapter6.experiments import TRACKED_KINDS
 from paramove.evaluation.chapter6.findings import Finding, findings_of
 from paramove.evaluation.chapter6.goals import Goal, goals_of
@@ -86,7 +86,7 @@ def write_results(
     goals, goals_there = goals_of(tracks), goals_of(held_out)
     findings = findings_of(tracks, summary)
     numbers = plain(summary) | {
-        "clips version": CLIPS_VERSION,
+        "clips code": clips_code(),
         "held out": plain(summarised(held_out)),
         "goals": [goal._asdict() for goal in goals],
         "goals held out": [goal._asdict() for goal in goals_there],

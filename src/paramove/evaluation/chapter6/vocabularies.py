@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
@@ -19,7 +18,6 @@ from paramove.action_space.vocabulary import ActionModel, Vocabulary, table_targ
 from paramove.evaluation.chapter6.actions import EYE, FAR_ORIGIN, SHOWN, far_place
 from paramove.evaluation.chapter6.performances import recording_of
 from paramove.evaluation.chapter6.recorded import direction_place, recorded_demonstrations
-from paramove.evaluation.movements.sweep import code_digest
 
 Floats = NDArray[np.float64]
 
@@ -48,21 +46,6 @@ ACTIONS: dict[str, tuple[str, ...]] = {
 """Of each kind of clip."""
 BY_OTHERS = "recorded_by_others"
 """Clips of kind "recorded" again, with a model of the two other persons."""
-
-TRAINING_SOURCES = (
-    "paramove.action_space.training",
-    "paramove.demonstrations.arm",
-    "paramove.demonstrations.blending",
-    "paramove.demonstrations.reaching",
-    "paramove.demonstrations.synthetic",
-    "paramove.evaluation.chapter6.actions",
-    "paramove.evaluation.chapter6.staging",
-    "paramove.hmm",
-    "paramove.phmm.polynomial",
-    "paramove.phmm.parametric",
-)
-"""Code that decides what the models learn."""
-RECORDED_SOURCES = ("paramove.evaluation.chapter6.recorded", "paramove.demonstrations.recorded_people")
 
 
 @dataclass(frozen=True)
@@ -128,21 +111,15 @@ def on_far_plane(place: Floats, placement: PersonPlacement) -> Floats:
 
 def _action(name: str) -> ActionModel:
     target = far_place if name == "pointing_far" else table_target
-    source = f"chapter 6, training movements of code {_digest(TRAINING_SOURCES)}"
-    return cached_action(name, source, SHOWN[name], target=target)
+    return cached_action(name, "chapter 6, training movements", SHOWN[name], target=target)
 
 
 def _recorded_action(subject: int, target: int | None, folder: Path | None) -> ActionModel:
     """Of the person without the movements to a target, or, without one, of all other persons."""
-    digest = _digest((*TRAINING_SOURCES, *RECORDED_SOURCES))
     if target is None:
         told, show = f"without person {subject}", partial(recorded_demonstrations, subject, folder)
     else:
         told = f"person {subject} without target {target}"
         show = partial(recorded_demonstrations, None, folder, of_subject=subject, without_target=target)
-    source = f"pointing27 {told}, code {digest}, {folder or 'usual folder'}"
+    source = f"pointing27 {told}, {folder or 'usual folder'}"
     return cached_action("recorded_pointing", source, show, target=direction_place)
-
-
-def _digest(sources: tuple[str, ...]) -> str:
-    return hashlib.sha256("".join(code_digest(source) for source in sources).encode()).hexdigest()[:12]

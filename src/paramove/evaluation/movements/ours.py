@@ -28,7 +28,6 @@ from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricH
 Floats = NDArray[np.float64]
 FLOOR_M = 1e-4
 """Recordings may hold a point that never moves: nothing is known better than to a tenth of a millimetre."""
-SOURCES = ("paramove.evaluation.movements.ours", "paramove.phmm", "paramove.hmm")
 
 
 class Models(NotAble):
@@ -78,7 +77,7 @@ def our_rows() -> list[Row]:
         "paramove, cubic PHMM": partial(CubicPHMM, **common),
         "paramove, quadratic PHMM as in the thesis": partial(QuadraticPHMM, residuals="independent", **common),
     }
-    return [Row(name, _maker(make), repr(make), SOURCES, ours=True) for name, make in kinds.items()]
+    return [Row(name, _maker(make), repr(make), ours=True) for name, make in kinds.items()]
 
 
 def _maker(make: Callable[[], ParametricHMM]) -> Callable[[int], Method]:

@@ -7,10 +7,8 @@ what a change of code or data makes invalid is not found again.
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib
-import inspect
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,18 +23,7 @@ from paramove.evaluation.movements.method import Method
 from paramove.evaluation.movements.tasks import Fold
 from paramove.evaluation.movements.trial import able, measure
 from paramove.linear_algebra_threads import ONE_THREAD
-
-PROTOCOL = (
-    "paramove.evaluation.movements.method",
-    "paramove.evaluation.movements.measures",
-    "paramove.evaluation.movements.disturbed",
-    "paramove.evaluation.movements.trial",
-    "paramove.alignment.warping",
-    "paramove.hmm.sequences:resample",
-    "paramove.hmm.sequences:interpolate",
-)
-"""Source that every result depends on, beside the data: modules, and single functions of modules."""
-
+from paramove.source_code import code_digest
 
 PATIENCE_S = 10.0
 """How long a cluster's scheduler may take to answer."""
@@ -54,7 +41,6 @@ class Row:
         name: as it is shown.
         make: an unfitted method for a seed.
         parameters: everything else that decides what comes out, in words: the name alone may stay when they change.
-        sources: modules, packages or functions ("module:name") of this project whose code does.
         libraries: packages of others whose versions do.
         seeds: repetitions for methods with chance in them.
         ours: whether it is this project's.
@@ -63,7 +49,6 @@ class Row:
     name: str
     make: Callable[[int], Method]
     parameters: str = ""
-    sources: tuple[str, ...] = ()
     libraries: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
     ours: bool = False
@@ -96,7 +81,7 @@ class Job:
     def key(self, data: str) -> str:
         """Name of the result's file; `data` is the digest of the fold."""
         parts = [self.row.name, self.row.parameters, str(self.seed), self.fold.task, self.fold.name, data]
-        parts += [code_digest(source) for source in (*PROTOCOL, *self.row.sources)]
+        parts.append(code_digest(measure.__module__, self.row.make.__module__))
         parts += [f"{name} {_version(name)}" for name in ("numpy", "scipy", *self.row.libraries)]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
@@ -231,21 +216,6 @@ def fold_digest(fold: Fold) -> str:
             digest.update(x.tobytes())
     for x in fold.others:
         digest.update(x.tobytes())
-    return digest.hexdigest()
-
-
-@lru_cache
-def code_digest(source: str) -> str:
-    """Digest of the source of a module, of all of a package, or of one function ("module:name")."""
-    module, _, name = source.partition(":")
-    found = importlib.import_module(module)
-    if name:
-        return hashlib.sha256(inspect.getsource(getattr(found, name)).encode()).hexdigest()
-    path = Path(str(found.__file__))
-    files = sorted(path.parent.rglob("*.py")) if path.name == "__init__.py" else [path]
-    digest = hashlib.sha256()
-    for file in files:  # layout and comments decide nothing
-        digest.update(ast.dump(ast.parse(file.read_text(encoding="utf-8"))).encode())
     return digest.hexdigest()
 
 

@@ -18,10 +18,6 @@ from paramove.evaluation.peers.promp import ContextualProMP
 from paramove.evaluation.peers.ridge import AlignedRidge
 from paramove.evaluation.peers.tuning import Tuned
 
-PEERS = "paramove.evaluation.peers"
-COMMON = (f"{PEERS}.tuning", "paramove.evaluation.movements.per_action")
-GAUSSIAN = (f"{PEERS}.linear_gaussian", *COMMON)
-
 Parameters = dict[str, Any]
 
 
@@ -51,7 +47,6 @@ def both(
     name: str,
     kind: Callable[..., Method],
     candidates: list[Parameters],
-    sources: tuple[str, ...],
     libraries: tuple[str, ...],
     *,
     whole: Callable[[Callable[[], Method]], Method] = one_action,
@@ -66,15 +61,15 @@ def both(
         return whole(partial(Tuned, partial(kind, **fixed), candidates))
 
     return [
-        Row(f"{name} (default)", default, repr(fixed), sources, libraries),
-        Row(f"{name} (tuned)", tuned, repr((fixed, candidates)), sources, libraries),
+        Row(f"{name} (default)", default, repr(fixed), libraries),
+        Row(f"{name} (tuned)", tuned, repr((fixed, candidates)), libraries),
     ]
 
 
 def ridge_rows() -> list[Row]:
     """Alignment, principal components and ridge regression: the strong simple baseline."""
     candidates = raster_of(components=[4, 8, 16], degree=[1, 2])
-    rest = (AlignedRidge, candidates, (f"{PEERS}.ridge", *GAUSSIAN), ("tslearn", "scikit-learn"))
+    rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
         *both("DTW + PCA + quadratic ridge, full covariance", *rest, covariance="full"),
@@ -85,7 +80,7 @@ def ridge_rows() -> list[Row]:
 def promp_rows() -> list[Row]:
     """Probabilistic movement primitives with quadratic context."""
     candidates = raster_of(weights=[8, 15], degree=[1, 2], noise_m=[0.003, 0.01, 0.03])
-    rest = (ContextualProMP, candidates, (f"{PEERS}.promp", *GAUSSIAN), ("movement-primitives", "gmr", "tslearn"))
+    rest = (ContextualProMP, candidates, ("movement-primitives", "gmr", "tslearn"))
     return [
         *both("ProMP, quadratic context, linear time", *rest),
         *both("ProMP, quadratic context, DTW-aligned", *rest, warped=True),
@@ -94,12 +89,8 @@ def promp_rows() -> list[Row]:
 
 def hmm_rows() -> list[Row]:
     """Hidden Markov models: hmmlearn without parameters, dynamax with theta as its input."""
-    plain = (raster_of(n_states=[10, 20, 30]), (f"{PEERS}.hidden_markov", *COMMON), ("hmmlearn",))
-    driven = (
-        raster_of(n_states=[10, 20], floor_m=[0.003, 0.01]),
-        (f"{PEERS}.input_driven_hmm", *GAUSSIAN),
-        ("dynamax", "jax"),
-    )
+    plain = (raster_of(n_states=[10, 20, 30]), ("hmmlearn",))
+    driven = (raster_of(n_states=[10, 20], floor_m=[0.003, 0.01]), ("dynamax", "jax"))
     return [
         *both("hmmlearn, one HMM per action", GaussianHMM, *plain),
         *both("hmmlearn, one HMM per target", CellHMMs, *plain),
@@ -110,8 +101,8 @@ def hmm_rows() -> list[Row]:
 
 def classifier_rows() -> list[Row]:
     """Classification and regression of time series."""
-    rocket = (raster_of(kernels=[1_000, 10_000]), (f"{PEERS}.minirocket", *COMMON), ("sktime", "scikit-learn"))
-    nearest = (raster_of(neighbours=[1, 3, 5], radius=[10, None]), (f"{PEERS}.nearest", *COMMON), ("tslearn",))
+    rocket = (raster_of(kernels=[1_000, 10_000]), ("sktime", "scikit-learn"))
+    nearest = (raster_of(neighbours=[1, 3, 5], radius=[10, None]), ("tslearn",))
     return [
         *both("MiniRocket", MiniRocket, *rocket, whole=classifier),
         *both("kNN-DTW", NearestByWarping, *nearest, whole=classifier),

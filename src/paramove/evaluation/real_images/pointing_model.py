@@ -5,7 +5,6 @@ Poses are in the models' frame and size (`paramove.demonstrations.synthetic`), w
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from paramove.action_space.vocabulary import ActionModel
 from paramove.demonstrations import Demonstrations
 from paramove.demonstrations.arm import elbow_positions, swivel_towards, unit
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, minimum_jerk
-from paramove.evaluation.movements.sweep import code_digest
 from paramove.observation.arm_body import POSE_POINTS, ArmSizes
 from paramove.phmm import CubicPHMM, MovementDescription
 
@@ -58,8 +56,7 @@ def pointing_action(sizes: ArmSizes, at_rest: ArrayLike, placement: PersonPlacem
     rest = placement.in_model(np.asarray(at_rest, dtype=np.float64))
     arm = sizes.scaled(1.0 / placement.scale)
     numbers = np.round([*rest, arm.upper_arm, arm.lower_arm], 4).tolist()
-    digest = hashlib.sha256(f"{numbers} {code_digest(__name__)}".encode()).hexdigest()[:12]
-    source = f"seated pointing, made by code, {digest}"
+    source = f"seated pointing, made by code, {numbers}"
     return cached_action(
         NAME, source, lambda: demonstrations(arm, rest), kind=CubicPHMM, folder=folder, target=direction_place
     )

@@ -1,0 +1,83 @@
+"""Machine code on disk: whole when several processes compile at once, never from other code, and not for ever."""
+
+import subprocess
+import sys
+
+import pytest
+
+KERNEL = """
+from paramove.hmm.compilation import compiled
+
+@compiled
+def kernel(x):
+    return 10 * x
+"""
+PROGRAM = """
+import sys
+from kernel_file import kernel
+for text in sys.argv[1:]:
+    print(kernel(float(text) if "." in text else int(text)), end=" ")
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a kernel."""
+    (tmp_path / "kernel_file.py").write_text(KERNEL)
+    return tmp_path
+
+
+def started(folder, *numbers, program=PROGRAM):
+    """A process that calls the kernel for numbers."""
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *numbers],
+        cwd=folder,
+        env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "XDG_CACHE_HOME": str(folder / "cache")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ended(process):
+    """What it printed, and how often it said that it compiles."""
+    output, said = process.communicate(timeout=300)
+    assert process.returncode == 0, said
+    return output.split(), said.count("compiling")
+
+
+def test_processes_that_compile_at_once_lose_nothing(folder):
+    together = [started(folder, numbers) for numbers in ("1", "1.5", "2", "2.5")]
+    assert [ended(process) for process in together] == [([value], 1) for value in ("10", "15.0", "20", "25.0")]
+    assert ended(started(folder, "3", "3.5")) == (["30", "35.0"], 0)
+
+
+def test_old_machine_code_is_not_used_and_not_stored_for_ever(folder):
+    assert ended(started(folder, "1")) == (["10"], 1)
+    (old,) = folder.rglob("*.nbc")
+    (folder / "kernel_file.py").write_text(KERNEL.replace("10", "11"))
+    assert ended(started(folder, "1")) == (["11"], 1)
+    (new,) = folder.rglob("*.nbc")
+    assert new != old
+
+
+def test_a_file_that_was_cut_off_is_compiled_again(folder):
+    ended(started(folder, "1"))
+    (stored,) = folder.rglob("*.nbc")
+    stored.write_bytes(stored.read_bytes()[:-100])
+    assert ended(started(folder, "1")) == (["10"], 1)
+    assert ended(started(folder, "1")) == (["10"], 0)
+
+
+def test_where_the_code_lies_read_only_the_users_cache_has_the_machine_code(folder):
+    (folder / "__pycache__").write_text("no folder can be made here")
+    assert ended(started(folder, "1")) == (["10"], 1)
+    assert ended(started(folder, "1")) == (["10"], 0)
+    assert list((folder / "cache").rglob("kernel_file.*.nbc"))
+
+
+def test_a_process_whose_code_was_edited_meanwhile_leaves_nothing_to_others(folder):
+    """It may have imported either."""
+    edited = "import paramove.source_code, pathlib; file = pathlib.Path('kernel_file.py'); "
+    assert ended(started(folder, "1", program=edited + "file.write_text(file.read_text())\n" + PROGRAM)) == (["10"], 1)
+    assert ended(started(folder, "1")) == (["10"], 1)
