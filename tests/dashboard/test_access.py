@@ -71,9 +71,13 @@ def test_a_missing_or_second_origin_gets_no_socket() -> None:
 @pytest.mark.parametrize(
     "target", ["/live", "/live?key=", "/live?key=wrong", "/live?key=a-token", "/live?key=a-session"]
 )
-def test_the_cookie_without_the_key_gets_no_socket(target: str) -> None:
+def test_without_the_key_there_is_no_socket(target: str) -> None:
     """Cookies are shared by all ports of a host: who was sent the cookie still has no key."""
-    assert judged(target, HOST, COOKIE, ORIGIN).kind is Kind.REFUSED
+    assert judged(target, HOST, COOKIE, ORIGIN).status is http.HTTPStatus.FORBIDDEN
+
+
+def test_a_page_whose_cookie_the_browser_dropped_still_gets_its_socket() -> None:
+    assert judged("/live?key=a-key", HOST, ORIGIN).kind is Kind.SOCKET
 
 
 COOKIES = [
@@ -88,12 +92,37 @@ COOKIES = [
 
 
 @pytest.mark.parametrize(
-    "target", ["/", "/page.js", "/live?key=a-key", "/nothing", "/?token=", "/?token=wrong", "/?token"]
+    "target", ["/", "/page.js", "/live?key=wrong", "/nothing", "/?token=", "/?token=wrong", "/?token"]
 )
 @pytest.mark.parametrize("cookie", COOKIES)
 def test_without_a_session_everything_is_refused_alike(cookie: str, target: str) -> None:
     found = judged(target, HOST, ORIGIN, ("Cookie", cookie))
     assert (found.kind, found.status) == (Kind.REFUSED, http.HTTPStatus.FORBIDDEN)
+
+
+FOREIGN_COOKIES = [
+    'state={"a": [1, 2]}',
+    "a b=c d; é=ü; \x80\xff=\xfe",
+    'quoted="half; other="',
+    "=nameless; bare; ;; a==b; $Version=1; __Host-x={}; a=1; a=2",
+    f"paramove_{PORT}=wrong; paramove_{PORT}=; paramove_{PORT}; paramove_{PORT}x=a-session",
+    "; ".join(f"other_{number}={'v' * 200}" for number in range(180)),
+]
+
+
+@pytest.mark.parametrize("cookie", FOREIGN_COOKIES)
+def test_cookies_of_other_programs_on_this_host_change_nothing(cookie: str) -> None:
+    """Cookies are shared by all ports of a host, and many programs write ones that no parser takes."""
+    for headers in (
+        [("Cookie", f"{cookie}; {COOKIE[1]}")],
+        [("Cookie", f"{COOKIE[1]}; {cookie}")],
+        [("Cookie", cookie), COOKIE],
+    ):
+        assert judged("/", HOST, *headers) == Verdict(Kind.PAGE)
+        assert judged("/page.js", HOST, *headers).kind is Kind.FILE
+        assert judged("/live?key=a-key", HOST, ORIGIN, *headers).kind is Kind.SOCKET
+    assert judged("/?token=a-token", HOST, ("Cookie", cookie)) == Verdict(Kind.PAGE, by_token=True)
+    assert judged("/", HOST, ("Cookie", cookie)).status is http.HTTPStatus.FORBIDDEN
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "CONNECT", "get", ""])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.server
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -191,6 +192,38 @@ def test_stop_reaches_the_bus_and_the_page_says_how_far_it_came(run: Run, browse
     shown = browser.until("document.getElementById('alert').textContent", "the page says so")
     assert STOPPED in shown
     expect_clean(browser)
+
+
+class ForeignPage(http.server.BaseHTTPRequestHandler):
+    """A page of another program on another port of this host, which stores cookies of its own."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        for cookie in ['state={"a": [1, "b"]}', "é=ü", "a b=c", "=nameless", "paramove_1=x", "half='\""]:
+            self.send_header("Set-Cookie", f"{cookie}; Path=/")
+        for number in range(40):
+            self.send_header("Set-Cookie", f"other_{number}={'v' * 400}; Path=/")
+        self.end_headers()
+        self.wfile.write(b"<p id=there>")
+
+    def log_message(self, format: str, *arguments: object) -> None:
+        """Writes nothing."""
+
+
+def test_cookies_of_another_port_do_not_keep_the_stop_from_the_bus(run: Run, browser: Browser) -> None:
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), ForeignPage) as foreign:
+        threading.Thread(target=foreign.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{foreign.server_port}/"
+        browser.open(address)
+        browser.until("document.getElementById('there') !== null", "the other program's page is there")
+        stored = browser.call("Network.getCookies", urls=[address])["cookies"]
+        assert sum(len(one["value"]) for one in stored) > 16000
+        opened(browser, run)
+        browser.open(f"http://127.0.0.1:{run.page.port}/")
+        browser.until("document.getElementById('gate-state')?.textContent === 'armed'", "it opens again without a link")
+        browser.click("#stop")
+        browser.until("document.getElementById('gate-state').textContent === 'hold'", "the gate holds")
+        foreign.shutdown()
 
 
 def test_a_stop_that_nobody_confirms_is_not_shown_as_one(run: Run, browser: Browser) -> None:

@@ -98,6 +98,33 @@ def test_the_cookie_is_strict_and_the_link_works_once(page: PageServer, tmp_path
     assert b'content=""' in other.get("/")[2], "the key is given with the token only"
 
 
+@pytest.mark.parametrize("foreign", ['state={"a": [1]}; é=\xff', "; ".join(f"o{n}={'v' * 300}" for n in range(180))])
+def test_cookies_of_other_ports_keep_nobody_from_the_page_and_its_stop(page: PageServer, foreign: str) -> None:
+    visitor = Visitor(page.port, foreign)
+    visitor.open_link(page.link)
+    cookies = f"{foreign}; {visitor.cookie}"
+    for target in ("/", "/page.js"):
+        assert visitor.get(target, Cookie=cookies)[0] == 200
+    head = f"GET /live?key={visitor.key} HTTP/1.1\r\nHost: {visitor.host}\r\nOrigin: http://{visitor.host}\r\n"
+    head += f"Cookie: {cookies}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+    with socket.create_connection(("127.0.0.1", page.port), WAIT_S) as live:
+        live.sendall(f"{head}Sec-WebSocket-Key: {'A' * 22}==\r\n\r\n".encode("latin-1"))
+        assert b" 101 " in live.recv(65536)
+        live.sendall(b"\x81\x84\0\0\0\0stop")
+        assert pressed(page)
+
+
+def test_pages_on_two_ports_have_cookies_of_their_own(page: PageServer, visitor: Visitor, tmp_path: Path) -> None:
+    (tmp_path / "second").mkdir()
+    with PageServer(tmp_path / "second") as second:
+        other = Visitor(second.port, visitor.cookie)
+        other.open_link(second.link)
+        both = {one.partition("=")[0]: one for one in (visitor.cookie, other.cookie)}
+        assert len(both) == 2
+        for one in (visitor, other):
+            assert one.get("/", Cookie="; ".join(both.values()))[0] == 200
+
+
 def test_without_the_link_nothing_is_shown(page: PageServer) -> None:
     stranger = Visitor(page.port)
     for target in ("/", "/page.js", "/live", "/live_page.json", "/../../etc/passwd", "/?token=", "/?token=x"):
@@ -117,7 +144,6 @@ def test_a_foreign_page_gets_no_socket(page: PageServer, visitor: Visitor) -> No
     for origin in ("http://evil.example", f"https://{visitor.host}", "http://127.0.0.1:1", "null"):
         assert status_of_socket(visitor, origin=origin) == 403
     assert status_of_socket(visitor, origin=None) == 403
-    assert status_of_socket(visitor, additional_headers={}) == 403
     assert status_of_socket(Visitor(visitor.port, visitor.cookie, "wrong")) == 403
     assert not page.watched
 

@@ -6,8 +6,9 @@ request must
 1. be a GET for a host name of ours (against DNS rebinding: a foreign name that was made to point here),
 2. carry the link's token, good for one use, or the session cookie that it was exchanged for,
 3. name a route exactly; nothing is looked up in the file system, so there is no path to climb,
-4. for the socket, come from the page itself (`Origin` exactly ours) and carry the key that only the page was given:
-   cookies are shared by all ports of a host, the key is not.
+4. for the socket, come from the page itself (`Origin` exactly ours) and carry the key that only the page was given.
+   A cookie does not count there: all ports of a host share their cookies and one limit of them, and a browser that
+   dropped ours for another program's must still be able to stop the arm.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ import hmac
 import http
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 SOCKET = "/live"
@@ -108,29 +108,26 @@ class Access:
         parameters = parse_qs(query, max_num_fields=4) if query.count("&") < 4 else {}
         if path == PAGE and _same(parameters.get("token", [""])[0], self.secrets.token):
             return Verdict(Kind.PAGE, by_token=True)
-        if not self._has_session(found):
-            return _refused(FORBIDDEN, WITHOUT_LINK)
         if path == SOCKET:
             return self._socket(found, parameters.get("key", [""])[0])
+        if not self._has_session(found):
+            return _refused(FORBIDDEN, WITHOUT_LINK)
         if path == PAGE:
             return Verdict(Kind.PAGE)
         name = path.removeprefix("/")
         return Verdict(Kind.FILE, file=name) if name in self.files else _refused(NOT_FOUND, "There is nothing here.")
 
     def _has_session(self, headers: dict[str, list[str]]) -> bool:
-        cookies: SimpleCookie = SimpleCookie()
-        try:
-            cookies.load("; ".join(headers.get("cookie", ())))
-        except CookieError:
-            return False
-        return self.cookie in cookies and _same(cookies[self.cookie].value, self.secrets.session)
+        """Whether any cookie is ours; what other programs of this host store is split, never parsed."""
+        pairs = (one.strip().partition("=") for line in headers.get("cookie", ()) for one in line.split(";"))
+        return any(name == self.cookie and _same(value, self.secrets.session) for name, _, value in pairs)
 
     def _socket(self, headers: dict[str, list[str]], key: str) -> Verdict:
         origins = headers.get("origin", [])
-        if origins != [f"http://{headers['host'][0]}"]:
-            return _refused(FORBIDDEN, "Only the page itself may open the socket.")
         if not _same(key, self.secrets.key):
             return _refused(FORBIDDEN, WITHOUT_LINK)
+        if origins != [f"http://{headers['host'][0]}"]:
+            return _refused(FORBIDDEN, "Only the page itself may open the socket.")
         return Verdict(Kind.SOCKET)
 
 

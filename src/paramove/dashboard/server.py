@@ -22,6 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from websockets import http11
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
@@ -32,6 +33,9 @@ from paramove.dashboard.link_file import LinkFile
 
 _log = logging.getLogger(__name__)
 
+http11.MAX_LINE_LENGTH, http11.MAX_NUM_HEADERS = 65536, 32
+"""Bytes of a line, and lines, of a request's head. A browser sends less than 20 lines; one of them holds the cookies of
+all ports of this host, which are easily more than the library's 8192 bytes."""
 ADDRESS = "127.0.0.1"
 MAX_BROWSERS = 16
 MAX_CONNECTIONS = 64
