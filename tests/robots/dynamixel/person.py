@@ -8,7 +8,7 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 from paramove.robots.dynamixel.driven_arm import DrivenArm
 
-PATIENT_S = 20.0
+PATIENT_S = 120.0
 
 
 class Person:

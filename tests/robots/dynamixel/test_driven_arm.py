@@ -28,6 +28,7 @@ from paramove.robots.dynamixel.servo_port import ServoPort
 from paramove.robots.dynamixel.stop_inputs import StopInputs
 from paramove.robots.dynamixel.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
+from tests.robots.dynamixel.untrue_replies import OneElsewhere
 
 SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
@@ -152,6 +153,16 @@ def test_an_arm_that_is_not_heard_says_its_safety_no_oftener_than_the_topic_allo
         select.select([person.arm.readable], [], [], 0.1)
         stamps += [now_ns for topic, _, now_ns in person.arm.said() if topic is topics.ARM_SAFETY]
     assert min(np.diff(stamps)) >= SLOW_NS
+
+
+def test_a_joint_that_jumps_stops_the_arm_and_its_angle_is_not_published(person):
+    person.arms_and_waits()
+    person.moves()
+    person.emulator.faults = OneElsewhere(15, 2100)
+    person.waits_for("HOLD")
+    assert person.codes() == [("joint_jumped", ROBOT.joint_names[4])]
+    assert "servo 15 (gripper) jumped by 184.6 deg" in person.safety.faults[0].sentence
+    assert np.abs(np.diff(person.angles, axis=0)).max() < 0.2
 
 
 def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):

@@ -1,6 +1,7 @@
 """The servos of an arm: what keeps them from holding, that nothing moves when they begin to, and what is noticed."""
 
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -164,13 +165,13 @@ def test_an_adapter_that_keeps_answers_for_16_ms_is_told_with_time_and_remedy(em
 
 
 def test_servos_that_stopped_by_themselves_are_told_take_no_goal_and_hold_again_when_armed(emulator, port):
-    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=0.1))
+    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=1.0))
     assert arm.take_hold() == ()
     while memory(emulator, "Bus Watchdog") != [0xFF] * 3:  # nobody asks them anything
         pass
     fault = arm.look_after_watchdogs()
     assert (fault.code, fault.joint) == ("watchdog_tripped", "pan")
-    assert "servo 1 (pan) has stopped by itself, for it heard nothing for 100 ms" in fault.sentence
+    assert "servo 1 (pan) has stopped by itself, for it heard nothing for 1000 ms" in fault.sentence
     assert fault.sentence.endswith("arm again, which clears its watchdog")
     goal = XL430_W250.registers["Goal Position"]
     with pytest.raises(
@@ -206,16 +207,20 @@ def test_a_joint_that_falls_silent_is_named_and_keeps_its_last_position(arm, emu
 def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port):
     arm.measured()
     port.latency_s = 0.03
-    for place, told in ((0, "servo 1 (pan) for"), (1, "servo 1 (pan), servo 2 (lift) for")):
+
+    def told(words):
+        """The fault that begins so: a pause of the machine may make others silent for a while."""
+        until_s = time.monotonic() + 60.0
+        while (fault := arm.fault_of_answers(arm.measured())) is None or not fault.sentence.startswith(words):
+            assert time.monotonic() < until_s, fault
+        return fault
+
+    for place, who in ((0, "servo 1 (pan) for"), (1, "servo 1 (pan), servo 2 (lift) for")):
         change(emulator, place, "ID", 9 + place)
-        for _ in range(3):
-            fault = arm.fault_of_answers(arm.measured())
-        assert fault.sentence.startswith(f"nothing was heard of {told}")
+        told(f"nothing was heard of {who}")
     change(emulator, 2, "ID", 19)
-    arm.measured()
-    fault = arm.fault_of_answers(arm.measured())
+    fault = told("nothing was heard of any servo for")
     assert (fault.code, fault.joint) == ("joint_silent", "")
-    assert fault.sentence.startswith("nothing was heard of any servo for")
     assert fault.sentence.endswith("check cables and the motors' power")
 
 
@@ -266,10 +271,9 @@ def test_low_voltage_is_warned_of_and_too_low_a_one_is_a_fault(arm, emulator):
     assert arm.look_after_supply().code == "servo_voltage"
 
 
-@pytest.mark.parametrize(("share", "latency_s", "noisy"), [(0.01, 0.1, False), (0.3, 0.002, True)])
-def test_one_damaged_answer_in_a_hundred_is_no_matter_and_many_are_a_fault(
-    arm, emulator, port, share, latency_s, noisy
-):
+@pytest.mark.parametrize(("share", "latency_s", "noisy"), [(0.01, 0.1, False), (0.3, 0.01, True)])
+def test_one_damaged_answer_in_a_hundred_is_no_matter_and_many_are_a_fault(emulator, port, share, latency_s, noisy):
+    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(silent_s=60.0))
     arm.measured()
     port.latency_s = latency_s
     emulator.faults = WireFaults(damaged=share, seed=5)
@@ -313,6 +317,33 @@ def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_i
     arm.command(np.array([1000, 2000, 4090], dtype=np.int16))
     arm.measured()
     assert memory(emulator, "Goal Position")[2] == 4090 - 4096
+
+
+def test_a_servo_that_loses_a_turn_and_its_torque_while_it_holds_is_where_it_was(emulator, port):
+    across = JointCalibration(
+        id=3, model="xl330_m288", firmware=46, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
+        min_counts=3000, max_counts=5200,
+    )  # fmt: skip
+    with emulator.lock:
+        servo = emulator.bus.servos[2]
+        servo.preset("Operating Mode", 4)
+        servo.turned(4196.0)
+    arm = ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S)
+    assert arm.measured().counts[2] == 4196
+    assert arm.take_hold() == ()
+    with emulator.lock:
+        servo.reboot()
+    while not servo.listens:
+        pass
+    reading = arm.measured()  # a turn less, and it should hold
+    assert reading.counts[2] == 4196
+    assert arm.fault_of_answers(reading).code == "joint_jumped"
+    assert arm.look_after().code == "torque_lost"
+    assert arm.check() == ()
+    assert arm.measured().counts[2] == 4196
+    assert arm.take_hold() == ()
+    assert memory(emulator, "Goal Position")[2] == 100
+    assert arm.measured().counts[2] == 4196
 
 
 def test_a_pulled_plug_is_told(arm, emulator):

@@ -18,6 +18,7 @@ from paramove.robots.dynamixel.arm_calibration import (
 from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
 from paramove.robots.dynamixel.bus_scan import FoundServo, looked_at
 from paramove.robots.dynamixel.calibration_sweep import SMALLEST_MOVE, JointSweep, calibrated_joint, remarks
+from paramove.robots.dynamixel.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.servo_settings import write_settings
@@ -49,7 +50,7 @@ class ArmCalibrator:
 
     def __init__(self, chain: ServoChain, plan: ArmPlan, serial: str, person: Person) -> None:
         self._chain, self._plan, self._serial, self._person = chain, plan, serial, person
-        self._position = model_named(plan.servos[0].model).registers["Present Position"]
+        self._watch = PositionWatch({servo.number: model_named(servo.model) for servo in plan.servos})
         self._silent = 0
 
     def run(self, created: str, tool: str) -> ArmCalibration:
@@ -102,14 +103,17 @@ class ArmCalibrator:
                     self._chain.write(servo.number, registers[name], 0)
 
     def _positions(self) -> dict[int, int]:
-        """Of all servos; of those alone that answered while an answer is missing now and then."""
+        """Of all servos; of those alone that answered while an answer is missing now and then, or cannot be true."""
         numbers = [servo.number for servo in self._plan.servos]
-        answers = self._chain.sync_read(numbers, [self._position])
+        answers = self._watch.read(self._chain)
+        while self._watch.jump is not None:  # a true position can be after a while, however fast the joint was moved
+            self._watch.jump = None
+            answers |= self._watch.read(self._chain)
         self._silent = 0 if len(answers) == len(numbers) else self._silent + 1
         if self._silent > GIVES_UP:
             missing = next(number for number in numbers if number not in answers)
             raise ServoSilentError(missing, f"servo {missing} no longer answers: check its cable and its power")
-        return {number: answer.values["Present Position"] for number, answer in answers.items()}
+        return {number: answer.values[POSITION] for number, answer in answers.items()}
 
     def _all_positions(self) -> dict[int, int]:
         positions = self._positions()

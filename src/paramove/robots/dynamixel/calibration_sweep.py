@@ -22,6 +22,7 @@ from paramove.robots.dynamixel.arm_calibration import (
 )
 from paramove.robots.dynamixel.arm_plan import PlannedServo
 from paramove.robots.dynamixel.bus_scan import FoundServo
+from paramove.robots.dynamixel.position_watch import difference
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN
 
 LARGEST_STEP = PULSES_PER_TURN // 4
@@ -34,11 +35,6 @@ SHOWN_TOLERANCE = float(np.deg2rad(3.0))
 """By which the travel that was shown may fall short of the described range without a remark."""
 LEAST_SHARE = 0.5
 """Of the described range that must lie in the travel: less, and posture or direction were not as described."""
-
-
-def difference(later: int, earlier: int) -> int:
-    """Counts from one position to another by the shorter way, -2048 to 2047."""
-    return (later - earlier + PULSES_PER_TURN // 2) % PULSES_PER_TURN - PULSES_PER_TURN // 2
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 
@@ -27,6 +28,7 @@ class LimpArm:
         self._chain = chain
         self._joints, self._numbers = description.joint_names, description.servo_ids
         self._models = [model_named(motor) for motor in description.motors]
+        self._watch = PositionWatch(dict(zip(self._numbers, self._models, strict=True)))
         self._units = description.units
         middle = 0.5 * (description.units.lower + description.units.upper)
         self._middle = self._units.zero_counts + self._units.counts_per_rad * middle
@@ -46,20 +48,21 @@ class LimpArm:
         return ()
 
     def measured(self) -> tuple[int, NDArray[np.float64]] | None:
-        """When, ns of the monotonic clock, and the angles of all joints, [J], rad; None while an answer is missing.
+        """When, ns of the monotonic clock, and the angles of all joints, [J], rad.
+
+        None while an answer is missing, or says what cannot be true.
 
         Raises:
             ServoSilentError: A servo has not answered for long.
         """
-        register = self._models[0].registers["Present Position"]  # at one address in all models
-        answers = self._chain.sync_read(list(self._numbers), [register])
+        answers = self._watch.read(self._chain)
         missing = [number for number in self._numbers if number not in answers]
         self._silent = self._silent + 1 if missing else 0
         if self._silent > GIVES_UP:
             raise ServoSilentError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
         if missing:
             return None
-        positions = np.array([answers[number].values["Present Position"] for number in self._numbers], dtype=np.float64)
+        positions = np.array([answers[number].values[POSITION] for number in self._numbers], dtype=np.float64)
         # A servo in the extended mode may begin in another turn.
         counts = positions - PULSES_PER_TURN * np.round((positions - self._middle) / PULSES_PER_TURN)
         at_ns = max(answers[number].at_ns for number in self._numbers)

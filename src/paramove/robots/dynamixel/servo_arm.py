@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.input_error import InputError
+from paramove.robots.dynamixel.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.servo_chain import Answered, ServoChain, ServoError
 from paramove.robots.dynamixel.servo_checks import (
     ENDS,
@@ -107,6 +108,7 @@ class ServoArm:
         self._turns = [0 for _ in servos]
         self._numbers = [servo.number for servo in servos]
         self._registers = servos[0].model.registers  # those used here have one address in all models
+        self._watch = PositionWatch({servo.number: servo.model for servo in servos})
         self._noise_mark = (0, 0)
         self._noise = ""
 
@@ -115,7 +117,8 @@ class ServoArm:
         faults = arming_faults(self.servos, self._chain)
         if faults:
             return faults
-        fault = bus_fault(self.measured, self._patience.read_s or self._period_s)
+        self._watch.jump = None
+        fault = bus_fault(self.measured, self._patience.read_s or self._period_s) or self._fault_of_jump()
         return () if fault is None else (fault,)
 
     def take_hold(self) -> tuple[Fault, ...]:
@@ -124,24 +127,28 @@ class ServoArm:
         Returns:
             Why it did not work; then what had no torque before has none again.
         """
-        faults, limp = [], []
+        faults, limp, turns = [], [], []
         for servo in self.servos:
             try:
-                if not self._chain.read(servo.number, self._registers["Torque Enable"]):
+                torque = bool(self._chain.read(servo.number, self._registers["Torque Enable"]))
+                if not torque:
                     limp.append(servo)
-                self._hold(servo)
+                turns.append(servo.turns(self._hold(servo, torque)))
             except ServoError as error:
                 faults.append(Fault("servo_refused", servo.joint, f"{servo.joint} cannot hold: {error}"))
         if faults:
             self._release(limp)
             return tuple(faults)
-        self.holds = True
+        self.holds, self._turns = True, turns
+        for health in self.health.values():
+            health.torque = True
         return ()
 
-    def _hold(self, servo: JointServo) -> None:
+    def _hold(self, servo: JointServo, torque: bool) -> int:
+        """The goal, which is the present position. Raises ServoError."""
         number, registers = servo.number, self._registers
         self._chain.write(number, registers["Bus Watchdog"], 0)  # a tripped one keeps the goals locked
-        goal = self._chain.read(number, registers["Present Position"])
+        goal = self._position(number, torque)
         self._chain.write(number, registers["Goal Position"], goal)
         if (found := self._chain.read(number, registers["Goal Position"])) != goal:
             raise ServoError(number, f"servo {number} was told the goal {goal} and has {found}: reboot it")
@@ -154,6 +161,16 @@ class ServoArm:
         if not self._chain.read(number, registers["Torque Enable"]):
             raise ServoError(number, f"servo {number} was told to hold and does not: reboot it")
         self._chain.write(number, registers["Bus Watchdog"], round(self._patience.watchdog_s / WATCHDOG_UNIT_S))
+        return goal
+
+    def _position(self, number: int, torque: bool) -> int:
+        """Where a servo stands, as patiently as other numbers are read. Raises ServoError."""
+        asked_ns = time.monotonic_ns()
+        position = self._chain.read(number, self._registers[POSITION])
+        self._watch.jump = None
+        if not self._watch.accepts(number, position, (asked_ns, time.monotonic_ns()), torque=torque):
+            raise ServoError(number, f"servo {number} {self._watch.jump}: check cable, plugs and supply, and arm again")
+        return position
 
     def let_go(self, torque_off: bool) -> tuple[str, ...]:
         """The last word to every servo, each on its own: no watchdog any more and, if asked for, no torque.
@@ -184,8 +201,13 @@ class ServoArm:
         self._chain.sync_write(self._registers["Goal Position"], goals)
 
     def measured(self) -> ArmReading | None:
-        """Where the joints are; None until all were heard once. One that does not answer keeps its last position."""
-        answers = self._read("Present Position")
+        """Where the joints are; None until all were heard once.
+
+        One that does not answer, or with a position that cannot be true, keeps its last one.
+        """
+        # One that has lost its torque has been rebooted, and may have begun in another turn.
+        held = {one.number for one in self.servos if self.holds and self.health[one.joint].torque is not False}
+        answers = self._watch.read(self._chain, held) if self._chain.has_room() else {}
         for servo in self.servos:
             if servo.number in answers:
                 self.health[servo.joint].answers = answers[servo.number]
@@ -194,9 +216,10 @@ class ServoArm:
         if len(known) < len(newest):
             return None
         now_ns = time.monotonic_ns()
-        positions = [answer.values["Present Position"] for answer in known]
-        if not self.holds:  # while it holds, they stay the same
-            self._turns = [servo.turns(place) for servo, place in zip(self.servos, positions, strict=True)]
+        positions = [answer.values[POSITION] for answer in known]
+        for joint, (servo, place) in enumerate(zip(self.servos, positions, strict=True)):
+            if servo.number not in held:  # while it holds, they stay the same
+                self._turns[joint] = servo.turns(place)
         counts = np.array(positions) - PULSES_PER_TURN * np.array(self._turns)
         return ArmReading(
             at_ns=max(answer.at_ns for answer in known),
@@ -205,7 +228,9 @@ class ServoArm:
         )
 
     def fault_of_answers(self, reading: ArmReading) -> Fault | None:
-        """Joints that are silent for too long, or a wire that damages too much."""
+        """A joint that jumped, joints that are silent for too long, or a wire that damages too much."""
+        if self._watch.jump is not None:
+            return self._fault_of_jump()
         allowed_s = self._patience.silent_s
         late = [self.servos[place] for place in np.flatnonzero(reading.ages_s > allowed_s)]
         if not late:
@@ -217,6 +242,17 @@ class ServoArm:
             f"nothing was heard of {names} for {silent_ms:.0f} ms, allowed {1e3 * allowed_s:.0f} ms: check {remedy}"
         )
         return Fault("joint_silent", late[0].joint if len(late) == 1 else "", sentence)
+
+    def _fault_of_jump(self) -> Fault | None:
+        jump, self._watch.jump = self._watch.jump, None
+        if jump is None:
+            return None
+        servo = self.servos[self._numbers.index(jump.number)]
+        sentence = (
+            f"{servo} {jump}, so that this reply is rejected: check cable, plugs and supply; two servos may have one "
+            "ID, or another program talks on the bus"
+        )
+        return Fault("joint_jumped", servo.joint, sentence)
 
     def _fault_of_noise(self) -> Fault | None:
         counts = self._chain.counts

@@ -79,11 +79,12 @@ class Answered:
     Attributes:
         values: Numbers.
         alert: Whether the servo has a hardware error (register 70).
-        at_ns: When the answer was complete, of the monotonic clock.
+        asked_ns, at_ns: When it was asked, and when the answer was complete, of the monotonic clock.
     """
 
     values: dict[str, int]
     alert: bool
+    asked_ns: int
     at_ns: int
 
 
@@ -204,11 +205,10 @@ class ServoChain:
         """As `sync_read`, but nobody is asked twice."""
         address = min(one.address for one in registers)
         size = max(one.address + one.size for one in registers) - address
-        found = {}
+        found, asked_ns = {}, time.monotonic_ns()
         for number, packet in self._read(numbers, address, size).items():
-            if packet.parameters[0] & ~ALERT == 0:
-                alert = bool(packet.parameters[0] & ALERT)
-                found[number] = Answered(_values(registers, packet), alert, time.monotonic_ns())
+            if (error := packet.parameters[0]) in (0, ALERT):
+                found[number] = Answered(_values(registers, packet), error == ALERT, asked_ns, time.monotonic_ns())
         return found
 
     def sync_write(self, register: Register, values: dict[int, int]) -> None:
