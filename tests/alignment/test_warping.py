@@ -52,6 +52,16 @@ def test_movement_distance_is_the_offset_of_shifted_points() -> None:
     assert_allclose(movement_distance(movement, shifted), 0.03, rtol=1e-9, atol=0.0)
 
 
+def test_movement_distance_leaves_out_15_percent_at_both_ends() -> None:
+    movement = np.tile(np.outer(np.arange(100.0), [1.0, 0.0, 0.0]), 7)
+    aside = np.full(100, 0.03)
+    aside[[15, 84]], aside[:15], aside[85:] = 0.06, 0.5, 0.5
+    other = movement + np.tile(np.outer(aside, [0.0, 0.0, 1.0]), 7)
+    inner = np.sqrt((68 * 0.03**2 + 2 * 0.06**2) / 70)
+    assert_allclose(movement_distance(movement, other), inner, rtol=1e-9, atol=0.0)
+    assert_allclose(movement_distance(movement, other, cut=0.0), np.sqrt((aside**2).mean()), rtol=1e-9, atol=0.0)
+
+
 @PROPERTY
 @given(st.integers(0, 2**31), st.integers(1, 40), st.integers(1, 40), st.integers(1, 9))
 def test_pattern_a_measures_both_ways_alike(seed: int, n_first: int, n_second: int, dim: int) -> None:

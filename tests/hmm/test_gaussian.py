@@ -227,6 +227,24 @@ def test_outputs_that_underflow_in_every_frame_still_have_a_likelihood(topology:
     assert_allclose(ours.sum(axis=1), 1.0, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("likelier_by", [600.0, 699.5, 1250.0])
+def test_the_only_predecessor_may_have_underflowed(likelier_by: float) -> None:
+    """State 1 precedes state 2 alone, and is so unlikely in its frame that its share of alpha, or its product, is 0."""
+    means = np.array([[0.0], [np.sqrt(2.0 * likelier_by)], [100.0]])
+    transitions = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 - 1e-6, 1e-6], [0.0, 0.0, 1.0]])
+    parameters = ChainParameters(
+        np.array([0.5, 0.5, 0.0]), transitions, np.zeros(3), means, np.tile(np.eye(1), (3, 1, 1))
+    )
+    model = GaussianHMM(3, topology="ergodic").with_parameters(parameters)
+    sequence = np.array([[0.0], [100.0], [100.0]])
+    value, gamma, xi, _ = forward_backward(chain_of(parameters), sequence, finish=False)
+    np.testing.assert_array_equal(gamma.argmax(axis=1), [1, 2, 2])
+    assert_allclose(model.log_likelihood(sequence), value, rtol=1e-12, atol=0.0)
+    assert_allclose(model.responsibilities(sequence), gamma, rtol=0.0, atol=1e-9)
+    _, _, found = model._ready().expectation(model._stacked(sequence))
+    assert_allclose(found.transitions, xi, rtol=0.0, atol=1e-9)
+
+
 def test_random_initialisation_is_repeated_by_its_seed() -> None:
     sequences = movements(2, [40, 44, 48])
     first, again, other = (

@@ -48,6 +48,21 @@ def test_truth_projects_onto_the_arm(studio, view):
     assert 700 < mask.sum() < 12000
 
 
+def test_a_tracker_sees_the_person_as_measured_and_the_cameras_as_calibrated(studio, tmp_path):
+    clip, truth, person = studio.clip(tmp_path), studio.truth(), studio.performance.person
+    for name in ("upper_arm", "forearm", "hand"):
+        seen, true = getattr(clip.sizes, name), getattr(truth.sizes, name)
+        assert seen != true
+        assert (seen, true) == (getattr(person.measured, name), getattr(person.sizes, name))
+    np.testing.assert_array_equal(clip.shoulder, person.measured_shoulder)
+    np.testing.assert_array_equal(truth.shoulder, person.shoulder)
+    assert (clip.shoulder != truth.shoulder).all()
+    assert (clip.cameras, truth.cameras) == (studio.calibrated, studio.cameras)
+    assert all(
+        (a.camera_from_world != b.camera_from_world).any() for a, b in zip(clip.cameras, truth.cameras, strict=True)
+    )
+
+
 def test_the_same_number_gives_the_same_images(studio):
     again = Studio(perform(kind_named("pointing"), 1))
     try:

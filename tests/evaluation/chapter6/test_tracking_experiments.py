@@ -1,6 +1,7 @@
 """Which tracks there are, under which name their results are kept, and that a clip is tracked from its images alone."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from paramove.action_space.placement import PersonPlacement
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from paramove.evaluation.chapter6 import experiments
 from paramove.evaluation.chapter6.actions import EYE, FAR_ORIGIN, far_place
-from paramove.evaluation.chapter6.clips import Clip, Truth, read_clip, write_clip
+from paramove.evaluation.chapter6.clips import TRUE_CAMERAS, Clip, Truth, read_clip, write_clip
 from paramove.evaluation.chapter6.experiments import ClipsMissingError, Piece, Selection, pieces, tracked_ways
 from paramove.evaluation.chapter6.measures import Track
 from paramove.evaluation.chapter6.performances import KINDS, Act, kind_named
@@ -18,7 +19,7 @@ from paramove.evaluation.chapter6.vocabularies import ACTIONS, knowledge_of, on_
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera
+from paramove.observation.cameras import CalibratedCamera, write_cameras
 from tests.evaluation.chapter6.made_up_tracks import act, true_hand
 
 FRAMES = 12
@@ -87,20 +88,26 @@ def test_a_clip_is_tracked_from_its_images_and_kept_as_json(root):
     assert again == found, "the same piece gives the same result"
 
 
-def test_truth_is_not_read_before_the_tracker_has_ended(root, monkeypatch):
+def test_the_tracker_is_given_nothing_that_is_true(root):
+    """Whatever the truth says of the body, where it sits, the cameras and the movement: the beliefs are the same."""
     piece = Piece(root / "pointing_00", "pointing", 0, (1,))
     expected = piece.run()
-    moved = dict(np.load(root / "pointing_00" / "truth.npz"))
-    moved["poses"] = moved["poses"] + 0.5
     folder = root / "moved"
     folder.mkdir()
     for file in (root / "pointing_00").iterdir():
         (folder / file.name).write_bytes(file.read_bytes())
+    moved = {
+        key: value * 1.3 + 0.5 if value.dtype.kind == "f" else value
+        for key, value in np.load(folder / "truth.npz").items()
+    }
     np.savez_compressed(folder / "truth.npz", **moved)
+    write_cameras(folder / TRUE_CAMERAS, tuple(replace(one, matrix=one.matrix * (2, 1, 1)) for one in CAMERAS))
     found = Piece(folder, "pointing", 0, (1,)).run()
-    assert found["values"]["poses"] == expected["values"]["poses"]
+    assert read_clip(folder).truth.sizes.forearm > 1.3 * ArmSizes().forearm
     assert found["truth"] != expected["truth"]
-    assert found["sight"]["focal_px"] == 340.0
+    assert (expected["sight"]["focal_px"], found["sight"]["focal_px"]) == (340.0, 680.0)
+    del found["values"]["seconds"], expected["values"]["seconds"]
+    assert found["values"] == expected["values"]
 
 
 def test_the_page_shows_images_of_the_clip_and_the_worst_depth(root, tmp_path):

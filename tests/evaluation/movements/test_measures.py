@@ -25,6 +25,16 @@ def test_a_shift_of_all_points_is_seen_by_every_measure() -> None:
     assert errors["dtw"] <= errors["rms"] + 1e-9
 
 
+def test_the_cut_leaves_out_15_percent_at_both_ends() -> None:
+    aside = np.zeros((100, 6))
+    aside[:15, 2] = aside[85:, 2] = 0.02
+    errors = synthesis_errors(100.0 * path() + aside, 100.0 * path(), tip=1)  # so fast that nothing is warped
+    assert errors["dtw"] == pytest.approx(2.0 * np.sqrt(0.3 / 2.0))
+    assert errors["dtw_cut"] == 0.0
+    aside[15, 2] = 0.02
+    assert synthesis_errors(100.0 * path() + aside, 100.0 * path(), tip=1)["dtw_cut"] > 0.0
+
+
 def test_warping_forgives_another_pace() -> None:
     slow = path()[np.round(99 * np.linspace(0, 1, 100) ** 2).astype(int)]
     errors = synthesis_errors(slow, path(), tip=1)
