@@ -55,7 +55,7 @@ Wait = Callable[..., Any]
 def wait() -> Wait:
     """`wait(condition, *also)` calls everything again and again until `condition()` is true; returns what it gave."""
 
-    def until(condition: Callable[[], Any], *also: Callable[[], Any], seconds: float = 10.0) -> Any:
+    def until(condition: Callable[[], Any], *also: Callable[[], Any], seconds: float = 60.0) -> Any:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             for call in also:

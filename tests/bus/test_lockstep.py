@@ -40,7 +40,7 @@ class Members:
         for process in self.processes.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGTERM)
-        return [process.wait(20) for process in self.processes.values()]
+        return [process.wait(60) for process in self.processes.values()]
 
 
 @pytest.fixture

@@ -44,7 +44,7 @@ def test_a_speaker_killed_again_and_again_is_replaced_and_no_loss_is_counted(
             wait(
                 lambda start=start: subscriber.receive() is None and subscriber.counter.messages == 50 * start,
                 subscriber.revive,
-                seconds=30,
+                seconds=120,
             )
             process.kill()
     counter = subscriber.counter

@@ -112,7 +112,7 @@ def running(folder, keys):
 
     thread = threading.Thread(target=drive)
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(60)
     yield made[1]
     made[0].stop()
     thread.join()

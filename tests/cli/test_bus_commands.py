@@ -57,7 +57,7 @@ def speaking(run: Run) -> Iterator[Path]:
 
     thread = threading.Thread(target=speak)
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(60)
     yield folder
     made[0].stop()
     thread.join()

@@ -128,7 +128,7 @@ def run(line):
 
 def comes_true(condition):
     """The emulator may act after the program that asked it has ended."""
-    end_s = time.monotonic() + 20.0
+    end_s = time.monotonic() + 60.0
     while not condition() and time.monotonic() < end_s:
         threading.Event().wait(0.01)
     return condition()

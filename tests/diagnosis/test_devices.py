@@ -65,6 +65,11 @@ def test_a_device_of_a_group_needs_the_group(tmp_path):
     assert "udevadm" in reload
 
 
+def test_a_device_that_went_away_meanwhile_is_to_be_plugged_in_again(terminal):
+    (remedy,) = access_remedy(terminal.with_name("no_such"), "dialout", "ttyUSB*")
+    assert "plug it in again" in remedy
+
+
 def test_what_this_user_may_read_and_write_can_be_used(terminal):
     assert stat.S_ISCHR(terminal.stat().st_mode)
     assert may_use(terminal)

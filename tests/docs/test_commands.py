@@ -34,7 +34,7 @@ from tests.robots.dynamixel.small_arm import LINK
 BLOCKS = [block for path in PAGES for block in blocks(path)]
 
 
-def run(command, seconds=60.0):
+def run(command, seconds=180.0):
     return subprocess.run(
         command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=seconds, check=False
     )
@@ -80,7 +80,7 @@ def demo(tmp_path_factory):
         yield
     finally:
         launch.send_signal(signal.SIGINT)
-        launch.wait(30)
+        launch.wait(120)
 
 
 @pytest.mark.slow

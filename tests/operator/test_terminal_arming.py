@@ -43,7 +43,7 @@ def gate(folder, before, *answers):
 
     thread = threading.Thread(target=drive)
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(60)
     yield heard
     made[0].stop()
     thread.join()

@@ -44,7 +44,7 @@ def gate(folder, answers=True):
 
     thread = threading.Thread(target=drive)
     thread.start()
-    assert ready.wait(10)
+    assert ready.wait(60)
     yield heard
     made[0].stop()
     thread.join()

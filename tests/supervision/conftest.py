@@ -19,7 +19,7 @@ from paramove.supervision.launch_file import load
 from paramove.supervision.view import LineView
 
 NODES = Path(__file__).parent / "nodes"
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 
 
 def until(condition, what):

@@ -123,7 +123,7 @@ def server(workspace):
 
 def connected():
     client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    client.settimeout(10)
+    client.settimeout(60)
     client.connect(str(Path(os.environ["XDG_RUNTIME_DIR"]) / "control"))
     return client
 

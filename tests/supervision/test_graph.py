@@ -161,12 +161,12 @@ def test_running_nodes_are_drawn_with_measured_rates():
     thread = threading.Thread(target=speak)
     thread.start()
     try:
-        assert ready.wait(30)
+        assert ready.wait(60)
         found = running_graph(folder, "default", 0.2)
         text = invoke("--live").stdout
     finally:
         made[0].stop()
-        thread.join(30)
+        thread.join(60)
     assert found.nodes == {"recognizer": "ready"}
     assert [edge.topic for edge in found.unsaid] == ["objects/tracked"]
     assert "domain default: 1 nodes, 2 topics" in text

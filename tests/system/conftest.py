@@ -28,7 +28,7 @@ class Launcher:
         self.started.append(subprocess.Popen(command, cwd=ROOT, env=self.environment, **options))
         return self.started[-1]
 
-    def run(self, *arguments, timeout_s=120):
+    def run(self, *arguments, timeout_s=300):
         process = self.start(*arguments)
         shown = process.communicate(timeout=timeout_s)[0]
         return process.returncode, shown

@@ -54,14 +54,14 @@ def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tm
             heard(running, "waiting until a person arms the arm (paramove arm enable)")
             assert "ARMED: the arm may move" in typed(ENABLE, environment, said="y\n")
             heard(running, "all 2 tasks are done")
-            assert running.wait(30) == 0
+            assert running.wait(120) == 0
         with launched(launch, environment) as running:
             heard(running, "waiting until a person arms the arm")
             typed(ENABLE, environment, said="y\n")
             heard(running, "task 1 of 2")
             typed(STOP, environment)
             heard(running, "FAILED", "the arm's driver stopped the motion: stopped from the terminal by a person")
-            assert running.wait(30) != 0
+            assert running.wait(120) != 0
 
 
 def test_the_application_reaches_and_carries_an_object_without_an_arm(launcher):
@@ -105,5 +105,5 @@ def mounted(servos, link):
         arm.stdin.flush()
         heard(arm, "plugged in")
         yield
-        arm.communicate(timeout=30)
+        arm.communicate(timeout=120)
         assert arm.returncode == 0

@@ -136,7 +136,7 @@ def test_is_fast_enough_to_be_out_of_the_way() -> None:
         image = scene.image()
     tracker, durations_ms = ColourTracker(), []
     for _ in range(60):
-        start = time.perf_counter()
+        start = time.process_time()  # what other processes take does not count
         tracker.update(image)
-        durations_ms.append(1e3 * (time.perf_counter() - start))
-    assert min(durations_ms) < 3.0  # the least is what the computation needs; the rest is other processes
+        durations_ms.append(1e3 * (time.process_time() - start))
+    assert min(durations_ms) < 3.0

@@ -1,5 +1,5 @@
-import os
 import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +12,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.vision.frame_sources import DeviceFrames, FileFrames, SourceError, TopicFrames, open_source
 from paramove.vision.frames import EndOfFrames, FrameError
+from tests.diagnosis.conftest import HOLD
 
 SECOND = 1_000_000_000
 
@@ -30,7 +31,7 @@ class FakeCapture:
 
     def press(self) -> None:
         self._pressed.release()
-        assert self.taken.acquire(timeout=5)
+        assert self.taken.acquire(timeout=60)
 
     def unplug(self) -> None:
         self._unplugged = True
@@ -42,7 +43,7 @@ class FakeCapture:
     def grab(self) -> bool:
         if self._level:
             self.taken.release()  # the frame before has been stored by now
-        assert self._pressed.acquire(timeout=10)
+        assert self._pressed.acquire(timeout=60)
         return not self._unplugged
 
     def retrieve(self) -> tuple[bool, Any]:
@@ -91,7 +92,7 @@ def test_an_unplugged_device_is_told_within_a_second_and_opened_again() -> None:
     opened[0].press()
     assert source.frame(0) is not None
     opened[0].unplug()
-    assert opened[0].released.wait(timeout=5)
+    assert opened[0].released.wait(timeout=60)
     assert source.frame(SECOND // 2) is None
     with pytest.raises(FrameError, match=r"no frame for 1\.0 s: replug"):
         source.frame(SECOND)
@@ -161,7 +162,7 @@ def test_a_device_that_raises_is_a_silent_one() -> None:
         return opened[-1]
 
     source = DeviceFrames("0", 6, 4, open_capture=open_capture)
-    assert opened[0].released.wait(timeout=5)
+    assert opened[0].released.wait(timeout=60)
     assert source.frame(0) is None
     with pytest.raises(FrameError, match=r"no frame for 1\.0 s: replug") as fault:
         source.frame(SECOND)
@@ -224,15 +225,12 @@ def test_a_device_without_rights_names_the_remedy(tmp_path: Path, monkeypatch: p
 def test_a_busy_device_names_who_holds_it(tmp_path: Path) -> None:
     path = tmp_path / "video0"
     path.touch()
-    with subprocess.Popen(["tail", "-f", str(path)], stdout=subprocess.PIPE) as holder:
-        try:
-            holding = f"/proc/{holder.pid}/fd"
-            while not any(os.path.realpath(entry) == str(path) for entry in Path(holding).iterdir()):
-                assert holder.poll() is None
-            with pytest.raises(SourceError, match=rf"held by tail \(pid {holder.pid}\): end it first"):
-                open_source(f"device:{path}", 480, 360)
-        finally:
-            holder.kill()
+    command, pipe = [sys.executable, "-c", HOLD, str(path)], subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) as holder:
+        assert holder.stdout.readline() == "held\n"
+        with pytest.raises(SourceError, match=rf"held by pid {holder.pid} \(python.*\): end it first"):
+            open_source(f"device:{path}", 480, 360)
+        holder.communicate()
 
 
 def test_a_topic_that_falls_silent_is_told_until_it_speaks_again() -> None:

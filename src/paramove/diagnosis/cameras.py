@@ -36,4 +36,7 @@ def camera_finding(device: Path, name: str) -> Finding:
 def _about(sysfs: Path, device: Path, attribute: str) -> str:
     """A second device of a camera, with index 1, gives data about the images; "" where nothing is said."""
     path = sysfs / "class" / "video4linux" / device.name / attribute
-    return path.read_text(encoding="utf-8", errors="replace").strip() if path.is_file() else ""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:  # it has none, or went away
+        return ""

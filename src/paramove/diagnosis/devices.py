@@ -40,7 +40,10 @@ def access_remedy(device: Path, group: str, kernel_name: str) -> tuple[str, ...]
         group: That such devices usually belong to, for one that belongs to no group of its own.
         kernel_name: Pattern of such devices' names, for a rule of udev.
     """
-    found = device.stat()
+    try:
+        found = device.stat()
+    except FileNotFoundError:
+        return ("plug it in again: it went away just now",)
     name = _group_name(found.st_gid)
     if stat.S_IMODE(found.st_mode) & GROUP_MAY != GROUP_MAY or not name or found.st_gid == 0:
         rule = f'KERNEL=="{kernel_name}", MODE="0660", GROUP="{group}"'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from functools import partial
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from paramove.diagnosis.devices import holders, may_use, serial_remedy
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
+from paramove.robots.dynamixel.serial_adapters import adapter_links
 from paramove.robots.dynamixel.servo_port import ServoPort
 
 SOON_MS = 1
@@ -18,7 +20,7 @@ RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency
 def port_links(machine: Machine) -> list[Path]:
     """By the name of their adapter, those that have no such name by their own."""
     folder = _folder(machine)
-    links = sorted(folder.iterdir()) if folder.is_dir() else []
+    links = adapter_links(folder)
     if machine.by_id is not None:
         return links
     named = {link.resolve() for link in links}
@@ -44,7 +46,7 @@ def serial_findings(machine: Machine) -> Iterator[Finding]:
     for link in links:
         yield port_finding(link)
         timer = machine.sysfs / "bus" / "usb-serial" / "devices" / link.resolve().name / "latency_timer"
-        if timer.is_file():
+        with contextlib.suppress(FileNotFoundError):  # not every adapter has one
             yield latency_finding(link, timer)
 
 

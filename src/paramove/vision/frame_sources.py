@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any, Protocol
 import cv2
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.diagnosis.devices import holders
 from paramove.input_error import InputError
 from paramove.vision.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
 from paramove.vision.replayed_frames import FolderFrames, RecordingFrames
@@ -268,18 +268,7 @@ def _open_v4l2(path: str) -> Capture:
     capture: Capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
     if not capture.isOpened():
         capture.release()
-        raise SourceError(f"{path} gives no frames: {_holder(device) or 'it is no V4L2 camera that captures'}")
+        held = ", ".join(map(str, holders(device)))
+        why = f"held by {held}: end it first" if held else "it is no V4L2 camera that captures"
+        raise SourceError(f"{path} gives no frames: {why}")
     return capture
-
-
-def _holder(device: Path) -> str:
-    """'held by NAME (pid N)' for another process that has the device open, else ''."""
-    real = device.resolve()
-    for descriptor in Path("/proc").glob("[0-9]*/fd/*"):
-        process = descriptor.parents[1]
-        try:
-            if process.name != str(os.getpid()) and descriptor.readlink() == real:
-                return f"held by {(process / 'comm').read_text().strip()} (pid {process.name}): end it first"
-        except OSError:
-            continue  # ended meanwhile, or not ours to look into
-    return ""

@@ -59,7 +59,7 @@ class PersonOfProcess(Person):
 
     def arms_and_waits_again(self) -> None:
         self.arms()
-        self.waits_for("ARMED")
+        self.hears_until(self._is_armed)
 
 
 @contextlib.contextmanager

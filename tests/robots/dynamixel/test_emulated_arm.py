@@ -76,6 +76,6 @@ def test_a_world_that_breaks_is_told(tmp_path):
         arm.emulator.check()
         with arm.emulator.lock:
             arm.mechanics.data.qvel[:] = np.nan
-        arm.emulator._thread.join(10.0)
+        arm.emulator._thread.join(60.0)
         with pytest.raises(RuntimeError, match="the emulated servos have stopped: the emulated servos' world broke"):
             arm.emulator.check()

@@ -54,7 +54,7 @@ class Client:
         assert (result, error) == (COMM_SUCCESS, 0)
         return value
 
-    def until(self, done, within_s=5.0):
+    def until(self, done, within_s=60.0):
         """Asks again until it is so: each question takes its time on the wire."""
         end_s = time.monotonic() + within_s
         while not done():

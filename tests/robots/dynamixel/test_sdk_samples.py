@@ -76,7 +76,7 @@ def parts(value):
     return [DXL_LOBYTE(low), DXL_HIBYTE(low), DXL_LOBYTE(high), DXL_HIBYTE(high)]
 
 
-def until(done, within_s=8.0):
+def until(done, within_s=60.0):
     end_s = time.monotonic() + within_s
     while not done():
         assert time.monotonic() < end_s, "did not happen"

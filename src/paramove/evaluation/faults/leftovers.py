@@ -35,7 +35,8 @@ def left_over(domain: str, runtime: Path) -> list[str]:
     """
     words = [f"process {pid} ({command})" for pid, command in processes_of(domain)]
     places = [runtime / domain, *runtime.glob(f"truth-{domain}-*")]
-    files = [path for place in places if place.is_dir() for path in place.rglob("*")]
+    # A folder that goes meanwhile is passed over, as `rglob` does not.
+    files = [Path(top) / name for place in places for top, _, names in os.walk(place) for name in names]
     files.append(runtime / f"{domain}.lock")
     for path in files:
         if path.is_socket() and is_alive(path):

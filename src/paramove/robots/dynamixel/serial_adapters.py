@@ -49,9 +49,16 @@ def serial_of(name: str) -> str:
 
 def serial_adapters(by_id: Path | None = None) -> list[SerialAdapter]:
     """All that are plugged in, by serial number. A folder that is not there holds none."""
-    folder = by_id or default_by_id()
-    links = [path for path in folder.iterdir() if path.exists()] if folder.is_dir() else []
+    links = [path for path in adapter_links(by_id or default_by_id()) if path.exists()]
     return sorted((SerialAdapter(serial_of(path.name), path) for path in links), key=lambda one: one.serial)
+
+
+def adapter_links(folder: Path) -> list[Path]:
+    """All links of the folder, sorted; none if it is not there: udev takes it away with its last link."""
+    try:
+        return sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
 
 
 def serial_adapter(serial: str = "", by_id: Path | None = None) -> SerialAdapter:
