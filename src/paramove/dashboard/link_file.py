@@ -7,12 +7,15 @@ were connected before. The secrets are worth nothing once the page has ended; th
 from __future__ import annotations
 
 import json
-import os
+import logging
 import secrets
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from paramove.dashboard.access import Secrets
+from paramove.documents.atomic_writing import replacing
+
+_log = logging.getLogger(__name__)
 
 NAME = "live_page.json"
 
@@ -59,7 +62,7 @@ class LinkFile:
         return replace(self, secrets=replace(self.secrets, token=_word()))
 
     def write(self) -> None:
-        """Writes the file at once and whole."""
+        """Writes the file at once and whole. On a full disk the page goes on with the file as it was."""
         content = {
             "link": self.link,
             "port": self.port,
@@ -67,12 +70,11 @@ class LinkFile:
             "session": self.secrets.session,
             "key": self.secrets.key,
         }
-        beside = self.path.with_name(f".{NAME}-{os.getpid()}")
-        beside.unlink(missing_ok=True)
-        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1)
-        beside.replace(self.path)
+        try:
+            with replacing(self.path, 0o600) as unfinished:
+                unfinished.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        except OSError as error:
+            _log.warning("%s cannot be written: %s", self.path, error.strerror)
 
     def remove(self) -> None:
         """Removes the file."""

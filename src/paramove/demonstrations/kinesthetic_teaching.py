@@ -14,6 +14,7 @@ from paramove.demonstrations.labelling import next_repetition
 from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
 from paramove.demonstrations.movement import DemonstrationError, Floats
 from paramove.demonstrations.writing import Label, Take, write_set
+from paramove.documents.atomic_writing import replacing
 from paramove.robots.arm_points import ARM_BASE, POINT_NAMES, arm_points
 from paramove.robots.description import DescriptionError, RobotDescription
 
@@ -124,9 +125,8 @@ class KinestheticTeacher:
         if before is None:
             self._labels.unlink()
         else:
-            unfinished = self._labels.with_name(f"{self._labels.name}.new")
-            unfinished.write_bytes(before)
-            unfinished.replace(self._labels)
+            with replacing(self._labels) as unfinished:
+                unfinished.write_bytes(before)
         (self._folder / name).unlink()
         return name
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +17,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents.atomic_writing import replacing
 from paramove.supervision.names import closest, nearest
 from paramove.supervision.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
 
@@ -195,8 +198,10 @@ def write_labels(path: Path, content: LabelsFile) -> None:
         tree["points"] = _in_one_line(content.points)
     tree["max_gap"] = content.max_gap
     tree["segments"] = CommentedSeq([_segment(segment) for segment in content.segments])
-    with path.open("x", encoding="utf-8") as file:
-        file.write(HEAD + _dumped(tree))
+    if path.exists():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    with replacing(path) as unfinished:
+        unfinished.write_text(HEAD + _dumped(tree), encoding="utf-8")
 
 
 def append_segments(path: Path, segments: Sequence[Segment]) -> None:
@@ -206,15 +211,14 @@ def append_segments(path: Path, segments: Sequence[Segment]) -> None:
     """
     before = _text(path)
     load_labels(path)
-    after = path.with_name(path.name + ".new")
-    after.write_text(_with_segments(before, [_in_flow(_segment(segment)) for segment in segments]), encoding="utf-8")
-    try:
-        load_labels(after)
-    except LabelsError as error:
-        after.unlink()
-        said = "; ".join(finding.message for finding in error.findings)
-        raise DemonstrationError(f"{path} would not be sound with this segment: {said}") from error
-    after.replace(path)
+    with replacing(path) as after:
+        text = _with_segments(before, [_in_flow(_segment(segment)) for segment in segments])
+        after.write_text(text, encoding="utf-8")
+        try:
+            load_labels(after)
+        except LabelsError as error:
+            said = "; ".join(finding.message for finding in error.findings)
+            raise DemonstrationError(f"{path} would not be sound with this segment: {said}") from error
 
 
 def _with_segments(text: str, lines: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from paramove.documents.atomic_writing import replacing
 from paramove.supervision import exit_codes
 
 APPLICATION = "rule_learning"
@@ -131,9 +132,9 @@ def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, 
         evaluate += [] if options.report else ["--no-report"]
         children.call(evaluate, options.workspace, environment, options.folder / f"seed_{seed:04d}.log")
     result |= _summary_in(folder)
-    beside = result_file(options.folder, seed).with_suffix(".new")
-    beside.write_text(json.dumps(result, indent=2, sort_keys=True, ensure_ascii=False) + "\n", encoding="utf-8")
-    beside.replace(result_file(options.folder, seed))
+    with replacing(result_file(options.folder, seed)) as unfinished:
+        text = json.dumps(result, indent=2, sort_keys=True, ensure_ascii=False)
+        unfinished.write_text(text + "\n", encoding="utf-8")
     if not options.keep_recordings and result["success"]:
         (folder / "recording.mcap").unlink(missing_ok=True)
     return result

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.recorded_run import recording_in
 from paramove.evaluation.run_summary import RunEvaluation
 from paramove.evaluation.story import Story
@@ -42,8 +43,7 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     every = round(factor * CAMERA_HZ / FRAMES_PER_S)
     frame = VideoFrame(f"rule learning, seed {run.truth.layout.seed}", factor)
     path = run.folder / "demo.mp4"
-    beside = path.with_name("demo.part.mp4")
-    with VideoWriter(beside, SIZE, FRAMES_PER_S) as writer:
+    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         shown = range(0, number, every)
         pictures = paired_images(run.folder, every)
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
@@ -54,7 +54,6 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
             writer.write(picture)
         for _ in range(LINGER_FRAMES):
             writer.write(picture)
-    beside.replace(path)
     return path
 
 

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.recorded_run import recording_in
 from paramove.evaluation.video_writer import VideoWriter
 from paramove.msgs.gesture_pb2 import Gesture
@@ -39,13 +40,11 @@ def write_pointing_video(folder: Path, console: Console) -> Path | None:
     if not moments:
         return None
     path = folder / "pointing.mp4"
-    beside = path.with_name("pointing.part.mp4")
     height, width = decode(moments[0][0]).shape[:2]
     size = (WIDTH_PX, round(WIDTH_PX * height / width) // 2 * 2)
-    with VideoWriter(beside, size, RATE_HZ) as writer:
+    with replacing(path) as unfinished, VideoWriter(unfinished, size, RATE_HZ) as writer:
         for image, outline, told in track(moments, "video", console=console, transient=True):
             writer.write(drawn(decode(image), outline, told, size))
-    beside.replace(path)
     return path
 
 

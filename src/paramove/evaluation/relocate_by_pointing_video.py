@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.pointing_video import drawn
 from paramove.evaluation.recorded_run import RecordedRun, recording_in
 from paramove.evaluation.video_frame import (
@@ -49,9 +50,8 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     words = [(r.publish_ns, r.message.sentence) for r in run.heard(topics.SPEECH)]
     states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.heard(topics.APPLICATION_STAGE)]
     path = run.folder / "relocations.mp4"
-    beside = path.with_name("relocations.part.mp4")
     title = f"relocation by pointing, seed {run.truth.layout.seed}"
-    with VideoWriter(beside, SIZE, FRAMES_PER_S) as writer:
+    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         moments = track(_moments(run.folder), "video", views // EVERY, console=console, transient=True)
         for time_ns, camera, outline, view in moments:
@@ -65,7 +65,6 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
             writer.write(picture)
         for _ in range(LINGER_FRAMES):
             writer.write(picture)
-    beside.replace(path)
     return path
 
 

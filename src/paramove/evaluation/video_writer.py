@@ -35,7 +35,7 @@ class VideoWriter:
 
     def __init__(self, path: Path, size_px: tuple[int, int], rate_hz: float) -> None:
         try:
-            self._file = av.open(str(path), "w")
+            self._file = av.open(str(path), "w", format="mp4")
             self._stream = self._file.add_stream("libvpx-vp9", rate=round(rate_hz), options=ENCODER)
         except (av.FFmpegError, ValueError) as error:
             raise VideoError(

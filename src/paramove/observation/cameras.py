@@ -21,6 +21,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from scipy.spatial.transform import Rotation
 
+from paramove.documents.atomic_writing import replacing
 from paramove.input_error import InputError
 
 Floats = NDArray[np.float64]
@@ -188,7 +189,7 @@ def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
         }
         for camera in cameras
     ]
-    with path.open("w", encoding="utf-8") as file:
+    with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
         yaml.dump({"world_frame": WORLD_FRAME, "cameras": listed}, file)
 
 

@@ -1,7 +1,6 @@
 """Model files: one .npz without pickles, checked when read."""
 
 import json
-import os
 import struct
 import tokenize
 import zipfile
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from paramove.documents.atomic_writing import replacing
 from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.input_error import InputError
 from paramove.phmm.description import MovementDescription
@@ -58,10 +58,8 @@ def write_record(path: Path, record: ModelRecord) -> None:
         "training": None if record.training is None else asdict(record.training),
     }
     arrays: dict[str, Any] = {f"learned_{name}": value for name, value in record.arrays.items()}
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with part.open("wb") as file:
+    with replacing(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, format_version=FORMAT_VERSION, header=json.dumps(header, sort_keys=True), **arrays)
-    part.replace(path)
 
 
 def read_record(path: Path) -> ModelRecord:

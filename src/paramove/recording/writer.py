@@ -1,12 +1,15 @@
 """Recordings: MCAP files with protobuf schemas, which Foxglove, rerun and the mcap tools open unmodified.
 
-Chunks are small, so that a process that is killed loses little; the file bears the ending `.part` until it is finished.
+The file bears the ending `.part` until it is finished, and only its owner may read it. A process that is killed loses
+what came after its last `flush`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import os
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,11 +19,13 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[imp
 from mcap.records import Channel, Message, Schema
 from mcap.writer import CompressionType, Writer
 
+from paramove.documents.atomic_writing import rename_durably
+
 CHANNELS = "paramove.channels"
 """Metadata that tells again which channel is which topic: with the chunk that tells it first, all would be lost."""
 CHUNK_BYTES = 64 * 1024
 CHUNK_NS = 250_000_000
-"""Of the time of publication; a longer chunk would lose more with a process that is killed."""
+"""Of the time of publication; in a longer chunk a damage would cost more."""
 
 
 class RecordingExistsError(FileExistsError):
@@ -34,8 +39,14 @@ class RecordingWriter:
         path: Of the finished file.
         library: What wrote it, for people.
 
+    Attributes:
+        path: As given.
+        unwritten: Messages since the last `flush` that succeeded; some of them may be in the file.
+
     Raises:
         RecordingExistsError: There is a file of that name already, finished or not.
+        OSError: It cannot be written, as on a full disk. Also `write`, `copy`, `flush` and `close` raise it. Nothing is
+            lost then: what was not written waits for the next `flush` or `close`.
     """
 
     def __init__(self, path: Path, library: str) -> None:
@@ -44,14 +55,23 @@ class RecordingWriter:
         for existing in (path, self._part):
             if existing.exists():
                 raise RecordingExistsError(f"{existing} exists; recordings are never overwritten: choose another name")
-        self._file = self._part.open("xb")
+        self._file = FileIO(self._part, "xb", opener=_private)
         with contextlib.suppress(OSError):  # a file system without locks
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # ends with this process, however it ends
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._stream = _Stream(self._file)
+        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="", library=library)
+        self._finished = False
         self._chunk_begun_ns: int | None = None
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
+        self.unwritten = 0
+        try:
+            self.flush()
+        except OSError:  # a full disk: nothing is left that would have to be told from a recording
+            self.abandon()
+            self._part.unlink()
+            raise
 
     def write(self, topic: str, message: Any, log_ns: int, publish_ns: int, sequence: int) -> None:
         """Append a protobuf message.
@@ -76,13 +96,32 @@ class RecordingWriter:
         """Add a metadata record."""
         self._writer.add_metadata(name, values)
 
+    def flush(self) -> None:
+        """Ends the chunk and hands everything to the system: it outlives this process."""
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._stream.drain()
+        self.unwritten = 0
+
+    def sync(self) -> None:
+        """Waits until what was flushed is on the disk: it outlives a power failure. For another thread."""
+        os.fsync(self._file.fileno())
+
     def close(self) -> None:
         """Write the index, close the file and give it its name."""
         if self._file.closed:
             return
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        if not self._finished:
+            self.flush()
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._finished = True
+        self._stream.drain()
+        self.sync()
         self._file.close()
-        self._part.rename(self.path)
+        rename_durably(self._part, self.path)
+
+    def abandon(self) -> None:
+        """Close the file as it is, unfinished, without what was not written."""
+        self._file.close()
 
     def __enter__(self) -> RecordingWriter:
         return self
@@ -90,17 +129,23 @@ class RecordingWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        finally:
+            self.abandon()
 
     def _append(self, channel: int, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> None:
-        if self._chunk_begun_ns is None:
-            self._chunk_begun_ns = publish_ns
-        elif not 0 <= publish_ns - self._chunk_begun_ns < CHUNK_NS:
+        begun_ns = self._chunk_begun_ns
+        ends_chunk = begun_ns is None or not 0 <= publish_ns - begun_ns < CHUNK_NS
+        if ends_chunk:
             self._writer.flush()  # type: ignore[no-untyped-call]
             self._chunk_begun_ns = publish_ns
         self._writer.add_message(
             channel_id=channel, log_time=log_ns, publish_time=publish_ns, sequence=sequence % 2**32, data=data
         )
+        self.unwritten += 1
+        if ends_chunk or self._stream.waiting >= CHUNK_BYTES:
+            self._stream.drain()
 
     def _channel(self, topic: str, message: Any) -> int:
         if topic in self._channels:
@@ -119,6 +164,41 @@ class RecordingWriter:
             )
             self.note(CHANNELS, {name: str(number) for name, number in self._channels.items()})
         return self._channels[topic]
+
+
+class _Stream:
+    """What the MCAP writer writes to: bytes wait until `drain` has brought them into the file, also beyond an error."""
+
+    def __init__(self, file: FileIO) -> None:
+        self._file = file
+        self._waiting = bytearray()
+        self._begun = 0
+
+    @property
+    def waiting(self) -> int:
+        """Bytes that are not in the file yet."""
+        return len(self._waiting)
+
+    def write(self, data: bytes) -> None:
+        self._waiting += data
+
+    def tell(self) -> int:
+        return self._begun + len(self._waiting)
+
+    def flush(self) -> None:
+        """A chunk has ended. An error now would take the message with it that begins the next."""
+
+    def drain(self) -> None:
+        while self._waiting:
+            written = self._file.write(self._waiting)
+            del self._waiting[:written]
+            self._begun += written
+
+
+def _private(path: str, flags: int) -> int:
+    descriptor = os.open(path, flags, 0o600)
+    os.fchmod(descriptor, 0o600)  # whatever the umask
+    return descriptor
 
 
 def schema_of(file: FileDescriptor) -> FileDescriptorSet:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 from ruamel.yaml import YAML
 
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.chapter6.performances import KINDS, Act, Split, split_of
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
@@ -205,21 +206,20 @@ def write_clip(clip: Clip, truth: Truth, images: Mapping[int, Sequence[Image]]) 
     for view, pictures in images.items():
         packed[f"view_{view}"], packed[f"offsets_{view}"] = pack(pictures)
     (clip.folder / CODE).write_text(clips_code(), encoding="utf-8")
-    beginning = clip.folder / f"unfinished_{SEEN}"
-    np.savez(
-        beginning,
-        version=np.array(FORMAT_VERSION),
-        name=np.array(clip.name),
-        kind=np.array(clip.kind),
-        number=np.array(clip.number),
-        times_s=clip.times_s,
-        views=np.array(clip.views),
-        sizes=_numbers(clip.sizes),
-        shoulder=clip.shoulder,
-        noise=np.array(clip.noise),
-        **packed,
-    )
-    beginning.replace(clip.folder / SEEN)
+    with replacing(clip.folder / SEEN) as unfinished, unfinished.open("wb") as file:
+        np.savez(
+            file,
+            version=np.array(FORMAT_VERSION),
+            name=np.array(clip.name),
+            kind=np.array(clip.kind),
+            number=np.array(clip.number),
+            times_s=clip.times_s,
+            views=np.array(clip.views),
+            sizes=_numbers(clip.sizes),
+            shoulder=clip.shoulder,
+            noise=np.array(clip.noise),
+            **packed,
+        )
 
 
 def write_manifest(folder: Path) -> Path:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.faults.kill_cases import KillCase, runs_of
 from paramove.evaluation.faults.kill_run import InterruptedRunError, KillResult, KillRun
 
@@ -93,7 +94,6 @@ def _perform(
 
 
 def _keep(folder: Path, result: KillResult) -> None:
-    path = result_file(folder, result.case)
-    beside = path.with_suffix(".new")
-    beside.write_text(json.dumps(result.as_json(), indent=2, sort_keys=True, ensure_ascii=False) + "\n", "utf-8")
-    beside.replace(path)
+    with replacing(result_file(folder, result.case)) as unfinished:
+        text = json.dumps(result.as_json(), indent=2, sort_keys=True, ensure_ascii=False)
+        unfinished.write_text(text + "\n", encoding="utf-8")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.models.drawing import point_names
 from paramove.phmm import MovementDescription, ParametricHMM
 
@@ -59,11 +60,12 @@ def write_movement(made: Made, path: Path) -> None:
     Raises RecordingExistsError for a recording that is there already.
     """
     if path.suffix == ".csv":
-        path.write_text(as_csv(made), encoding="utf-8")
+        with replacing(path) as unfinished:
+            unfinished.write_text(as_csv(made), encoding="utf-8")
         return
     positions = made.frames.reshape(len(made.frames), -1, 3)
     if path.suffix == ".npz":
-        with path.open("wb") as file:
+        with replacing(path) as unfinished, unfinished.open("wb") as file:
             np.savez_compressed(
                 file, time=made.time, positions=positions, points=np.array(made.point_names), unit="m", axes="z_up",
                 frame=made.frame, theta=made.theta,

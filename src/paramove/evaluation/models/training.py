@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.models.examples import Examples
 from paramove.evaluation.models.kinds import kind_of
 from paramove.evaluation.models.leaving_out import LeaveOutResult, LeftOutBy, leave_out
@@ -135,6 +135,5 @@ def checksum(file: Path) -> str:
 def _write_facts(trained: Trained) -> None:
     facts = trained.facts() | {"sha256": checksum(trained.file)}
     beside = trained.file.with_suffix(FACTS_ENDING)
-    part = beside.with_name(f".{beside.name}.{os.getpid()}.part")
-    part.write_text(json.dumps(facts, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    part.replace(beside)
+    with replacing(beside) as unfinished:
+        unfinished.write_text(json.dumps(facts, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -19,6 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.movements.method import Method
 from paramove.evaluation.movements.tasks import Fold
 from paramove.evaluation.movements.trial import able, measure
@@ -237,6 +238,5 @@ def _stored(file: Path) -> dict[str, Any] | None:
 
 
 def _store(file: Path, result: dict[str, Any]) -> None:
-    unfinished = file.with_suffix(".part")
-    unfinished.write_text(json.dumps(result), encoding="utf-8")
-    unfinished.replace(file)
+    with replacing(file) as unfinished:
+        unfinished.write_text(json.dumps(result), encoding="utf-8")

@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from paramove.documents.atomic_writing import replacing
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
@@ -171,13 +171,9 @@ class ArmCalibration(_Part):
         self.check(str(path))
         content = self.model_dump() | {"sha256": self.content_sha256()}
         path.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = path.with_suffix(".part")
-        with unfinished.open("w", encoding="utf-8") as file:
+        with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
             file.write(HEADER)
             _writer().dump(content, file)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
 
     def units(self, joint_names: Sequence[str], lower: ArrayLike, upper: ArrayLike) -> JointUnits:
         """Units of these joints, each within its described range and the travel that was shown, whichever is less.
@@ -217,9 +213,8 @@ def sign_again(path: Path) -> ArmCalibration:
     found = ArmCalibration.read(path)
     text, sha256 = path.read_text(encoding="utf-8"), found.content_sha256()
     kept = re.sub(r"^sha256:.*\n?", "", text, flags=re.M)
-    unfinished = path.with_suffix(".part")
-    unfinished.write_text(f"{kept.rstrip()}\nsha256: {sha256}\n", encoding="utf-8")
-    unfinished.replace(path)
+    with replacing(path) as unfinished:
+        unfinished.write_text(f"{kept.rstrip()}\nsha256: {sha256}\n", encoding="utf-8")
     return found.model_copy(update={"sha256": sha256})
 
 
