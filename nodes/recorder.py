@@ -1,14 +1,13 @@
 """Recorder: keeps every recorded topic in `recording.mcap` of the run's folder.
 
-When its process is started again it goes on in `recording.2.mcap`, ….
+When its process is started again, or the disk was full, it goes on in `recording.2.mcap`, ….
 
 Hears   every topic that the topic table marks as recorded
 """
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.recording.parts import next_part
-from paramove.recording.writer import RecordingWriter
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.recording.recorder import Recorder
 
 HEARS = topics.RECORDED
 SAYS = ()
@@ -24,12 +23,16 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
-    with RecordingWriter(next_part(bus.run_folder / config.file), "paramove recorder") as recording:
-        bus.ready(f"recording to {recording.path.name}")
-        for count, heard in enumerate(bus.events(*HEARS), start=1):
-            recording.write(heard.topic.name, heard.message, heard.captured_ns, heard.published_ns, heard.sequence)
-            if count % REPORT_EVERY == 0:
-                bus.ready(f"{count} messages recorded")
+    with Recorder(bus, bus.run_folder / config.file, "paramove recorder") as recording:
+        count, sentence = 0, f"recording to {recording.part_name}"
+        recording.tell(sentence)
+        for event in bus.events(*HEARS, tick=True):
+            if isinstance(event, Heard):
+                recording.keep(event)
+                count += 1
+                if count % REPORT_EVERY == 0:
+                    sentence = f"{count} messages recorded"
+            recording.tell(sentence)
 
 
 if __name__ == "__main__":

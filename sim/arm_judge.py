@@ -8,9 +8,8 @@ Writes `truth.mcap` into the run folder, and goes on in `truth.2.mcap`, … when
 from __future__ import annotations
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.recording.parts import next_part
-from paramove.recording.writer import RecordingWriter
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.recording.recorder import Recorder
 
 HEARS = (topics.TRUTH_ARM,)
 SAYS = ()
@@ -22,10 +21,12 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
-    with RecordingWriter(next_part(bus.run_folder / "truth.mcap"), "paramove, judge of an arm") as recording:
-        bus.ready("records the truth")
-        for heard in bus.events(*HEARS):
-            recording.write(heard.topic.name, heard.message, heard.captured_ns, heard.published_ns, heard.sequence)
+    with Recorder(bus, bus.run_folder / "truth.mcap", "paramove, judge of an arm") as recording:
+        recording.tell("records the truth")
+        for event in bus.events(*HEARS, tick=True):
+            if isinstance(event, Heard):
+                recording.keep(event)
+            recording.tell("records the truth")
 
 
 if __name__ == "__main__":

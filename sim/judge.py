@@ -10,7 +10,9 @@ When its process is started again it goes on in `truth.2.mcap`, ….
 
 from __future__ import annotations
 
+import contextlib
 import json
+import logging
 import time
 from pathlib import Path
 from typing import Any
@@ -22,10 +24,13 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from pydantic import Field
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.recording.parts import PartedRecording, next_part
-from paramove.recording.writer import RecordingWriter
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.documents.atomic_writing import replacing
+from paramove.recording.parts import PartedRecording
+from paramove.recording.recorder import Recorder
 from sim.verdict import Verdict
+
+_log = logging.getLogger(__name__)
 
 HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
 SAYS = ()
@@ -51,27 +56,22 @@ def run(bus: Bus, config: Config) -> None:
     judge = Judge(bus.run_folder / "truth.json")
     path = bus.run_folder / "truth.mcap"
     earlier = judge.recall(PartedRecording(path))
-    recording = RecordingWriter(next_part(path), "paramove judge") if config.record else None
-    bus.ready(f"goes on after {earlier} recorded states" if earlier else "waits for the truth")
-    try:
-        for heard in bus.events(*HEARS):
-            if heard.topic is topics.TRUTH_LAYOUT:
-                judge.begin(heard.message)
-            elif heard.topic is topics.TRUTH_STATE:
-                sentence = judge.take(heard.message)
-                if sentence:
-                    bus.ready(sentence)
-            if recording is not None:
-                kept = (
-                    compressed(heard.message, config.jpeg_quality)
-                    if heard.topic is topics.TRUTH_VIEW
-                    else heard.message
-                )
-                recording.write(heard.topic.name, kept, heard.captured_ns, heard.published_ns, heard.sequence)
-    finally:
-        judge.write()
-        if recording is not None:
-            recording.close()
+    sentence = f"goes on after {earlier} recorded states" if earlier else "waits for the truth"
+    with contextlib.ExitStack() as ending:
+        recording = ending.enter_context(Recorder(bus, path, "paramove judge")) if config.record else None
+        tell = bus.ready if recording is None else recording.tell
+        ending.callback(judge.write)
+        tell(sentence)
+        for event in bus.events(*HEARS, tick=True):
+            if isinstance(event, Heard):
+                if event.topic is topics.TRUTH_LAYOUT:
+                    judge.begin(event.message)
+                elif event.topic is topics.TRUTH_STATE:
+                    sentence = judge.take(event.message) or sentence
+                if recording is not None:
+                    view = event.topic is topics.TRUTH_VIEW
+                    recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
+            tell(sentence)
 
 
 class Judge:
@@ -128,9 +128,11 @@ class Judge:
             summary["begun_monotonic_s"] = round(self._begun_s, 3)
             summary["wall_s"] = round(wall_s, 3)
             summary["realtime_factor"] = round(summary.get("simulated_s", 0.0) / wall_s, 3) if wall_s > 0 else None
-        beside = self._path.with_suffix(".json.new")
-        beside.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        beside.replace(self._path)
+        try:
+            with replacing(self._path) as unfinished:
+                unfinished.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        except OSError as error:  # a full disk ends no run
+            _log.warning("%s cannot be written: %s", self._path, error.strerror)
         return summary
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from pathlib import Path
 from typing import BinaryIO
@@ -21,6 +22,8 @@ from sim.camera import Eye, Image, Sensor
 from sim.instructor import Instructor
 from sim.looks import Looks
 from sim.world import World
+
+_log = logging.getLogger(__name__)
 
 CAMERA_HZ = 15
 
@@ -110,7 +113,11 @@ class Simulation:
             instructor.advance(0.001)
             world.step(torques)
         if self._firmware_log is not None:
-            self._firmware_log.write(np.array(played, dtype="<i2").tobytes())
+            try:
+                self._firmware_log.write(np.array(played, dtype="<i2").tobytes())
+            except OSError as error:  # a full disk ends no run
+                _log.warning("the log of the firmware ends: %s", error.strerror)
+                self._firmware_log = None
         self.physics_s += time.perf_counter() - started
 
     def light(self) -> RawImage | None:

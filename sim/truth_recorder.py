@@ -15,9 +15,8 @@ import cv2
 from pydantic import Field
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.recording.parts import next_part
-from paramove.recording.writer import RecordingWriter
+from paramove.bus.node import Bus, Heard, NodeConfig, main
+from paramove.recording.recorder import Recorder
 from sim.judge import compressed
 
 HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_ARM, topics.TRUTH_VIEW)
@@ -33,12 +32,13 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
     cv2.setNumThreads(1)
-    with RecordingWriter(next_part(bus.run_folder / "truth.mcap"), "paramove truth recorder") as recording:
-        bus.ready("records the truth")
-        for heard in bus.events(*HEARS):
-            view = heard.topic is topics.TRUTH_VIEW
-            message = compressed(heard.message, config.jpeg_quality) if view else heard.message
-            recording.write(heard.topic.name, message, heard.captured_ns, heard.published_ns, heard.sequence)
+    with Recorder(bus, bus.run_folder / "truth.mcap", "paramove truth recorder") as recording:
+        recording.tell("records the truth")
+        for event in bus.events(*HEARS, tick=True):
+            if isinstance(event, Heard):
+                view = event.topic is topics.TRUTH_VIEW
+                recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
+            recording.tell("records the truth")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """`paramove recover`: what it says, and its exit codes."""
 
+import datetime
 import json
 
 import pytest
@@ -30,6 +31,8 @@ def test_it_says_what_was_kept(killed):
     assert done.exit_code == 0, done.output
     kept = len(list(read(killed)))
     assert f"run.mcap: kept {kept} messages" in done.stdout
+    last = list(read(killed))[-1]
+    assert f"not known: what came after the message of {last.log_ns * 1e-9:.3f} s" in done.stdout
     assert "never finished" in done.stdout
     assert len(list(read(killed.with_name("run.mcap")))) == kept
     again = run(killed)
@@ -44,6 +47,9 @@ def test_as_json(killed):
     facts = json.loads(run(killed, "--json").stdout)
     assert facts["messages_kept"] == len(list(read(killed.with_name("run.mcap"))))
     assert facts["damages"][-1]["end"] == killed.stat().st_size
+    assert facts["known_until_s"] == pytest.approx(list(read(killed.with_name("run.mcap")))[-1].log_ns * 1e-9)
+    written = datetime.datetime.fromisoformat(facts["last_written"]).timestamp()
+    assert written == pytest.approx(killed.stat().st_mtime)
 
 
 def test_a_whole_one_needs_nothing(tmp_path):
@@ -51,6 +57,7 @@ def test_a_whole_one_needs_nothing(tmp_path):
     done = run(tmp_path / "run.mcap")
     assert done.exit_code == 0
     assert "is whole (20 messages" in done.stdout
+    assert "not known" not in done.stdout
 
 
 def test_what_cannot_be_recovered(tmp_path):

@@ -12,6 +12,7 @@ from paramove.evaluation import servo_arm
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
+from tests.recording.small_disk import fill, small_disk
 
 TASKS = "parameters: {tasks: [{reach: [0.2, 0.0, 0.1]}, {pick: [0.1, 0.1, 0.02], place: [0.2, 0.1, 0.02]}]}\n"
 
@@ -38,7 +39,25 @@ def test_a_run_is_judged_by_its_truth_even_if_the_judge_was_started_again(folder
     assert servo_arm.main([str(folder)]) == 0
     summary = json.loads((folder / "run.json").read_text())
     assert [one["error"] for one in summary["tasks"]] == pytest.approx([0.004, 0.005])
+    assert summary["gaps"] == [{"recording": "truth", "begin_s": pytest.approx(1e-9), "end_s": pytest.approx(2e-9)}]
     assert (folder / "tasks.png").is_file()
+
+
+def test_without_room_for_the_numbers_the_reason_is_told_and_the_run_can_be_judged_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with small_disk(tmp_path / "disk", 2) as disk:
+        (disk / "nodes").mkdir()
+        (disk / "nodes" / "reacher.yaml").write_text(TASKS)
+        record(disk, (0.2, 0.0, 0.104), 0.205)
+        filler = fill(disk)
+        assert servo_arm.main([str(disk)]) == 1
+        said = capsys.readouterr().err
+        assert "No space left on device" in said
+        assert f"python -m paramove.evaluation.servo_arm {disk}" in said
+        filler.unlink()
+        servo_arm.main([str(disk)])
+        assert (disk / "run.json").is_file()
 
 
 def test_the_truth_of_a_judge_that_was_killed_counts_as_far_as_it_goes(folder: Path) -> None:

@@ -1,16 +1,27 @@
 """The recorder's node keeps what it hears, in the order of hearing."""
 
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from nodes import recorder
 from paramove.bus import topics
+from paramove.bus.bus import Bus
 from paramove.bus.recorded import RecordedBus
+from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import Speech
 from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import read
+from tests.supervision.conftest import until
 
+ROOT = Path(__file__).parents[2]
 HEARD = [
     Heard(topics.GESTURES, Gesture(object="blue"), 100, 110, 1),
     Heard(topics.SPEECH, Speech(sentence="hello"), 90, 120, 1),
@@ -52,3 +63,46 @@ def test_goes_on_in_a_further_file_and_never_writes_over_one(tmp_path: Path) -> 
     recording = PartedRecording(tmp_path / "recording.mcap")
     assert [part.name for part in recording.parts] == ["recording.mcap", "recording.2.mcap"]
     assert [found.message for found in recording.read()] == [heard.message for heard in HEARD]
+
+
+@contextlib.contextmanager
+def recording_in(folder: Path, log: Path) -> Iterator[tuple[subprocess.Popen, Bus]]:
+    """The real recorder as a process, and a bus that says gestures to it."""
+    with (
+        TemporaryDirectory(prefix="pm-", dir="/tmp") as runtime,  # paths of sockets are short
+        Bus("speaker", BusSettings(folder=Path(runtime) / "bus"), (), (topics.GESTURES,)) as bus,
+        log.open("wb") as output,
+    ):
+        settings = {"node": "recorder", "bus": {"folder": f"{runtime}/bus"}, "run_folder": str(folder)}
+        (folder / "recorder.yaml").write_text(json.dumps(settings))
+        command = [sys.executable, "-m", "nodes.recorder", "--config", str(folder / "recorder.yaml")]
+        environment = os.environ | {"PYTHONUNBUFFERED": "1"}
+        process = subprocess.Popen(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, env=environment)
+        try:
+            publisher = bus.exchange.publishers[topics.GESTURES.name]
+            until(lambda: (bus.exchange.wait(0.1), publisher.subscriptions)[1], "the recorder hears")
+            yield process, bus
+        finally:
+            process.kill()
+            process.wait()
+
+
+def test_killed_in_silence_it_has_everything_that_was_said_before(tmp_path: Path) -> None:
+    """Nothing follows that would push it to the disk, and the process gets no chance to do so at its end."""
+    part = tmp_path / "recording.mcap.part"
+    with recording_in(tmp_path, tmp_path / "log") as (_, bus):
+        for number in range(20):
+            bus.publish(topics.GESTURES, Gesture(object=f"object {number}"))
+        until(lambda: part.exists() and len(list(read(part))) == 20, "all messages are in the file")
+    assert [recorded.message.object for recorded in read(part)] == [f"object {number}" for number in range(20)]
+
+
+def test_a_log_without_room_ends_no_node(tmp_path: Path) -> None:
+    """All that it logs fails, as on a full disk."""
+    with recording_in(tmp_path, Path("/dev/full")) as (process, bus):
+        bus.publish(topics.GESTURES, Gesture(object="blue"))
+        part = tmp_path / "recording.mcap.part"
+        until(lambda: part.exists() and len(list(read(part))) == 1, "it records")
+        process.terminate()
+        assert process.wait(30) == 0
+    assert len(list(read(tmp_path / "recording.mcap"))) == 1

@@ -120,23 +120,23 @@ class RecordedBus:
 
     def starting(self, sentence: str) -> None:
         """Keeps the state."""
-        self.states.append(("starting", sentence))
+        self._change("starting", sentence)
 
     def ready(self, sentence: str) -> None:
         """Keeps the state."""
-        self.states.append(("ready", sentence))
+        self._change("ready", sentence)
 
     def degraded(self, sentence: str) -> None:
         """Keeps the state."""
-        self.states.append(("degraded", sentence))
+        self._change("degraded", sentence)
 
     def failed(self, sentence: str) -> None:
         """Keeps the state."""
-        self.states.append(("failed", sentence))
+        self._change("failed", sentence)
 
     def ended(self, sentence: str) -> None:
         """Keeps the state."""
-        self.states.append(("stopped", sentence))
+        self._change("stopped", sentence)
 
     def stop(self) -> None:
         """Ends every loop over events."""
@@ -152,6 +152,10 @@ class RecordedBus:
         if found:
             self.refused.append((heard.topic.name, found))
         return not found
+
+    def _change(self, state: str, sentence: str) -> None:
+        if self.states[-1:] != [(state, sentence)]:  # as a bus does
+            self.states.append((state, sentence))
 
     def _events(self, names: set[str], tick: bool) -> Iterator[Heard | Tick]:
         index = 0

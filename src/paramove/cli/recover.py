@@ -65,6 +65,8 @@ def _facts(result: Recovery) -> dict[str, Any]:
         "messages_lost_is_exact": result.lost_is_exact,
         "seconds_kept": result.seconds_kept,
         "seconds_lost": result.seconds_lost,
+        "known_until_s": result.known_until_s,
+        "last_written": result.last_written.isoformat(),
         "damages": [{"begin": one.begin, "end": one.end, "what": one.what} for one in result.damages],
     }
 
@@ -80,8 +82,12 @@ def _lines(result: Recovery) -> list[str]:
     lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MOST_DAMAGES]]
     if len(result.damages) > MOST_DAMAGES:
         lines.append(f"  and {len(result.damages) - MOST_DAMAGES} more")
-    if not result.damages:
-        lines.append("  its writer never finished it; what it had not written yet (up to 0.25 s) is not known")
+    if result.known_until_s is not None:
+        lines += [
+            f"not known: what came after the message of {result.known_until_s:.3f} s, as its writer never finished it",
+            f"  it wrote last at {result.last_written.isoformat(timespec='seconds')}; a recorder that was killed takes "
+            "0.5 s with it at most, a power failure may cost 2 s",
+        ]
     return [printable(line) for line in lines]
 
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
-from paramove.evaluation.recorded_run import RunFolderError
+from paramove.documents.atomic_writing import replacing
+from paramove.evaluation.recorded_run import RunFolderError, gaps_in
 from paramove.supervision import exit_codes
 from paramove.supervision.queued_output import QueuedOutput
 
@@ -32,9 +36,23 @@ def evaluated(
         parser.add_argument(flag, action="store_true", help=told)
     options = parser.parse_args(arguments)
     with QueuedOutput():
+        errors = Console(stderr=True, highlight=False, markup=False)
         try:
             success = evaluate(options, Console(highlight=False, emoji=False))
         except RunFolderError as error:
-            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+            errors.print(str(error), soft_wrap=True)
             return exit_codes.INPUT_MISSING
+        except OSError as error:
+            again = f"when that is fixed, run python -m {module} {options.run_folder}"
+            errors.print(f"{error.filename or options.run_folder}: {error.strerror or error}; {again}", soft_wrap=True)
+            return exit_codes.FAILURE
     return exit_codes.JUDGED_A_FAILURE if success is False else exit_codes.OK
+
+
+def write_run_json(folder: Path, summary: dict[str, Any]) -> Path:
+    """Writes `run.json` into a run's folder: the numbers of the run, and the gaps of its recordings."""
+    path = folder / "run.json"
+    content = summary | {"gaps": [asdict(gap) for gap in gaps_in(folder)]}
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return path

@@ -7,7 +7,6 @@ Exit codes: 0 the targets were found, or nobody knows them; 3 they were not; 66 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from paramove.evaluation.after_a_run import evaluated
+from paramove.evaluation.after_a_run import evaluated, write_run_json
 from paramove.evaluation.pointing_run import FARTHEST_M, MEDIAN_M, load_pointing_run
 
 
@@ -31,8 +30,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
     from paramove.evaluation.pointing_video import write_pointing_video
 
     summary = run.summary()
-    numbers = run.folder / "run.json"
-    numbers.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    numbers = write_run_json(run.folder, summary)
     video = None if options.no_video else write_pointing_video(run.folder, console)
     written = [write_pointing_report(run, summary, video), *([video] if video is not None else []), numbers]
     show(summary, written, console)

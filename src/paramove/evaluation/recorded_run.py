@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -114,7 +115,7 @@ class RecordedRun:
         facts: Of `run.yaml`.
         end_s: When the application was done, else when the recording ended.
         done: Whether the application said that it was done.
-        gaps: Times at which nothing was recorded because the recorder or the judge was being started again.
+        gaps: Times at which nothing was recorded: the recorder or the judge was being started again, or the disk full.
     """
 
     folder: Path
@@ -156,12 +157,26 @@ def load_run(folder: Path) -> RecordedRun:
         facts=_read_yaml(folder / "run.yaml"),
         end_s=end_ns * 1e-9,
         done=done,
-        gaps=tuple(
-            RecordingGap(name, gap.begin_ns * 1e-9, min(gap.end_ns, end_ns) * 1e-9)
-            for name, parts in (("recording", recording), ("truth", truth_file))
-            for gap in parts.gaps
-            if gap.begin_ns < end_ns
-        ),
+        gaps=_gaps({"recording": recording, "truth": truth_file}, end_ns),
+    )
+
+
+def gaps_in(folder: Path) -> tuple[RecordingGap, ...]:
+    """The gaps of all recordings of a run, which has them only where there are further parts."""
+    found = {name: PartedRecording(folder / f"{name}.mcap") for name in ("recording", "truth")}
+    for recording in found.values():
+        if len(recording.parts) > 1:
+            for _ in recording.read():
+                pass  # the recording learns of its gaps
+    return _gaps(found)
+
+
+def _gaps(recordings: Mapping[str, PartedRecording], end_ns: float = float("inf")) -> tuple[RecordingGap, ...]:
+    return tuple(
+        RecordingGap(name, gap.begin_ns * 1e-9, min(gap.end_ns, end_ns) * 1e-9)
+        for name, parts in recordings.items()
+        for gap in parts.gaps
+        if gap.begin_ns < end_ns
     )
 
 

@@ -8,7 +8,6 @@ place pointed at, by the recorded truth; 3 it did not; 66 no such run.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from paramove.evaluation.after_a_run import evaluated
+from paramove.evaluation.after_a_run import evaluated, write_run_json
 from paramove.evaluation.recorded_run import load_run
 from paramove.evaluation.relocate_by_pointing_run import GOAL, SCALE, pointed_relocations_of, summary_of
 
@@ -34,8 +33,7 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     from paramove.evaluation.relocate_by_pointing_report import write_relocation_report
     from paramove.evaluation.relocate_by_pointing_video import write_relocation_video
 
-    numbers = run.folder / "run.json"
-    numbers.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    numbers = write_run_json(run.folder, summary)
     video = None if options.no_video else write_relocation_video(run, console)
     report = write_relocation_report(run, relocations, summary, video)
     show(summary, [report, *([video] if video is not None else []), numbers], console)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from paramove.documents.atomic_writing import replacing
 from paramove.evaluation.after_a_run import evaluated
 from paramove.evaluation.recorded_run import load_run
 from paramove.evaluation.run_summary import RunEvaluation, as_json
@@ -30,7 +31,8 @@ def evaluate(folder: Path, workspace: Path) -> RunEvaluation:
 def write_summary(evaluation: RunEvaluation) -> Path:
     """Write `run.json` into the run's folder."""
     path = evaluation.run.folder / "run.json"
-    path.write_text(as_json(evaluation.summary), encoding="utf-8")
+    with replacing(path) as unfinished:
+        unfinished.write_text(as_json(evaluation.summary), encoding="utf-8")
     return path
 
 

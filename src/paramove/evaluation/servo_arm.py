@@ -7,7 +7,6 @@ the arm reached every place and put every object where it belongs, by the record
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,7 +20,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from paramove.bus import topics
-from paramove.evaluation.after_a_run import evaluated
+from paramove.evaluation.after_a_run import evaluated, write_run_json
 from paramove.evaluation.recorded_run import RunFolderError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import PartedRecording
@@ -85,9 +84,8 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     results = results_of(_tasks_in(folder), states)
     good = sum(one.good for one in results)
     success = good == len(results) > 0
-    numbers = folder / "run.json"
     content = {"success": success, "good": good, "tasks": [{**asdict(one), "good": one.good} for one in results]}
-    numbers.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    numbers = write_run_json(folder, content)
     word = "[bold green]SUCCESS[/]" if success else "[bold red]FAILURE[/]"
     console.print(f"\n{word}: {good} of {len(results)} tasks done")
     for one in results:

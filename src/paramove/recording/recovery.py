@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import fcntl
 import mmap
 import os
@@ -11,6 +12,7 @@ from pathlib import Path
 from mcap.records import Schema
 
 from paramove.bus import topics
+from paramove.documents.atomic_writing import rename_durably
 from paramove.input_error import InputError
 from paramove.recording.damage import Content, Damage, Sound, Survey, messages_of, survey
 from paramove.recording.writer import RecordingExistsError, RecordingWriter, schema_of
@@ -41,6 +43,9 @@ class Recovery:
         seconds_kept: From the first to the last message that was kept, without gaps that damages left.
         seconds_lost: Of those gaps, and at the end as far as the file tells.
         damages: Where bytes could not be used.
+        known_until_s: Time of the last message that is left of a recording that was never finished: whether others came
+            after it nothing in the file tells. None if it was finished.
+        last_written: Of the source, on the wall clock: what came until shortly before is in it, if nothing is damaged.
     """
 
     source: Path
@@ -51,6 +56,8 @@ class Recovery:
     seconds_kept: float
     seconds_lost: float
     damages: tuple[Damage, ...]
+    known_until_s: float | None
+    last_written: datetime.datetime
 
 
 def recovered_path(source: Path) -> Path:
@@ -85,7 +92,7 @@ def recover(source: Path, destination: Path | None = None) -> Recovery:
             aside = goal.with_name(f"{goal.stem}.{os.getpid()}.recovering.mcap")  # until it is whole
             try:
                 kept, nameless = _copy(content, found, sound, aside)
-                aside.rename(goal)
+                rename_durably(aside, goal)
             finally:
                 for left in (aside, aside.with_name(f"{aside.name}.part")):
                     left.unlink(missing_ok=True)
@@ -137,8 +144,18 @@ def _told(source: Path, destination: Path | None, found: Survey, kept: int, name
     if found.statistics is not None:
         lost, exact = max(found.statistics.message_count - kept, 0), True
     kept_ns, lost_ns = _spans(found)
+    last_ns = max((part.last_ns for part in found.parts if isinstance(part, Sound)), default=0)
     return Recovery(
-        source, destination, kept, lost, exact, kept_ns / SECOND_NS, lost_ns / SECOND_NS, tuple(found.damages)
+        source=source,
+        destination=destination,
+        kept=kept,
+        lost=lost,
+        lost_is_exact=exact,
+        seconds_kept=kept_ns / SECOND_NS,
+        seconds_lost=lost_ns / SECOND_NS,
+        damages=tuple(found.damages),
+        known_until_s=None if found.finished else last_ns / SECOND_NS,
+        last_written=datetime.datetime.fromtimestamp(source.stat().st_mtime).astimezone(),
     )
 
 

@@ -1,0 +1,234 @@
+"""Records what a node hears, for as long as the node runs, whatever the disk does.
+
+A thread writes, so that neither a slow disk nor a full one keeps the node from receiving: messages wait in memory
+meanwhile. After every `FLUSH_S` what has come is handed to the system, also in silence, and every `SYNC_S` a further
+thread sees to it that it is on the disk. When nothing can be written any more, the recorder waits for space and goes
+on in a further part; of more than `WAITING_BYTES` the oldest messages are lost by then, and counted.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import shutil
+import threading
+import time
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from paramove.bus.node import Bus, Heard
+from paramove.recording.parts import next_part
+from paramove.recording.writer import RecordingWriter
+
+_log = logging.getLogger(__name__)
+
+FLUSH_S = 0.2
+SYNC_S = 1.0
+WAITING_BYTES = 64 * 2**20
+LOW_BYTES = 10**9
+"""Free on the disk; with less the node is degraded."""
+ROOM_BYTES = 16 * 2**20
+"""Free on a disk that was full before it is written to again."""
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+
+
+class Recorder:
+    """The recording of a node, in parts; finished by `close` or at the end of a `with` block.
+
+    Args:
+        bus: Of the node. In lockstep time waits for the disk, but not for one that is full.
+        path: Of the first part; see `paramove.recording.parts`.
+        library: What writes it, for people.
+
+    Raises OSError if it cannot be written for another reason than a full disk.
+    """
+
+    def __init__(self, bus: Bus, path: Path, library: str) -> None:
+        self._bus, self._path, self._library = bus, path, library
+        self._changed = threading.Condition()
+        self._waiting: deque[tuple[int, tuple[str, Any, int, int, int]]] = deque()
+        self._bytes = 0
+        self._lost = 0
+        self._last_ns: int | None = None  # of what was written last
+        self._ends = False
+        self._is_low = False
+        self._fault = ""
+        self._part: RecordingWriter | None = None
+        self._part_name = ""
+        self._syncing: Future[None] | None = None
+        self._is_synced = True
+        self._sync_due_s = 0.0
+        self._free_bytes()
+        try:
+            self._begin_part()
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            self._take_fault(error)
+        self._threads = ThreadPoolExecutor(2, "recorder")
+        self._running = self._threads.submit(self._run)
+        self._running.add_done_callback(lambda _: self._wake())
+
+    @property
+    def part_name(self) -> str:
+        """Name of the file that was begun last; empty if the disk was full from the beginning."""
+        return self._part_name
+
+    def keep(self, heard: Heard, message: Any = None) -> None:
+        """Records a message. Never waits for a disk, but in lockstep.
+
+        Args:
+            heard: What was heard.
+            message: What to write instead of its message.
+        """
+        kept = heard.message if message is None else message
+        size = kept.ByteSize()
+        with self._changed:
+            if self._bus.settings.lockstep:
+                self._changed.wait_for(
+                    lambda: (
+                        not self._waiting or self._bytes + size <= WAITING_BYTES or self._fault or self._running.done()
+                    )
+                )
+            if self._running.done():
+                self._running.result()  # raises what ended the thread
+            self._waiting.append(
+                (size, (heard.topic.name, kept, heard.captured_ns, heard.published_ns, heard.sequence))
+            )
+            self._bytes += size
+            while self._bytes > WAITING_BYTES and len(self._waiting) > 1:
+                self._bytes -= self._waiting.popleft()[0]
+                self._lost += 1
+            if self._bytes > WAITING_BYTES // 4:
+                self._changed.notify_all()
+
+    def tell(self, sentence: str) -> None:
+        """Says `sentence` as the node's state, or what is wrong with the disk. For every turn of the node's loop."""
+        if self._fault:
+            self._bus.degraded(f"{self._fault}; waits for space in {self._path.parent} and goes on in a further file")
+        elif self._is_low:
+            self._bus.degraded(
+                f"less than 1 GB is free in {self._path.parent}: make room there, or recording will stop"
+            )
+        else:
+            self._bus.ready(sentence)
+
+    def close(self) -> None:
+        """Writes what waits and finishes the part. What a full disk does not take is lost, and logged."""
+        self._ends = True
+        self._wake()
+        try:
+            self._running.result()
+        finally:
+            self._threads.shutdown()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        try:
+            ends = False
+            while not ends:
+                with self._changed:
+                    self._changed.wait_for(self._is_due, SYNC_S if self._fault else FLUSH_S)
+                    ends = self._ends
+                try:
+                    self._turn(ends)
+                except OSError as error:
+                    self._take_fault(error)
+        finally:
+            self._lost += len(self._waiting)
+            if self._part is not None:
+                self._lost += self._part.unwritten
+                self._part.abandon()
+        if self._fault:
+            self._log_loss(self._path.name, self._fault, "the end")
+
+    def _wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _is_due(self) -> bool:
+        return self._ends or (self._bytes > WAITING_BYTES // 4 and not self._fault)
+
+    def _turn(self, ends: bool) -> None:
+        """Writes what waits, or tries whether it can be written again."""
+        if self._free_bytes() < ROOM_BYTES and self._fault and not ends:
+            return
+        if self._part is None or self._fault:
+            self._begin_part()
+        assert self._part is not None
+        for _ in range(len(self._waiting)):
+            with self._changed:
+                size, message = self._waiting.popleft()
+                self._bytes -= size
+                self._changed.notify_all()
+            self._last_ns = message[3]
+            self._part.write(*message)
+        self._is_synced &= self._part.unwritten == 0
+        self._part.flush()
+        if ends:
+            self._finish_part(self._part)
+            self._part = None
+        is_due = ends or time.monotonic() >= self._sync_due_s
+        if is_due and self._lost:
+            self._log_loss(self._part_name, "the disk does not keep up", "now")
+        if self._syncing is not None and self._syncing.done():
+            done, self._syncing = self._syncing, None
+            done.result()
+        if is_due and not self._is_synced and self._syncing is None and self._part is not None:
+            self._is_synced, self._sync_due_s = True, time.monotonic() + SYNC_S
+            self._syncing = self._threads.submit(self._part.sync)
+
+    def _free_bytes(self) -> int:
+        """Of the disk, which is low until somebody has made clearly more room."""
+        free = shutil.disk_usage(self._path.parent).free
+        self._is_low = free < (1.2 if self._is_low else 1.0) * LOW_BYTES
+        return free
+
+    def _begin_part(self) -> None:
+        """Begins the first part, or a further one after a fault; says what was lost in between."""
+        if self._part is not None:
+            self._finish_part(self._part)
+            self._part = None
+        self._part = RecordingWriter(next_part(self._path), self._library)
+        self._part_name = self._part.path.name
+        if self._fault:
+            until = f"{self._waiting[0][1][3] * 1e-9:.3f} s" if self._waiting else "now"
+            self._log_loss(f"goes on in {self._part_name}", self._fault, until)
+        self._fault = ""
+
+    def _finish_part(self, part: RecordingWriter) -> None:
+        """Finishes a part; one that can never be written to again stays as it is."""
+        if self._syncing is not None:
+            wait([self._syncing])
+            self._syncing = None
+        try:
+            part.close()
+        except OSError as error:
+            if error.errno in FULL:
+                raise
+            part.abandon()
+            with self._changed:
+                self._lost += part.unwritten
+            _log.error("%s stays unfinished, `paramove recover` makes it whole: %s", part.path, error.strerror)
+
+    def _take_fault(self, error: OSError) -> None:
+        if not self._fault:
+            _log.error("%s cannot be written: %s", self._part_name or self._path.name, error.strerror)
+        self._fault = error.strerror or str(error)
+        self._wake()
+
+    def _log_loss(self, where: str, reason: str, until: str) -> None:
+        since = "the beginning" if self._last_ns is None else f"{self._last_ns * 1e-9:.3f} s"
+        with self._changed:
+            lost, self._lost = self._lost, 0
+        _log.warning("%s: %d messages from %s to %s (bus clock) are lost: %s", where, lost, since, until, reason)
