@@ -22,8 +22,13 @@ def test_folders_are_private_and_gone_afterwards(runtime):
         assert domain.folder == runtime / "paramove" / "one"
         for folder in (domain.folder, domain.truth_folder, domain.folder.parent):
             assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        assert stat.S_IMODE(domain.truth_folder.parent.stat().st_mode) == 0o300
+        assert domain.truth_folder.parent == runtime / "paramove" / "truth-one"
+        first = domain.truth_folder.name
         assert not domain.truth_folder.is_relative_to(domain.folder)
     assert [path.name for path in (runtime / "paramove").iterdir()] == ["one.lock"]
+    with held_domain("one", "a test") as domain:
+        assert domain.truth_folder.name != first
 
 
 def test_second_holder_is_told_of_the_first(runtime):
@@ -40,10 +45,12 @@ def test_second_holder_is_told_of_the_first(runtime):
 def test_leftovers_of_a_killed_run_are_removed(runtime):
     (runtime / "paramove" / "one").mkdir(parents=True, mode=0o700)
     (runtime / "paramove" / "one" / "clock").touch()
-    (runtime / "paramove" / "truth-one-xyz").mkdir()
+    (runtime / "paramove" / "truth-one" / "xyz").mkdir(parents=True)
+    (runtime / "paramove" / "truth-one").chmod(0o300)
     with held_domain("one", "a test") as domain:
         assert list(domain.folder.iterdir()) == []
-        assert [path.name for path in domain.folder.parent.glob("truth-*")] == [domain.truth_folder.name]
+        domain.truth_folder.parent.chmod(0o700)
+        assert list(domain.truth_folder.parent.iterdir()) == [domain.truth_folder]
 
 
 @pytest.mark.parametrize("name", ["", "..", "a/b", "A", "a" * 41, "a b"])

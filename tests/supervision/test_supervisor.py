@@ -1,13 +1,18 @@
 """Real processes under real supervision."""
 
+import io
 import os
 import re
+import stat
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 from ruamel.yaml import YAML
 
-from paramove.supervision import exit_codes
+from paramove.supervision import application, exit_codes
+from paramove.supervision.view import LineView
+from tests.recording.small_disk import fill, small_disk
 
 
 def test_nodes_start_in_order_and_end_against_it(workspace):
@@ -203,6 +208,37 @@ nodes:
     assert not list(Path(os.environ["XDG_RUNTIME_DIR"]).glob("paramove/truth-*"))
     _, second, _ = workspace.run()
     assert second.path != folder.path
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o077])
+def test_all_that_a_run_writes_is_for_its_user_only(workspace, umask):
+    before = os.umask(umask)
+    try:
+        workspace.write("nodes:\n  one: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0}}\n")
+        _, folder, _ = workspace.run()
+        assert os.umask(umask) == umask
+    finally:
+        os.umask(before)
+    files = [folder.path, *folder.path.rglob("*")]
+    assert {path.name for path in files} >= {"run.yaml", "launch.yaml", "events.jsonl", "one.log", "one.yaml"}
+    assert "events.txt" in {path.name for path in files}  # the node wrote it itself
+    for path in files:
+        assert stat.S_IMODE(path.stat().st_mode) == (0o700 if path.is_dir() else 0o600), path
+
+
+def test_an_outcome_that_finds_no_room_changes_nothing(workspace, caplog):
+    workspace.write("nodes:\n  one: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: 0}}\n")
+    with small_disk(workspace.root / "runs", 2) as runs:
+
+        def filled(folder):
+            fill(runs)
+            return LineView(Console(file=io.StringIO()))
+
+        _, folder = application.run(workspace.load(), workspace.root, filled)
+        facts = YAML(typ="safe").load((folder.path / "run.yaml").read_text())
+    assert "outcome" not in facts
+    assert facts["launch"] == "test"
+    assert "run.yaml does not tell the outcome: No space left on device" in caplog.text
 
 
 def test_node_over_its_memory_limit_is_given_up_with_the_figure(workspace):

@@ -1,5 +1,6 @@
 """Ends, stops and silence of nodes: seen, told in one sentence, and written into the log of events."""
 
+import json
 import os
 import signal
 
@@ -7,6 +8,7 @@ import pytest
 
 from paramove.supervision import exit_codes
 from paramove.supervision.events import EventLog, signal_name
+from tests.recording.small_disk import fill, small_disk
 
 MAIN = "  main: {module: nodes.silent_actor, ends_run: true, parameters: {lasts_s: %s}}\n"
 LONG = MAIN % 1e6
@@ -142,3 +144,17 @@ def test_log_of_events_outlives_a_full_disk(caplog):
     assert [record.message for record in caplog.records] == [
         "the log of events cannot be written: No space left on device"
     ]
+
+
+def test_log_of_events_goes_on_when_there_is_space_again(tmp_path):
+    with small_disk(tmp_path / "disk", 1) as disk, EventLog(disk / "events.jsonl") as events:
+        filler = fill(disk)
+        os.truncate(filler, filler.stat().st_size - 4096)  # room for one block: a line is cut off in it
+        for number in range(200):
+            events.write("ready", sentence=str(number))
+        filler.unlink()
+        events.write("ended", sentence="the last")
+        *whole, cut, last = (disk / "events.jsonl").read_text().splitlines()
+    assert [json.loads(line)["sentence"] for line in whole] == [str(number) for number in range(len(whole))]
+    assert not cut.endswith("}")
+    assert json.loads(last)["sentence"] == "the last"

@@ -35,7 +35,11 @@ def test_no_ordinary_node_can_learn_of_the_truth(launcher):
     judge = launcher.latest / "logs" / "judge.log"
     until(lambda: judge.exists() and "ready" in judge.read_text(), "the judge is ready")
     runtime = Path(launcher.environment["XDG_RUNTIME_DIR"]) / "paramove"
-    (truth_folder,) = runtime.glob("truth-*")
+    (hidden,) = runtime.glob("truth-*")
+    assert stat.S_IMODE(hidden.stat().st_mode) == 0o300
+    told = YAML(typ="safe").load((launcher.latest / "nodes" / "judge.yaml").read_text())
+    truth_folder = Path(told["bus"]["truth_folder"])
+    assert truth_folder.parent == hidden
     bus_folder = runtime / "test"
     sockets = {"truth.layout", "truth.state"}
     until(lambda: sockets <= {path.name for path in truth_folder.iterdir()}, "the simulator says the truth")
@@ -66,7 +70,7 @@ def test_no_ordinary_node_can_learn_of_the_truth(launcher):
         assert not any(str(truth_folder) in link for link in links), name
     process.terminate()
     process.communicate(timeout=60)
-    assert not truth_folder.exists()
+    assert not hidden.exists()
 
 
 def test_a_bus_without_the_folder_refuses_topics_of_truth(tmp_path):

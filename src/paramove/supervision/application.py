@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import importlib.metadata
+import logging
 import os
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,8 @@ from paramove.supervision.limits import allow_open_files
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+
+_log = logging.getLogger(__name__)
 
 
 class NoWorkspaceError(FileNotFoundError):
@@ -57,7 +61,7 @@ def run(
     interfaces = check(launch, workspace)
     allow_open_files()
     name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
-    with held_domain(name, f"paramove launch {launch.name}") as domain:
+    with _private_files(), held_domain(name, f"paramove launch {launch.name}") as domain:
         begun = datetime.datetime.now().astimezone()
         folder = RunFolder.create((runs or workspace / "runs").resolve(), begun)
         folder.write_effective(launch)
@@ -83,8 +87,21 @@ def run(
                 for node in supervisor.nodes.values()
             },
         }
-        folder.write_run(facts)
+        try:
+            folder.write_run(facts)
+        except OSError as error:  # a full disk does not change how the run ended
+            _log.warning("%s does not tell the outcome: %s", folder.path / "run.yaml", error.strerror)
     return outcome, folder
+
+
+@contextlib.contextmanager
+def _private_files() -> Iterator[None]:
+    """Whatever the launcher, its nodes and the evaluation after the run make is for their user only: 0700 and 0600."""
+    before = os.umask(0o077)
+    try:
+        yield
+    finally:
+        os.umask(before)
 
 
 def _facts(launch: Launch, workspace: Path, domain: str, begun: datetime.datetime) -> dict[str, Any]:

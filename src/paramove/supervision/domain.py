@@ -34,7 +34,7 @@ class Domain:
     Attributes:
         name: Of the domain, `default` unless PARAMOVE_DOMAIN says otherwise.
         folder: Sockets of the bus.
-        truth_folder: Sockets of the ground truth, in a place that the bus folder does not tell.
+        truth_folder: Sockets of the ground truth; has a random name below a folder that cannot be listed (mode 0300).
     """
 
     name: str
@@ -85,13 +85,19 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
         lock.truncate(0)
         lock.write(f"pid {os.getpid()} ({holder})")
         lock.flush()
-        for old in (folder, *runtime.glob(f"truth-{name}-*")):
-            shutil.rmtree(old, ignore_errors=True)  # sockets of a run that was killed
-        folder.mkdir(mode=0o700)
-        truth = Path(tempfile.mkdtemp(prefix=f"truth-{name}-", dir=runtime))
+        hidden = runtime / f"truth-{name}"
+        _remove(folder, hidden)  # of a run that was killed
         try:
-            yield Domain(name, folder, truth)
+            folder.mkdir(mode=0o700)
+            hidden.mkdir(mode=0o300)
+            yield Domain(name, folder, Path(tempfile.mkdtemp(prefix="", dir=hidden)))
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
-            shutil.rmtree(truth, ignore_errors=True)
+            _remove(folder, hidden)
             lock.truncate(0)
+
+
+def _remove(folder: Path, hidden: Path) -> None:
+    with contextlib.suppress(FileNotFoundError):
+        hidden.chmod(0o700)  # else its owner could not list it either
+    for one in (folder, hidden):
+        shutil.rmtree(one, ignore_errors=True)

@@ -26,17 +26,22 @@ class EventLog:
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
         self._broken = False
+        self._cut = b""  # ends a line that a full disk has cut off
 
     def write(self, event: str, **facts: Any) -> None:
-        """Appends one event; facts that are None are left out. A full disk is told once and ends no run."""
+        """Appends one event; facts that are None are left out. A full disk is told once each time and ends no run."""
         monotonic_ns = time.monotonic_ns()
         wall = datetime.datetime.now().astimezone().isoformat(timespec="microseconds")
         known = {name: value for name, value in facts.items() if value is not None}
         line = json.dumps({"monotonic_ns": monotonic_ns, "wall": wall, "event": event, **known}, ensure_ascii=False)
+        left = self._cut + line.encode("utf-8", errors="backslashreplace") + b"\n"
         try:
-            os.write(self._file, line.encode("utf-8", errors="backslashreplace") + b"\n")
+            while left:
+                left = left[os.write(self._file, left) :]
+                self._cut = b"\n" if left else b""
+            self._broken = False
         except OSError as error:
             if not self._broken:
                 _log.warning("the log of events cannot be written: %s", error.strerror)

@@ -1,4 +1,4 @@
-"""The folder of one run: effective launch file, node configurations, logs, outcome."""
+"""The folder of one run: effective launch file, node configurations, logs, outcome. Only its owner may read it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
+from paramove.documents.atomic_writing import replacing
 from paramove.supervision.launch_file import Launch
 
 
@@ -103,5 +104,5 @@ def _write(path: Path, content: Any) -> None:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    with path.open("w", encoding="utf-8") as file:
+    with replacing(path, 0o600) as unfinished, unfinished.open("w", encoding="utf-8") as file:
         yaml.dump(content, file)

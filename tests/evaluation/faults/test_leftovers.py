@@ -52,10 +52,10 @@ def test_a_socket_that_is_listened_at_is_found_and_a_stale_one_is_not(runtime: P
     assert left_over(DOMAIN, runtime) == []
 
 
-@pytest.mark.parametrize("where", ["{}/clock.lock", "{}.lock", "truth-{}-x/truth.state.lock"])
+@pytest.mark.parametrize("where", ["{}/clock.lock", "{}.lock", "truth-{}/x/truth.state.lock"])
 def test_a_held_lock_is_found_and_a_free_one_is_not(runtime: Path, where: str) -> None:
     path = runtime / where.format(DOMAIN)
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         assert left_over(DOMAIN, runtime) == [f"lock {path.name} is held"]

@@ -34,7 +34,9 @@ def left_over(domain: str, runtime: Path) -> list[str]:
         runtime: Folder above the domain's.
     """
     words = [f"process {pid} ({command})" for pid, command in processes_of(domain)]
-    places = [runtime / domain, *runtime.glob(f"truth-{domain}-*")]
+    places = [runtime / domain, runtime / f"truth-{domain}"]
+    with contextlib.suppress(FileNotFoundError):
+        places[1].chmod(0o700)  # nobody may list it while a run goes on
     # A folder that goes meanwhile is passed over, as `rglob` does not.
     files = [Path(top) / name for place in places for top, _, names in os.walk(place) for name in names]
     files.append(runtime / f"{domain}.lock")
