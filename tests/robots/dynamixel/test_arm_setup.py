@@ -133,7 +133,8 @@ def test_a_port_that_leads_elsewhere_when_it_is_opened_again_is_not_driven(tmp_p
         link.unlink()
         emulator.plug_in()
         person.hears_until(lambda: arm.trouble == "")
-        person.waits_for("DISARMED")
+        person.arms()
+        person.waits_for("ARMED")
 
 
 def test_an_arm_whose_servos_are_always_late_is_heard_if_it_may_be_read_slowly(tmp_path):

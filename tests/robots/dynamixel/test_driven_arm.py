@@ -66,13 +66,14 @@ class PersonAtEmulator(Person):
 
 
 @pytest.fixture
-def emulator():
-    with DynamixelEmulator(emulated_servos(ROBOT)) as emulator:
+def emulator(tmp_path):
+    with DynamixelEmulator(emulated_servos(ROBOT), tmp_path / "port") as emulator:
         yield emulator
 
 
 def port(emulator, latency_s: float = LATENCY_S):
-    port = servo_port(ROBOT, emulator.port)
+    """By its link: a terminal's own name is another program's as soon as it is unplugged."""
+    port = servo_port(ROBOT, str(emulator.link))
     port.latency_s = latency_s
     return port
 

@@ -61,6 +61,7 @@ class DynamixelEmulator:
 
     Attributes:
         faults: What goes wrong on the wire; may be replaced at any time.
+        link: As given.
         port: Name of the terminal; another one after `plug_in`.
     """
 
@@ -75,7 +76,7 @@ class DynamixelEmulator:
         self.faults = WireFaults()
         self.lock = threading.Lock()
         """Held while the servos hear and move; hold it to look at them."""
-        self._link = link
+        self.link = link
         self._began_s = time.monotonic()
         self._stopped, self._moved = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._serve, name="dynamixel_emulator", daemon=True)
@@ -125,16 +126,16 @@ class DynamixelEmulator:
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         self.port = os.ttyname(self._theirs)
-        if self._link is not None:
-            if self._link.exists() and not self._link.is_symlink():
-                raise InputError(f"{self._link} is there already and no link: name another place for the port")
-            self._link.unlink(missing_ok=True)
-            self._link.symlink_to(self.port)
+        if self.link is not None:
+            if self.link.exists() and not self.link.is_symlink():
+                raise InputError(f"{self.link} is there already and no link: name another place for the port")
+            self.link.unlink(missing_ok=True)
+            self.link.symlink_to(self.port)
         self._wanted = self.plugged_in = True
 
     def _close(self) -> None:
-        if self._link is not None:  # first: the terminal's name may be another program's as soon as it is closed
-            self._link.unlink(missing_ok=True)
+        if self.link is not None:  # first: the terminal's name may be another program's as soon as it is closed
+            self.link.unlink(missing_ok=True)
         os.close(self._ours)
         os.close(self._theirs)
         self.plugged_in = False
