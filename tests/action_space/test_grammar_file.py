@@ -52,7 +52,7 @@ def test_a_file(tmp_path):
     path = tmp_path / "loop.yaml"
     path.write_text(GOOD, encoding="utf-8")
     assert read_grammar(path).steps[0].name == "point"
-    with pytest.raises(GrammarError, match="there is no such grammar") as caught:
+    with pytest.raises(GrammarError, match="there is no grammar") as caught:
         read_grammar(tmp_path / "none.yaml")
     assert caught.value.missing
     path.write_bytes(b"\xff\xfe\x00")

@@ -125,8 +125,8 @@ def test_a_second_start_names_the_first(start: Start, bus: Bus) -> None:
     [
         ("node: x\nbus: {folder: /tmp/x, clok: simulated}\n", r"bus\.clok: Extra inputs are not permitted"),
         ("node: x\nbus: {folder: /tmp/x}\nparameters: {greting: 1}\n", r"parameters\.greting: Extra inputs"),
-        ("node: [\n", "line 2"),
-        ("", "valid dictionary"),
+        ("node: [\n", r"node\.yaml:2:1"),
+        ("", "the file is empty"),
     ],
 )
 def test_a_wrong_file_is_refused_with_the_key(tmp_path: Path, text: str, message: str) -> None:
@@ -137,7 +137,7 @@ def test_a_wrong_file_is_refused_with_the_key(tmp_path: Path, text: str, message
 
 
 def test_a_missing_or_wrong_file_ends_with_78(start: Start, tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match="No such file"):
+    with pytest.raises(ConfigurationError, match="there is no configuration"):
         read_node_file(tmp_path / "none.yaml", Config)
     process = start("{greting: 1}")
     _, errors = process.communicate(timeout=60)

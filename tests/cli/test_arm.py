@@ -179,7 +179,7 @@ def test_verify_without_a_calibration_says_so(desk):
     desk.plug_in()
     done = desk.arm("verify")
     assert done.exit_code == 66
-    assert "no calibration at" in done.stderr
+    assert "no calibration of an arm" in done.stderr
 
 
 def test_reboot_tells_the_error_first(desk):

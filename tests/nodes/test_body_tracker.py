@@ -120,7 +120,7 @@ def test_late_images_are_left_out(cameras, images):
 
 
 def test_one_camera_and_none_are_refused(tmp_path):
-    with pytest.raises(InputError, match="no calibration file there"):
+    with pytest.raises(InputError, match="there is no calibration file"):
         run(tmp_path / "none.yaml", [])
     write_cameras(tmp_path / "one.yaml", EYES[:1])
     with pytest.raises(InputError, match="need at least two calibrated cameras"):

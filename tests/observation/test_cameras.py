@@ -77,7 +77,7 @@ def test_a_wrong_file_is_refused_with_what_would_help(tmp_path):
     with pytest.raises(InputError, match="paramove calibrate cameras"):
         read_cameras(tmp_path / "none.yaml")
     for text, message in (
-        ("cameras: [", "no YAML"),
+        ("cameras: [", "in YAML"),
         ("cameras: 3", "a list 'cameras'"),
         ("cameras: [{name: a}]", "the keys name, width_px"),
     ):

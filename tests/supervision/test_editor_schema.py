@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
+from paramove.documents.positions import LaunchFileError, read_mapping
 from paramove.supervision.editor_schema import FILES, as_text, editor_schema
 from paramove.supervision.launch_file import load, validated
-from paramove.supervision.positions import LaunchFileError, read_mapping
 
 ROOT = Path(__file__).parents[2]
 LAUNCH = ROOT / "launch"

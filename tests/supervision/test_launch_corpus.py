@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
+from paramove.documents.positions import MAX_CHARACTERS, LaunchFileError
 from paramove.supervision import application, wiring
 from paramove.supervision.launch_file import load
-from paramove.supervision.positions import MAX_CHARACTERS, LaunchFileError
 
 ROOT = Path(__file__).parents[2]
 CORPUS = ROOT / "tests" / "data" / "launch"
@@ -72,7 +72,7 @@ def test_what_editors_make_of_a_file_does_not_matter(tmp_path, content):
         (b"\xff\xfe\x00n", "cannot be read as UTF-8 text"),
         (b"nodes: \x00", "bad.yaml:1:8: control character '\\x00'"),
         (b"#" * (MAX_CHARACTERS + 1), f"{MAX_CHARACTERS + 1} characters; at most {MAX_CHARACTERS} are read"),
-        (b"#" * 2**20, "1048576 bytes: no launch file is that large"),
+        (b"#" * 2**20, "expected a launch file of at most 0.381 MB, found 1.0 MB"),
     ],
     ids=["no UTF-8", "zero byte", "too long", "1 MB"],
 )

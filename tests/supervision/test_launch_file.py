@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paramove.documents.positions import LaunchFileError, read_mapping
 from paramove.supervision.launch_file import LaunchFileMissingError, load, start_waves, validated
-from paramove.supervision.positions import LaunchFileError, read_mapping
 from paramove.supervision.supervisor import stop_waves
 
 GOOD = """\

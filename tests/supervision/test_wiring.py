@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from paramove.bus import topics
+from paramove.documents.positions import LaunchFileError
 from paramove.supervision.interfaces import InterfaceError, read_interface
-from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
 
 ROOT = Path(__file__).parents[2]

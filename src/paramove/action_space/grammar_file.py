@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from paramove.action_space.grammar import NEW, Follower, Grammar, Step, Switching
+from paramove.documents.files import read_text
+from paramove.documents.positions import MAX_CHARACTERS, Document, KeyPath, LaunchFileError, read_mapping
 from paramove.input_error import InputError
 from paramove.supervision.names import nearest
-from paramove.supervision.positions import Document, KeyPath, LaunchFileError, read_mapping
 
 EXAMPLE = "begin: point(a)"
 KEYS = ("description", "begin", "after", "actions", "switching")
@@ -40,13 +41,7 @@ class _Call(NamedTuple):
 
 def read_grammar(path: Path) -> Grammar:
     """The grammar in a file. Raises GrammarError."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise GrammarError(f"{path}: there is no such grammar", missing=True) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise GrammarError(f"{path}: cannot be read as UTF-8 text: {error}") from error
-    return parsed_grammar(text, str(path))
+    return parsed_grammar(read_text(path, "grammar", GrammarError, 4 * MAX_CHARACTERS), str(path))
 
 
 def parsed_grammar(text: str, source: str = "grammar") -> Grammar:

@@ -6,8 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.grammar_file import read_grammar
@@ -20,6 +18,7 @@ from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
+from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
@@ -65,11 +64,8 @@ def read_person(path: Path) -> Person:
     """The person of a YAML file. Raises InputError if there is none or it holds something else."""
     example = "shoulder: [-0.27, -0.18, 0.35], upper_arm: 0.28, forearm: 0.24, hand: 0.17, all in m"
     try:
-        return Person.model_validate(YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")))
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file; it tells a person's measures, as {example}", missing=True) from error
-    except (OSError, YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {error}; expected a YAML file with {example}") from error
+        remedy = f"it tells a person's measures, as {example}"
+        return Person.model_validate(read_document(path, "file of a person", remedy=remedy).data)
     except ValidationError as error:
         found = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
         raise InputError(f"{path}: {found}; expected as {example}") from error

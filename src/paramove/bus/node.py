@@ -23,8 +23,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from paramove.bus.bus import Bus
 from paramove.bus.endpoint import BusFolderError, TopicTakenError
@@ -33,6 +31,7 @@ from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
+from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 
 __all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "read_node_file"]
@@ -67,19 +66,14 @@ class NodeFile(BaseModel):
 Config = TypeVar("Config", bound=NodeConfig)
 
 
-class ConfigurationError(Exception):
+class ConfigurationError(InputError):
     """The node's file is missing or wrong; the text is for people."""
 
 
 def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Config]:
     """Reads and checks the file behind `--config`; raises ConfigurationError with every wrong key named."""
     try:
-        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-        file = NodeFile.model_validate(content)
-    except OSError as error:
-        raise ConfigurationError(f"{path}: {error.strerror}") from error
-    except YAMLError as error:
-        raise ConfigurationError(f"{path}: {error}") from error
+        file = NodeFile.model_validate(read_document(path, "configuration of a node", ConfigurationError).data)
     except ValidationError as error:
         raise ConfigurationError(_sentence(path, error)) from error
     try:

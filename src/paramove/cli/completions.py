@@ -120,8 +120,8 @@ def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Ite
 
 def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
+    from paramove.documents.positions import LaunchFileError, read_mapping
     from paramove.supervision.names import overlay_folder
-    from paramove.supervision.positions import LaunchFileError, read_mapping
 
     modules: dict[str, str] = {}
     with contextlib.suppress(OSError, LaunchFileError, UnicodeDecodeError):

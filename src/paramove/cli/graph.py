@@ -68,11 +68,11 @@ def graph(
 
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
+    from paramove.documents.positions import LaunchFileError
     from paramove.supervision import exit_codes
     from paramove.supervision.application import NoWorkspaceError, check, find_workspace
     from paramove.supervision.graph import graph_of
     from paramove.supervision.launch_file import LaunchFileMissingError, load
-    from paramove.supervision.positions import LaunchFileError
 
     try:
         workspace = find_workspace(Path.cwd())

@@ -12,12 +12,12 @@ from pathlib import Path
 from rich.console import Console
 
 from paramove.cli.live_view import AnnouncingView, with_page
+from paramove.documents.positions import LaunchFileError
 from paramove.supervision import application, exit_codes
 from paramove.supervision.domain import DomainError, DomainNameError
 from paramove.supervision.environment import Environment, examined
 from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
 from paramove.supervision.limits import LimitError
-from paramove.supervision.positions import LaunchFileError
 from paramove.supervision.queued_output import QueuedOutput
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, View

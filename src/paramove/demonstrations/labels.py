@@ -18,11 +18,12 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.files import read_text
+from paramove.documents.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
 from paramove.supervision.names import closest, nearest
-from paramove.supervision.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
 
 FILE_NAME = "labels.yaml"
-MAX_CHARACTERS = 20_000_000
+MAX_CHARACTERS = 4_000_000
 EXAMPLE = "segments: [{recording: a.mcap, start: 0.0, end: 2.5, action: reaching}]"
 HEAD = """\
 # A demonstration set. Each segment is one movement: start and end in seconds from the first pose of its recording.
@@ -123,10 +124,7 @@ def load_labels(path: Path) -> Labels:
 
 
 def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DemonstrationError(f"{path} cannot be read as UTF-8 text: {error}") from error
+    return read_text(path, "text of labels", DemonstrationError, 4 * MAX_CHARACTERS)
 
 
 def _validated(document: Document) -> LabelsFile:

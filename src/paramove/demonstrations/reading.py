@@ -9,8 +9,8 @@ from paramove.demonstrations.gaps import PointGap, fill_gaps
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
 from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
+from paramove.documents.positions import LaunchFileError, raise_any
 from paramove.supervision.names import nearest
-from paramove.supervision.positions import LaunchFileError, raise_any
 
 
 def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:

@@ -15,10 +15,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 
 from paramove.bus import topics
+from paramove.documents.positions import read_document
 from paramove.evaluation.traffic import Traffic
+from paramove.input_error import InputError
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import Recorded
@@ -36,7 +37,7 @@ HEAVY = frozenset(
 SAID_AT_THE_END = frozenset({topics.APPLICATION_STAGE.name, topics.SPEECH.name})
 
 
-class RunFolderError(ValueError):
+class RunFolderError(InputError):
     """A folder that holds no run that can be evaluated; the message says what is missing."""
 
 
@@ -257,4 +258,4 @@ def _read_json(path: Path) -> dict[str, Any]:
 def _read_yaml(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    return dict(YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")) or {})
+    return read_document(path, "file of a run", RunFolderError).data

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from paramove.bus import topics
+from paramove.documents.positions import read_document
 from paramove.evaluation.after_a_run import evaluated, write_run_json
 from paramove.evaluation.recorded_run import RunFolderError
+from paramove.input_error import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import PartedRecording
 
@@ -114,8 +114,8 @@ def _truth_in(folder: Path) -> list[TruthState]:
 def _tasks_in(folder: Path) -> list[dict[str, Any]]:
     path = folder / "nodes" / "reacher.yaml"
     try:
-        return list(YAML(typ="safe").load(path.read_text(encoding="utf-8"))["parameters"]["tasks"])
-    except (OSError, YAMLError, KeyError, TypeError) as error:
+        return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
+    except (InputError, KeyError, TypeError) as error:
         raise RunFolderError(f"{path} does not tell the tasks of the run ({error!r})") from error
 
 

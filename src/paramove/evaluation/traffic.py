@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-
 from paramove.bus import topics
+from paramove.documents.positions import read_document
 from paramove.recording.reader import Recorded
 from paramove.supervision.interfaces import InterfaceError, read_interface
 
@@ -84,7 +83,7 @@ def speakers(launch_file: Path, workspace: Path) -> dict[str, str]:
     found: dict[str, str] = {}
     if not launch_file.is_file():
         return found
-    launch = YAML(typ="safe", pure=True).load(launch_file.read_text(encoding="utf-8")) or {}
+    launch = read_document(launch_file, "launch file of a run").data
     for node, settings in launch.get("nodes", {}).items():
         try:
             interface = read_interface(settings["module"], workspace)

@@ -18,10 +18,10 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from numpy.typing import ArrayLike, NDArray
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 from scipy.spatial.transform import Rotation
 
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 
 Floats = NDArray[np.float64]
@@ -195,13 +195,8 @@ def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
 
 def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
     """The cameras of a calibration file. Raises InputError if there is none or it holds something else."""
-    if not path.exists():
-        raise InputError(f"{path}: no calibration file there; `paramove calibrate cameras` writes one", missing=True)
-    try:
-        content = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is no YAML file: {error}") from error
-    listed = content.get("cameras") if isinstance(content, dict) else None
+    content = read_document(path, "calibration file", remedy="`paramove calibrate cameras` writes one").data
+    listed = content.get("cameras")
     if not isinstance(listed, list) or not listed:
         raise InputError(f"{path}: a list 'cameras' expected; `paramove calibrate cameras` writes one")
     return tuple(_camera(path, number, entry) for number, entry in enumerate(listed))

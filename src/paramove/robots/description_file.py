@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
+from paramove.documents.findings import findings
+from paramove.documents.positions import read_document
 from paramove.input_error import InputError
-from paramove.robots.yaml_findings import findings
 
 POSITION_MODE_MOST = 4095
 
@@ -156,18 +155,10 @@ class RobotFile(_Part):
 def read_robot_file(path: Path) -> RobotFile:
     """Read and check a `robot.yaml`. Raises DescriptionError with every wrong key, what was found and expected."""
     try:
-        raw = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-        file = RobotFile.model_validate(raw)
-    except FileNotFoundError:
-        raise DescriptionError(
-            f"no robot description at {path}: name the folder that holds robot.yaml", missing=True
-        ) from None
-    except OSError as error:
-        raise DescriptionError(f"{path} cannot be read: {error.strerror}") from error
+        remedy = "name the folder that holds robot.yaml"
+        file = RobotFile.model_validate(read_document(path, "robot description", DescriptionError, remedy).data)
     except ValidationError as error:
         raise DescriptionError(f"{path}: {findings(error)}") from error
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise DescriptionError(f"{path}: {error}") from error
     _check(path, file)
     return file
 

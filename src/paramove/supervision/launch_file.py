@@ -11,9 +11,8 @@ from typing import get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from paramove.supervision.launch_schema import LaunchFile, NodeSettings
-from paramove.supervision.names import closest, nearest, overlay_folder
-from paramove.supervision.positions import (
+from paramove.documents.files import read_text
+from paramove.documents.positions import (
     MAX_CHARACTERS,
     Document,
     KeyPath,
@@ -22,6 +21,9 @@ from paramove.supervision.positions import (
     raise_any,
     read_mapping,
 )
+from paramove.input_error import InputError
+from paramove.supervision.launch_schema import LaunchFile, NodeSettings
+from paramove.supervision.names import closest, nearest, overlay_folder
 from paramove.supervision.references import with_values, wrong_references
 
 _QUOTED = re.compile(r"'([^']*)'")
@@ -166,11 +168,9 @@ def path_of(folder: Path, name: str, kind: str, others: Sequence[str] = ()) -> P
 
 def _read(path: Path) -> Document:
     try:
-        if path.stat().st_size > 4 * MAX_CHARACTERS:
-            raise LaunchFileError(Position(str(path)), f"{path.stat().st_size} bytes: no launch file is that large")
-        text = path.read_text(encoding="utf-8-sig")  # an editor may have written a byte order mark
-    except (OSError, UnicodeDecodeError) as error:
-        raise LaunchFileError(Position(str(path)), f"cannot be read as UTF-8 text: {error}") from error
+        text = read_text(path, "launch file", most_bytes=4 * MAX_CHARACTERS)
+    except InputError as error:
+        raise LaunchFileError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
     return read_mapping(text, str(path))
 
 

@@ -17,10 +17,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from paramove.documents.positions import LaunchFileError
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.names import nearest
-from paramove.supervision.positions import LaunchFileError
 
 PATIENCE_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from paramove.documents.positions import Document, LaunchFileError, Position, read_value
 from paramove.supervision.names import nearest
-from paramove.supervision.positions import Document, LaunchFileError, Position, read_value
 
 Findings = list[LaunchFileError]
 

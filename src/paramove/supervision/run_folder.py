@@ -103,6 +103,7 @@ def _point_latest(runs: Path, path: Path) -> None:
 def _write(path: Path, content: Any) -> None:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
+    yaml.representer.ignore_aliases = lambda _: True  # readers refuse them
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     with replacing(path, 0o600) as unfinished, unfinished.open("w", encoding="utf-8") as file:
         yaml.dump(content, file)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from paramove.bus import topics
 from paramove.bus.topics import CLOCK, Topic
+from paramove.documents.positions import LaunchFileError, raise_any
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.names import nearest
 from paramove.supervision.parameters import wrong_parameters
-from paramove.supervision.positions import LaunchFileError, raise_any
 
 
 def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:

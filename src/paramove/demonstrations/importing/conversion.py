@@ -15,8 +15,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError, Floats, place_of_theta
 from paramove.demonstrations.writing import Take, recording_name
+from paramove.documents.positions import read_document
 from paramove.supervision.names import nearest
-from paramove.supervision.positions import LaunchFileError, read_mapping
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"
@@ -160,17 +160,9 @@ class MappingFile(BaseModel):
 
 def read_mapping_file(path: Path) -> ImportOptions:
     """Options of a mapping file; raises DemonstrationError with file:line:column of what is wrong."""
+    document = read_document(path, "mapping file", DemonstrationError, "it has lines such as points: {index: RFIN}")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError as error:
-        raise DemonstrationError(f"there is no mapping file {path}", missing=True) from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise DemonstrationError(f"{path} cannot be read as UTF-8 text: {error}") from error
-    try:
-        document = read_mapping(text, str(path), example="points: {index: RFIN}")
         found = MappingFile.model_validate(document.data)
-    except LaunchFileError as error:
-        raise DemonstrationError(str(error)) from error
     except ValidationError as error:
         first = error.errors()[0]
         keys = tuple(str(part) for part in first["loc"])

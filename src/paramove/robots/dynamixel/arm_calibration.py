@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.findings import findings
+from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 from paramove.robots.dynamixel.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
-from paramove.robots.yaml_findings import findings
 
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
@@ -136,15 +136,9 @@ class ArmCalibration(_Part):
     def read(cls, path: Path) -> Self:
         """As `load`, but of whatever adapter and signature."""
         try:
-            found = cls.model_validate(YAML(typ="safe").load(path.read_text(encoding="utf-8")))
-        except FileNotFoundError:
-            raise CalibrationError(f"no calibration at {path}: run `paramove arm calibrate`", missing=True) from None
-        except OSError as error:
-            raise CalibrationError(f"{path} cannot be read: {error.strerror}") from error
+            found = cls.model_validate(read_document(path, "calibration of an arm", CalibrationError, _REMEDY).data)
         except ValidationError as error:
             raise CalibrationError(f"{path}: {findings(error)}; {_REMEDY}") from error
-        except (YAMLError, ValueError, RecursionError) as error:  # numbers and dates that are none, too many brackets
-            raise CalibrationError(f"{path} is no YAML: {error}; {_REMEDY}") from error
         found.check(str(path))
         return found
 

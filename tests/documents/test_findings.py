@@ -3,7 +3,7 @@
 import pytest
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from paramove.robots.yaml_findings import findings
+from paramove.documents.findings import findings
 
 
 class Part(BaseModel):

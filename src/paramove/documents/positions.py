@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -16,11 +17,15 @@ from ruamel.yaml.events import (
     CollectionStartEvent,
     DocumentStartEvent,
     Event,
+    MappingStartEvent,
     NodeEvent,
     ScalarEvent,
 )
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.reader import ReaderError
+
+from paramove.documents.files import read_text
+from paramove.input_error import InputError
 
 MAX_CHARACTERS = 100_000
 MAX_DEPTH = 20
@@ -142,55 +147,61 @@ def read_mapping(text: str, source: str, *, max_characters: int = MAX_CHARACTERS
 
     Raises LaunchFileError with the positions of all that is refused; what is no YAML ends the search.
     """
-    node = _composed(text, source, max_characters)
     start = Position(source, 1, 1)
-    if node is None or (isinstance(node, ScalarNode) and _tag(node) == "null"):
+    data, positions = _read(text, source, max_characters)
+    if data is None:
         raise LaunchFileError(start, f"the file is empty; expected a mapping such as '{example}'")
-    if not isinstance(node, MappingNode):
-        raise LaunchFileError(start, f"expected a mapping at the top level, found a {_kind(node)}")
-    reader = _Reader(source, {(): start})
-    data = reader.plain(node, ())
-    raise_any(reader.findings)
-    return Document(data, reader.positions)
+    if not isinstance(data, dict):
+        kind = "list" if isinstance(data, list) else "single value"
+        raise LaunchFileError(start, f"expected a mapping at the top level, found a {kind}")
+    return Document(data, {(): start} | positions)
+
+
+def read_document(path: Path, kind: str, raising: type[InputError] = InputError, remedy: str = "") -> Document:
+    """The mapping in a YAML file; arguments as of `read_text`.
+
+    Raises `raising` for a file that cannot be read and for what `read_mapping` refuses.
+    """
+    text = read_text(path, kind, raising, 4 * MAX_CHARACTERS, remedy)
+    try:
+        return read_mapping(text, str(path), example="name: value")
+    except LaunchFileError as error:
+        raise raising(f"{error}; expected a {kind} in YAML" + (f"; {remedy}" if remedy else "")) from error
 
 
 def read_value(text: str, source: str) -> Any:
     """Reads one YAML value, such as the right side of `--set camera.rate_hz=15`; raises LaunchFileError."""
-    reader = _Reader(source, {})
     try:
-        node = _composed(text, source)
-        value = None if node is None else reader.plain(node, ())
-        raise_any(reader.findings)
+        return _read(text, source, MAX_CHARACTERS)[0]
     except LaunchFileError as error:  # lines and columns of an argument would only confuse
         raise LaunchFileError.of([LaunchFileError(Position(source), one.message) for one in error]) from error
-    return value
 
 
-def _composed(text: str, source: str, max_characters: int = MAX_CHARACTERS) -> Node | None:
-    """The tree of nodes; None of an empty text."""
+def _read(text: str, source: str, max_characters: int) -> tuple[Any, dict[KeyPath, Position]]:
+    """The value of a text, None of an empty one, and where its keys and elements stood; raises LaunchFileError."""
     if len(text) > max_characters:
         raise LaunchFileError(Position(source), f"{len(text)} characters; at most {max_characters} are read")
-    refused: list[LaunchFileError] = []
+    reader = _Reader(text, source)
     try:
-        _refuse_unwanted(text, source, refused)
-        raise_any(refused)
-        node: Node | None = _yaml().compose(text)
-        return node
+        data = reader.document()
     except ReaderError as error:
         before = text[: error.position]
         where = Position(source, before.count("\n") + 1, len(before) - before.rfind("\n"))
         letter = text[error.position : error.position + 1]
-        raise LaunchFileError.of([*refused, LaunchFileError(where, f"control character {letter!r}")]) from error
+        raise LaunchFileError.of([*reader.refused, LaunchFileError(where, f"control character {letter!r}")]) from error
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = Position(source, mark.line + 1, mark.column + 1) if mark else Position(source)
-        raise LaunchFileError.of([*refused, LaunchFileError(where, _explained(error))]) from error
-    except (YAMLError, RecursionError, ValueError) as error:
+        raise LaunchFileError.of([*reader.refused, LaunchFileError(where, _explained(error))]) from error
+    except (YAMLError, RecursionError, ValueError, LookupError) as error:
         if isinstance(error, LaunchFileError):
             raise
         raise LaunchFileError(Position(source), f"cannot be read as YAML: {' '.join(str(error).split())}") from error
+    raise_any(reader.refused or reader.findings)
+    return data, reader.positions
 
 
+_SECOND = "expected a single document in the stream but found another document"
 _EXPLANATIONS = (
     (r"found character '\\t'", "a tab: indent with spaces"),
     (r"mapping values are not allowed here", "no ': ' can stand here: wrong indentation, or a text that needs quotes"),
@@ -214,26 +225,6 @@ def _explained(error: MarkedYAMLError) -> str:
     return " ".join(problem.split())
 
 
-def _yaml() -> YAML:
-    yaml = YAML(typ="safe", pure=True)
-    yaml.version = (1, 2)
-    return yaml
-
-
-def _refuse_unwanted(text: str, source: str, refused: list[LaunchFileError]) -> None:
-    """Collects what is never needed, before anything is built from the text."""
-    depth = 0
-    for event in _yaml().parse(text):
-        where = Position(source, event.start_mark.line + 1, event.start_mark.column + 1)
-        message = _refusal(event)
-        if message:
-            refused.append(LaunchFileError(where, message))
-        depth += isinstance(event, CollectionStartEvent)
-        depth -= isinstance(event, CollectionEndEvent)
-        if depth > MAX_DEPTH:
-            raise LaunchFileError(where, f"more than {MAX_DEPTH} levels of nesting")
-
-
 def _refusal(event: Event) -> str:
     if isinstance(event, DocumentStartEvent) and (event.version or event.tags):
         return "'%' directives are refused: YAML 1.2 is expected"
@@ -250,68 +241,119 @@ def _refusal(event: Event) -> str:
 
 
 class _Reader:
-    """Builtin data of a tree of nodes; collects positions and findings on the way."""
+    """Builtin data of the events of a text, which are read once; collects positions and findings on the way.
 
-    def __init__(self, source: str, positions: dict[KeyPath, Position]) -> None:
-        self.positions = positions
+    Attributes:
+        positions: Of keys and elements.
+        refused: What is never needed, and hides all other findings.
+        findings: What is wrong with values and keys.
+    """
+
+    def __init__(self, text: str, source: str) -> None:
+        self.positions: dict[KeyPath, Position] = {}
+        self.refused: list[LaunchFileError] = []
         self.findings: list[LaunchFileError] = []
         self._source = source
-        self._constructor = _yaml().constructor
+        self._yaml = YAML(typ="safe", pure=True)
+        self._yaml.version = (1, 2)
+        self._events: Iterator[Event] = self._yaml.parse(text)
+        self._depth = 0
 
-    def plain(self, node: Node, path: KeyPath) -> Any:
-        """Data of the node at `path`."""
-        if isinstance(node, MappingNode):
-            return self._mapping(node, path)
-        if isinstance(node, SequenceNode):
-            for index, item in enumerate(node.value):
-                self.positions[*path, str(index)] = self._at(item)
-            return [self.plain(item, (*path, str(index))) for index, item in enumerate(node.value)]
-        return self._scalar(node)
+    def document(self) -> Any:
+        """The value of the only document; None if there is none."""
+        value, documents = None, 0
+        for event in self._events:
+            if isinstance(event, DocumentStartEvent):
+                documents += 1
+                if documents > 1:
+                    raise LaunchFileError.of([*self.refused, LaunchFileError(self._at(event), _SECOND)])
+                self._refuse_unwanted(event)
+            elif isinstance(event, NodeEvent):
+                value = self._value(event, ())
+        return value
 
-    def _mapping(self, node: MappingNode, path: KeyPath) -> dict[str, Any]:
+    def _next(self) -> Event:
+        return next(self._events)
+
+    def _value(self, event: Event, path: KeyPath) -> Any:
+        """Data of what begins with an event."""
+        self._refuse_unwanted(event)
+        if not isinstance(event, CollectionStartEvent):
+            return self._scalar(event) if isinstance(event, ScalarEvent) else None
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise LaunchFileError(self._at(event), f"more than {MAX_DEPTH} levels of nesting")
+        value = self._mapping(path) if isinstance(event, MappingStartEvent) else self._list(path)
+        self._depth -= 1
+        return value
+
+    def _list(self, path: KeyPath) -> list[Any]:
+        result: list[Any] = []
+        while not isinstance(event := self._next(), CollectionEndEvent):
+            place = (*path, str(len(result)))
+            self.positions[place] = self._at(event)
+            result.append(self._value(event, place))
+        return result
+
+    def _mapping(self, path: KeyPath) -> dict[str, Any]:
         result: dict[str, Any] = {}
-        for key_node, item in node.value:
-            where = self._at(key_node)
-            key = key_node.value
-            if not isinstance(key_node, ScalarNode) or _tag(key_node) != "str":
-                shown = f"'{key}'" if isinstance(key, str) else f"a {_kind(key_node)}"
+        while not isinstance(event := self._next(), CollectionEndEvent):
+            key = event.value if isinstance(event, ScalarEvent) else ""
+            where, place = self._at(event), (*path, key)
+            self._refuse_unwanted(event)
+            if not isinstance(event, ScalarEvent) or self._tag(event) != "str":
+                if isinstance(event, CollectionStartEvent):
+                    self._value(event, place)
+                shown = f"'{key}'" if isinstance(event, ScalarEvent) else f"a {_kind(event)}"
                 self.findings.append(LaunchFileError(where, f"key {shown} is no string; write it in quotes"))
             elif _CONTROL.search(key):
                 self.findings.append(LaunchFileError(where, f"control characters in the key {key[:80]!r}"))
             elif key in result:
-                first = self.positions[*path, key]
+                first = self.positions[place]
                 self.findings.append(LaunchFileError(where, f"duplicate key '{key}': it is in line {first.line} too"))
             else:
-                self.positions[*path, key] = where
-                result[key] = self.plain(item, (*path, key))
+                self.positions[place] = where
+            value = self._value(self._next(), place)
+            result.setdefault(key, value)
         return result
 
-    def _scalar(self, node: Node) -> Any:
-        if _tag(node) not in ("str", "int", "float", "bool", "null"):
-            self._refuse(node, f"'{node.value}' would be a {_tag(node)}, which is not taken; write it in quotes")
+    def _refuse_unwanted(self, event: Event) -> None:
+        message = _refusal(event)
+        if message:
+            self.refused.append(LaunchFileError(self._at(event), message))
+
+    def _scalar(self, event: ScalarEvent) -> Any:
+        tag = self._tag(event)
+        if tag not in ("str", "int", "float", "bool", "null"):
+            self._find(event, f"'{event.value}' would be a {tag}, which is not taken; write it in quotes")
             return None
-        try:
-            value = self._constructor.construct_object(node, deep=True)
-        except ValueError:  # more digits than Python converts
-            self._refuse(node, f"a number of {len(node.value)} characters is refused")
-            return None
+        value = event.value
+        if tag != "str":
+            node = ScalarNode(f"tag:yaml.org,2002:{tag}", event.value, event.start_mark, event.end_mark)
+            try:
+                value = self._yaml.constructor.construct_object(node, deep=True)
+            except ValueError:  # more digits than Python converts
+                self._find(event, f"a number of {len(event.value)} characters is refused")
+                return None
         if isinstance(value, float) and not math.isfinite(value):
-            self._refuse(node, f"'{node.value}' is refused: numbers are finite")
+            self._find(event, f"'{event.value}' is refused: numbers are finite")
         if isinstance(value, str) and _CONTROL.search(value):
-            self._refuse(node, f"control characters in {value[:80]!r}")
+            self._find(event, f"control characters in {value[:80]!r}")
         return value
 
-    def _refuse(self, node: Node, message: str) -> None:
-        self.findings.append(LaunchFileError(self._at(node), message[:300]))
+    def _tag(self, event: ScalarEvent) -> str:
+        """`int` of `tag:yaml.org,2002:int`."""
+        if event.ctag is not None and str(event.ctag) != "!":
+            return "str"  # it is refused elsewhere
+        tag = self._yaml.resolver.resolve(ScalarNode, event.value, event.implicit)
+        return str(tag).rpartition(":")[2]
 
-    def _at(self, node: Node) -> Position:
-        return Position(self._source, node.start_mark.line + 1, node.start_mark.column + 1)
+    def _find(self, event: Event, message: str) -> None:
+        self.findings.append(LaunchFileError(self._at(event), message[:300]))
+
+    def _at(self, event: Event) -> Position:
+        return Position(self._source, event.start_mark.line + 1, event.start_mark.column + 1)
 
 
-def _tag(node: Node) -> str:
-    """`int` of `tag:yaml.org,2002:int`."""
-    return str(node.tag).rpartition(":")[2]
-
-
-def _kind(node: Node) -> str:
-    return "list" if isinstance(node, SequenceNode) else "mapping" if isinstance(node, MappingNode) else "single value"
+def _kind(event: Event) -> str:
+    return "mapping" if isinstance(event, MappingStartEvent) else "list"
