@@ -55,12 +55,12 @@ def list_models(
 
 def _is_model(file: Path) -> bool:
     """Whether an .npz calls itself a model; others, such as recordings, are passed over."""
-    import zipfile
+    from paramove.documents.arrays import read_arrays
 
+    names = {"format_version", "header"}
     try:
-        with zipfile.ZipFile(file) as archive:
-            return {"format_version.npy", "header.npy"} <= set(archive.namelist())
-    except (OSError, zipfile.BadZipFile):
+        return names == read_arrays(file, only=names).keys()
+    except InputError:
         return True  # damaged: to be told
 
 

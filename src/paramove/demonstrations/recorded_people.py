@@ -15,6 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.arrays import read_arrays
+from paramove.input_error import InputError
+
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -31,7 +34,7 @@ FINGERTIPS = ("index", "indexFinger")
 UNITS = {"m": 1.0, "mm": 0.001}
 
 
-class RecordingsError(ValueError):
+class RecordingsError(InputError):
     """A folder of recordings is missing or does not have the layout described above."""
 
 
@@ -143,8 +146,7 @@ def load_recordings(name: str, folder: str | Path | None = None, *, rate_hz: flo
     path = data_folder(folder) / name / "data.npz"
     if not path.is_file():
         raise RecordingsError(f"{path} is missing: a data set is a folder with a file data.npz")
-    with np.load(path, allow_pickle=False) as file:
-        arrays = {key: file[key] for key in file.files}
+    arrays = read_arrays(path, raising=RecordingsError)
     try:
         return _recordings(name, arrays, rate_hz)
     except KeyError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,8 @@ from paramove.hmm.compilation import compiled
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+MOST_MONOMIALS = 5000
+MOST_PARAMETERS = 12
 
 
 @dataclass(frozen=True)
@@ -30,15 +33,23 @@ class Monomials:
 
     @classmethod
     def of_degree(cls, degree: int, theta: Floats) -> Monomials:
-        """Monomials for labels (K, P), which give centre and scale. Raises ValueError for a degree below 1."""
+        """Monomials for labels (K, P), which give centre and scale.
+
+        Raises ValueError for a degree below 1, and for more monomials or parameters than are ever used.
+        """
         if degree < 1:
             raise ValueError(f"the degree of a polynomial model is at least 1, found {degree}")
         lower, upper = theta.min(axis=0), theta.max(axis=0)
         half = 0.5 * (upper - lower)
         scale = np.where(half > 0.0, half, 1.0)
-        powers = itertools.product(range(degree + 1), repeat=theta.shape[1])
-        kept = sorted((p for p in powers if sum(p) <= degree), key=lambda p: (sum(p), [-e for e in p]))
-        return cls(np.array(kept, dtype=np.int64), 0.5 * (lower + upper), scale)
+        each = range(theta.shape[1])
+        if len(each) > MOST_PARAMETERS or degree > MOST_MONOMIALS or comb(len(each) + degree, degree) > MOST_MONOMIALS:
+            raise ValueError(
+                f"expected at most {MOST_PARAMETERS} parameters and {MOST_MONOMIALS} monomials, "
+                f"found degree {degree} of {len(each)} parameters"
+            )
+        factors = (f for total in range(degree + 1) for f in itertools.combinations_with_replacement(each, total))
+        return cls(np.array([[one.count(p) for p in each] for one in factors]), 0.5 * (lower + upper), scale)
 
     @property
     def degrees(self) -> Ints:

@@ -8,7 +8,6 @@ Many: `flat` (frames, 3 P), `flat_time`, `offsets` (movements + 1,), `points`, `
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError, Floats
 from paramove.demonstrations.writing import Label
+from paramove.documents.arrays import read_arrays
 
 TARGET = ("target_x", "target_y", "target_z")
 SIDES = {"L": "left", "R": "right", "left": "left", "right": "right"}
@@ -28,17 +28,13 @@ def read_npz(path: Path) -> tuple[list[RawTake], list[str]]:
 
     Raises DemonstrationError for arrays that are missing or do not fit together.
     """
-    try:
-        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
-        raise DemonstrationError(f"{path} cannot be read as NPZ: {error}; arrays of objects are refused") from error
+    arrays = read_arrays(path, raising=DemonstrationError)
     try:
         return _many(path, arrays) if "flat" in arrays else ([_one(path, arrays)], [])
     except KeyError as error:
         there = ", ".join(sorted(arrays))
         raise DemonstrationError(f"{path}: the array {error} is missing; there are {there}") from error
-    except (IndexError, ValueError, TypeError) as error:
+    except (IndexError, ValueError, TypeError, ArithmeticError) as error:
         if isinstance(error, DemonstrationError):
             raise
         raise DemonstrationError(f"{path}: its arrays do not fit together: {error}") from error

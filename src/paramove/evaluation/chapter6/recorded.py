@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.demonstrations import Demonstrations
 from paramove.demonstrations.recorded_people import RecordedMovement, data_folder, load_recordings
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER
+from paramove.documents.arrays import read_arrays
 from paramove.hmm.sequences import resample
 from paramove.observation.arm_body import BENT_POSE_POINTS, ArmSizes
 from paramove.phmm import MovementDescription
@@ -79,8 +80,8 @@ def recorded_pointing(folder: str | Path | None = None) -> tuple[RecordedPointin
     recordings = load_recordings(DATA_SET, folder, rate_hz=RATE_HZ)
     names = recordings.point_names
     wanted = [names.index(name) for name in ("rightShoulder", "forearm", "hand", "indexFinger")]
-    with np.load(data_folder(folder) / DATA_SET / "data.npz", allow_pickle=False) as file:
-        heights = np.asarray(file["subject_height"], dtype=np.float64) / USUAL_HEIGHT
+    arrays = read_arrays(data_folder(folder) / DATA_SET / "data.npz", only=["subject_height"])
+    heights = np.asarray(arrays["subject_height"], dtype=np.float64) / USUAL_HEIGHT
     result: list[RecordedPointing] = []
     for subject in recordings.subjects:
         own = recordings.of(subject=subject)

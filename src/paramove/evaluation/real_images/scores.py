@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.arrays import read_arrays
 from paramove.evaluation.real_images.replay import Said
 from paramove.evaluation.real_images.seated_person import SIZES
 from paramove.input_error import InputError
@@ -62,11 +63,10 @@ def read_reference(folder: Path) -> Floats:
     """Middle of the hand's skin in each frame, (T, 2), px. Raises InputError."""
     path = folder / REFERENCE
     try:
-        with np.load(path, allow_pickle=False) as file:
-            places = np.asarray(file["uv"], dtype=np.float64)
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file; it tells where the hand is seen", missing=True) from error
-    except (OSError, ValueError, KeyError) as error:
+        places = np.asarray(read_arrays(path, "reference of where the hand is seen")["uv"], dtype=np.float64)
+    except (ValueError, KeyError, TypeError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: {error}; an array uv (frames, 2) expected") from error
     if places.ndim != 2 or places.shape[1] != 2:
         raise InputError(f"{path}: uv of shape {places.shape} found, (frames, 2) expected")
