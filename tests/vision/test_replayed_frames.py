@@ -58,7 +58,7 @@ def test_a_broken_picture_is_told_and_the_next_one_is_played(folder: Path) -> No
     (folder / "00001.png").write_bytes(b"broken")
     source = open_source(f"folder:{folder}@10", 16, 12)
     assert levels(source, 0) == [0]
-    with pytest.raises(FrameError, match=r"00001\.png is no picture"):
+    with pytest.raises(FrameError, match=r"00001\.png .* is no PNG"):
         source.frame(100 * MS)
     assert levels(source, 200) == [20]
 

@@ -13,11 +13,13 @@ from rich.progress import track
 
 from paramove.bus import topics
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.pictures import decoded
 from paramove.evaluation.recorded_run import recording_in
 from paramove.evaluation.run_summary import RunEvaluation
 from paramove.evaluation.story import Story
 from paramove.evaluation.video_frame import SIZE, VideoFrame
 from paramove.evaluation.video_writer import VideoError, VideoWriter
+from paramove.input_error import InputError
 
 Picture = NDArray[np.uint8]
 
@@ -75,7 +77,8 @@ def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Picture, Pi
 
 
 def _decoded(data: bytes) -> Picture:
-    image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        raise VideoError(f"an image of {len(data)} bytes in the recording cannot be decoded")
+    try:
+        image = decoded(data)
+    except InputError as error:
+        raise VideoError(f"an image of {len(data)} bytes in the recording {error}") from error
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)

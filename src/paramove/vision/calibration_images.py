@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import cv2
 import numpy as np
 
+from paramove.documents.pictures import opened_video, read_picture
 from paramove.input_error import InputError
 from paramove.vision.camera_calibration import GOOD_VIEWS, CalibrationError
 from paramove.vision.charuco_board import BoardFinder, BoardView, Image
@@ -77,7 +78,7 @@ class FolderImages:
     def _found(self, wanted: Callable[[Path], bool]) -> Found:
         if self._views is None:
             finder = BoardFinder()
-            self._views = [(path, finder.find(_read(path), path.name)) for path in self._paths]
+            self._views = [(path, finder.find(read_picture(path), path.name)) for path in self._paths]
         looked_at = [view for path, view in self._views if wanted(path)]
         return Found(tuple(view for view in looked_at if view is not None), len(looked_at))
 
@@ -209,24 +210,10 @@ def file_source(path: Path) -> FolderImages | VideoImages:
     return VideoImages(path)
 
 
-def _read(path: Path) -> Image:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise InputError(
-            f"{path} ({path.stat().st_size} bytes) cannot be read: a whole image expected; remove the file"
-        )
-    return image
-
-
 def _video(path: Path) -> Iterator[tuple[float, Image]]:
-    capture: Any = cv2.VideoCapture(str(path))
+    capture = opened_video(path)
     try:
-        rate_hz = capture.get(cv2.CAP_PROP_FPS)
-        if not capture.isOpened() or not 0.1 <= rate_hz <= 1000.0:
-            raise InputError(
-                f"{path} ({path.stat().st_size} bytes) is no video that OpenCV can read: mp4 or avi expected"
-            )
-        count = 0
+        rate_hz, count = capture.get(cv2.CAP_PROP_FPS), 0
         while True:
             done, image = capture.read()
             if not done:

@@ -12,6 +12,7 @@ import cv2
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.diagnosis.devices import holders
+from paramove.documents.pictures import opened_video
 from paramove.input_error import InputError
 from paramove.vision.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
 from paramove.vision.replayed_frames import FolderFrames, RecordingFrames
@@ -89,21 +90,15 @@ class FileFrames:
     hears_light = False
 
     def __init__(self, path: Path) -> None:
-        if not path.is_file():
-            found = "a folder or device" if path.exists() else "nothing"
-            raise SourceError(f"no video file {path}: an existing file (mp4, avi, ...) expected, {found} found", True)
         self._path = path
-        self._capture: Capture = cv2.VideoCapture(str(path))
+        self._capture: Capture = opened_video(path, SourceError)
         self._rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
         self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        if not self._capture.isOpened() or not 0.1 <= self._rate_hz <= 1000.0 or not self._capture.grab():
-            self._capture.release()
-            raise SourceError(
-                f"{path} ({path.stat().st_size} bytes) is no video that OpenCV can read, or is cut off: an mp4 or avi "
-                "with frames expected"
-            )
+        readable = self._capture.grab()
         self._capture.release()
-        self._capture = cv2.VideoCapture(str(path))  # from the first frame on
+        if not readable:
+            raise SourceError(f"{path} ({path.stat().st_size} bytes) holds no frame: it is cut off or damaged")
+        self._capture = opened_video(path, SourceError)  # from the first frame on
         self._start_ns: int | None = None
         self._grabbed = 0
 

@@ -15,6 +15,9 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
+from paramove.documents.pictures import JPEG, decoded
+from paramove.input_error import InputError
+
 Image = NDArray[Any]  # uint8 [H, W, 3], BGR
 
 CAMERA_FRAME = "camera_optical"
@@ -22,10 +25,6 @@ DARK_LEVEL = 16.0
 """Mean of 255 below which noise hides the colours. A lens cap gives 0 to 5, the demo's darkest scene 50."""
 SATURATED_SHARE = 0.95
 _TO_BGR = {"bgr8": None, "8UC3": None, "rgb8": cv2.COLOR_RGB2BGR}
-
-
-MOST_PIXELS = 50_000_000
-"""Of a compressed image, which may claim more than memory holds in a few bytes."""
 
 
 class FrameError(RuntimeError):
@@ -144,40 +143,11 @@ def encode(frame: Frame, jpeg_quality: int = 95) -> CompressedImage:
 
 def decode(message: CompressedImage) -> Image:
     """BGR pixels of a compressed image. Raises FrameError for empty, corrupt or cut data and for huge sizes."""
-    image, fault = None, "cannot be decoded"
-    width, height = _claimed_size(message.data)
-    if width * height > MOST_PIXELS:
-        fault = f"claims {width} x {height} px, {MOST_PIXELS} px together allowed"
-    elif width * height and message.data[:2] == _JPEG and b"\xff\xd9" not in message.data[-64:]:
-        fault = "is cut off"  # OpenCV would fill the missing part with grey
-    elif width * height:
-        try:
-            image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
-        except cv2.error as error:
-            fault = f"cannot be decoded ({error.err})"
-    if image is None:
+    try:
+        if message.data[:2] == JPEG and b"\xff\xd9" not in message.data[-64:]:
+            raise InputError("is cut off")  # OpenCV would fill the missing part with grey
+        return decoded(message.data)
+    except InputError as error:
         raise FrameError(
-            f"compressed image ({message.format!r:.20}, {len(message.data)} bytes) {fault}: whole JPEG or PNG expected",
-            "corrupt",
-        )
-    return image
-
-
-_JPEG = b"\xff\xd8"
-_PNG = b"\x89PNG\r\n\x1a\n"
-_NO_FRAME_HEADER = frozenset((0xC4, 0xC8, 0xCC))
-
-
-def _claimed_size(data: bytes) -> tuple[int, int]:
-    """Width and height in the header of a JPEG or PNG; 0, 0 if there is none."""
-    if data[:8] == _PNG:
-        return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    place = 2 if data[:2] == _JPEG else len(data)
-    while place + 9 <= len(data) and data[place] == 0xFF:
-        marker = data[place + 1]
-        if 0xC0 <= marker <= 0xCF and marker not in _NO_FRAME_HEADER:
-            return int.from_bytes(data[place + 7 : place + 9], "big"), int.from_bytes(
-                data[place + 5 : place + 7], "big"
-            )
-        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
-    return 0, 0
+            f"compressed image ({message.format!r:.20}, {len(message.data)} bytes) {error}", "corrupt"
+        ) from error

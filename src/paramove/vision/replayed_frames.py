@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
+from paramove.documents.pictures import read_picture
 from paramove.input_error import InputError
 from paramove.recording.reader import Recorded, read
 from paramove.vision.frames import EndOfFrames, Frame, FrameError, decode
@@ -46,11 +46,10 @@ class FolderFrames:
         if index >= len(self._files):
             raise EndOfFrames(f"{self._folder} has ended after {len(self._files)} pictures")
         self._next = index + 1
-        image = cv2.imread(str(self._files[index]), cv2.IMREAD_COLOR)
-        if image is None:
-            raise FrameError(
-                f"{self._files[index]} is no picture that can be read: a whole JPEG or PNG expected", "corrupt"
-            )
+        try:
+            image = read_picture(self._files[index])
+        except InputError as error:
+            raise FrameError(str(error), "corrupt") from error
         return Frame(image, now_ns, index)
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import cv2
 import numpy as np
@@ -24,7 +24,9 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 from ruamel.yaml import YAML
 
+from paramove.documents.arrays import read_arrays
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.pictures import decoded
 from paramove.evaluation.chapter6.performances import KINDS, Act, Split, split_of
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
@@ -104,9 +106,9 @@ class Clip:
         """The images of a view, RGB [H, W, 3], one per time. Raises InputError for a view without images."""
         if view not in self.views:
             raise InputError(f"clip {self.name}: view {view} has no images; views with images are {self.views}")
-        with np.load(self.folder / SEEN, allow_pickle=False) as file:
-            packed, offsets = file[f"view_{view}"], file[f"offsets_{view}"]
-        return self._noisy(unpacked(packed, offsets), view)
+        names = (f"view_{view}", f"offsets_{view}")
+        arrays = read_arrays(self.folder / SEEN, "clip", only=names)
+        return self._noisy(unpacked(*(arrays[name] for name in names)), view)
 
     def frames(self, views: Sequence[int] | None = None) -> Iterator[tuple[Image | None, ...]]:
         """For each time the images of all four views; None for a view that has none or is not wanted."""
@@ -128,8 +130,7 @@ class Clip:
     @cached_property
     def truth(self) -> Truth:
         """What is true: for evaluators, never for a tracker."""
-        with np.load(self.folder / TRUTH, allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
+        arrays = read_arrays(self.folder / TRUTH, "clip's truth")
         return Truth(
             arrays["poses"],
             arrays["wrist"],
@@ -139,6 +140,9 @@ class Clip:
             arrays["shoulder"],
             read_cameras(self.folder / TRUE_CAMERAS),
         )
+
+
+_ABOUT = ("version", "name", "kind", "number", "times_s", "views", "sizes", "shoulder", "noise")
 
 
 def clips_folder() -> Path:
@@ -161,19 +165,19 @@ def read_clip(folder: Path) -> Clip:
             f"{folder}: a clip of code {rendered_by} found, {clips_code()} expected; `python -m sim.performances` "
             "renders it again, in the clone"
         )
-    with np.load(folder / SEEN, allow_pickle=False) as file:
-        return Clip(
-            folder,
-            str(file["name"]),
-            str(file["kind"]),
-            int(file["number"]),
-            file["times_s"],
-            tuple(int(view) for view in file["views"]),
-            read_cameras(folder / CAMERAS),
-            _sizes(file["sizes"]),
-            file["shoulder"],
-            float(file["noise"]),
-        )
+    found = read_arrays(folder / SEEN, "clip", only=_ABOUT)
+    return Clip(
+        folder,
+        str(found["name"]),
+        str(found["kind"]),
+        int(found["number"]),
+        found["times_s"],
+        tuple(int(view) for view in found["views"]),
+        read_cameras(folder / CAMERAS),
+        _sizes(found["sizes"]),
+        found["shoulder"],
+        float(found["noise"]),
+    )
 
 
 def read_clips(folder: Path | None = None, kind: str | None = None, split: Split | None = None) -> tuple[Clip, ...]:
@@ -254,7 +258,7 @@ def unpacked(packed: NDArray[np.uint8], offsets: NDArray[np.int64]) -> Iterator[
     """The images again."""
     image: Image | None = None
     for begin, end in pairwise(offsets):
-        step = cast(Image, cv2.imdecode(packed[begin:end], cv2.IMREAD_COLOR))
+        step = decoded(packed[begin:end].tobytes())
         image = step if image is None else image + step
         yield image
 

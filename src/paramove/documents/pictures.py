@@ -1,0 +1,127 @@
+"""Pictures and videos, whose size in pixels is known before memory is taken for them."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.documents.files import MEBIBYTE, read_bytes, size_of, unreadable
+from paramove.input_error import InputError
+
+MOST_PIXELS = 50_000_000
+"""Of one picture, which may claim more than memory holds in a few bytes."""
+PICTURE_BYTES = 256 * MEBIBYTE
+VIDEO_BYTES = 2**40
+JPEG = b"\xff\xd8"
+_PNG = b"\x89PNG\r\n\x1a\n"
+_NO_FRAME_HEADER = frozenset((0xC4, 0xC8, 0xCC))
+_TIFF = {b"II*\0": "<", b"MM\0*": ">"}
+_VIDEOS = (b"....ftyp", b"RIFF....AVI ", b"\x1aE\xdf\xa3", b"....moov", b"....mdat", b"....free", b"....wide")
+
+
+def decoded(data: bytes) -> NDArray[np.uint8]:
+    """BGR pixels [H, W, 3] of a PNG, JPEG, BMP, WebP or TIFF file.
+
+    Raises InputError, which tells what is wrong with the data but not where they come from.
+    """
+    width, height = claimed_size(data)
+    if not width * height:
+        raise InputError("is no PNG, JPEG, BMP, WebP or TIFF: a whole JPEG or PNG expected")
+    if width * height > MOST_PIXELS:
+        raise InputError(f"claims {width} x {height} px, {MOST_PIXELS} px together allowed")
+    try:
+        image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise InputError(f"cannot be decoded ({error.err}): a whole JPEG or PNG expected") from error
+    if image is None:
+        raise InputError("cannot be decoded: a whole JPEG or PNG expected")
+    return np.asarray(image, dtype=np.uint8)
+
+
+def read_picture(path: Path, raising: type[InputError] = InputError) -> NDArray[np.uint8]:
+    """BGR pixels [H, W, 3] of a file. Raises `raising` for a missing or damaged file, and for huge pictures."""
+    data = read_bytes(path, "picture", raising, PICTURE_BYTES)
+    try:
+        return decoded(data)
+    except InputError as error:
+        raise raising(f"{path} ({len(data)} bytes) cannot be read: it {error}; remove the file") from error
+
+
+def claimed_size(data: bytes) -> tuple[int, int]:
+    """Width and height, px, in the header of a picture; 0, 0 of anything else."""
+    try:
+        if data[:8] == _PNG:
+            width, height = struct.unpack_from(">II", data, 16)
+        elif data[:2] == JPEG:
+            width, height = _of_jpeg(data)
+        elif data[:2] == b"BM":
+            old = struct.unpack_from("<I", data, 14)[0] == 12
+            width, height = struct.unpack_from("<HH" if old else "<ii", data, 18)
+        elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+            width, height = _of_webp(data)
+        elif data[:4] in _TIFF:
+            width, height = _of_tiff(data, _TIFF[data[:4]])
+        else:
+            return 0, 0
+    except (struct.error, IndexError):  # the header is cut off
+        return 0, 0
+    return abs(width), abs(height)
+
+
+def _of_jpeg(data: bytes) -> tuple[int, int]:
+    place = 2
+    while data[place] == 0xFF:
+        marker = data[place + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in _NO_FRAME_HEADER:
+            height, width = struct.unpack_from(">HH", data, place + 5)
+            return width, height
+        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return 0, 0
+
+
+def _of_webp(data: bytes) -> tuple[int, int]:
+    if data[12:16] == b"VP8X":
+        return 1 + int.from_bytes(data[24:27], "little"), 1 + int.from_bytes(data[27:30], "little")
+    if data[12:16] == b"VP8L":
+        bits = struct.unpack_from("<I", data, 21)[0]
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack_from("<HH", data, 26)
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _of_tiff(data: bytes, order: str) -> tuple[int, int]:
+    found = {256: 0, 257: 0}
+    begin = struct.unpack_from(order + "I", data, 4)[0]
+    for number in range(struct.unpack_from(order + "H", data, begin)[0]):
+        tag, kind, _ = struct.unpack_from(order + "HHI", data, begin + 2 + 12 * number)
+        if tag in found:
+            found[tag] = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, begin + 10 + 12 * number)[0]
+    return found[256], found[257]
+
+
+def opened_video(path: Path, raising: type[InputError] = InputError) -> Any:
+    """A cv2.VideoCapture of an mp4, mov, avi, mkv or webm file with a sound frame rate and size.
+
+    Raises `raising` for everything else, also for play lists, which would lead to other files.
+    """
+    size = size_of(path, "video file (mp4, avi, ...)", raising, VIDEO_BYTES)
+    try:
+        with path.open("rb") as file:
+            begin = file.read(12)
+    except OSError as error:
+        raise raising(unreadable(path, error)) from error
+    known = any(all(part in (ord("."), byte) for part, byte in zip(one, begin, strict=False)) for one in _VIDEOS)
+    capture: Any = cv2.VideoCapture(str(path) if known and len(begin) == 12 else "")
+    pixels = capture.get(cv2.CAP_PROP_FRAME_WIDTH) * capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
+    if not capture.isOpened() or not 0.1 <= capture.get(cv2.CAP_PROP_FPS) <= 1000.0 or not 1 <= pixels <= MOST_PIXELS:
+        capture.release()
+        raise raising(
+            f"{path} ({size} bytes) is no video that OpenCV can read, or is cut off: an mp4 or avi with frames of at "
+            f"most {MOST_PIXELS} px expected"
+        )
+    return capture
