@@ -50,7 +50,7 @@ def read_poses(path: Path) -> PoseRecording:
     file = path if path.is_file() or not part.is_file() else part
     times, poses, frames = [], [], set()
     with contextlib.suppress(FileNotFoundError):
-        for recorded in read(file, only=[HUMAN_ARM_POSE.name]):
+        for recorded in read(file, [HUMAN_ARM_POSE.name], DemonstrationError):
             times.append(recorded.message.captured.ToNanoseconds())
             poses.append({point.name: (point.x, point.y, point.z) for point in recorded.message.points})
             frames.add(recorded.message.frame)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import re
-import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -12,7 +11,6 @@ from io import BytesIO
 from typing import Any
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -31,20 +29,17 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from zstandard import ZstdDecompressor, ZstdError
 
 from paramove.bus import topics
+from paramove.recording.chunks import HEAD_BYTES, RECORD_BYTES, WRONG, allowance, begin, records, whole
 from paramove.recording.writer import CHANNELS
 
 MAGIC = b"\x89MCAP0\r\n"
-HEAD_BYTES = 9  # opcode and length of a record
 CHUNK_HEAD_BYTES = 40  # of a chunk, without the name of its compression
 Content = mmap.mmap | bytes
 
 COMPRESSION = re.compile(rb"\x04\x00\x00\x00zstd|\x03\x00\x00\x00lz4")
 BEFORE_COMPRESSION = HEAD_BYTES + 28
-WRONG = (McapError, ValueError, EOFError, struct.error, ZstdError, OverflowError, MemoryError, KeyError)
-"""What a record that is damaged makes its reader raise."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +94,7 @@ class Survey:
         statistics: Of a file that was finished.
         finished: Whether the file ends as a finished one does.
         indexed: What the index of the newest chunk has to say of each channel: log time and offset of its messages.
+        allowed: Bytes to which further chunks may decompress.
     """
 
     parts: list[Sound | Damage] = field(default_factory=list)
@@ -108,6 +104,7 @@ class Survey:
     statistics: Statistics | None = None
     finished: bool = False
     indexed: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+    allowed: int = 0
 
     @property
     def damages(self) -> list[Damage]:
@@ -141,8 +138,8 @@ class Survey:
 
 def survey(content: Content) -> Survey:
     """Reads everything that is sound; never raises for what is in a file."""
-    found = Survey()
     size = len(content)
+    found = Survey(allowed=allowance(size))
     at = len(MAGIC) if content[: len(MAGIC)] == MAGIC else 0
     found.finished = size >= 2 * len(MAGIC) and content[size - len(MAGIC) :] == MAGIC
     if at == 0:
@@ -165,7 +162,7 @@ def _take_record(content: Content, at: int, found: Survey) -> int:
     if _is_chunk(content, at):
         return _take_chunk(content, at, found)
     end = at + HEAD_BYTES + _length(content, at)
-    if at + HEAD_BYTES <= len(content) and end <= len(content) and content[at] in _READERS:
+    if at + HEAD_BYTES <= len(content) and end <= min(len(content), at + RECORD_BYTES) and content[at] in _READERS:
         try:
             record = _record(content, at, end)
             if isinstance(record, Footer) and not _summary_is_sound(content, at, record):
@@ -246,7 +243,9 @@ def _take_chunk(content: Content, at: int, found: Survey) -> int:
     end = at + HEAD_BYTES + _length(content, at)
     cut = end > len(content)
     try:
-        placed = list(_records_at(content, at))
+        data = _data_of(content, at, found.allowed)
+        found.allowed -= len(data)
+        placed = list(records(data, cut))
     except WRONG:
         placed = []
         if not cut:
@@ -273,57 +272,26 @@ def _records_at(content: Content, at: int) -> Iterator[tuple[int, Channel | Sche
     end = at + HEAD_BYTES + _length(content, at)
     if content[at] == Opcode.MESSAGE:
         yield at, _record(content, at, end)
-        return
+    else:
+        yield from records(_data_of(content, at, RECORD_BYTES), cut=end > len(content))
+
+
+def _data_of(content: Content, at: int, most_bytes: int) -> bytes:
+    """What is in the chunk at `at`; of one that is cut off, as much as its bytes that were written give."""
+    end = at + HEAD_BYTES + _length(content, at)
+    if min(end, len(content)) - at > RECORD_BYTES:
+        raise ValueError("a chunk that is too large")
     missing = max(0, end - len(content))
     chunk = Chunk.read(ReadDataStream(BytesIO(content[at + HEAD_BYTES : end] + bytes(min(missing, 1)))))
-    if missing:
-        written = content[end - _data_bytes(content, at) :]
-        yield from _records(_begin_of(chunk.compression, written), cut=True)
-    else:
-        yield from _records(_whole(chunk), cut=False)
+    if not missing:
+        return whole(chunk, most_bytes)
+    return begin(chunk.compression, content[end - _data_bytes(content, at) :], min(most_bytes, RECORD_BYTES))
 
 
 def _data_bytes(content: Content, at: int) -> int:
     """Length of what a chunk holds, compressed."""
     name = int.from_bytes(content[at + BEFORE_COMPRESSION : at + BEFORE_COMPRESSION + 4], "little")
     return _length(content, at) - CHUNK_HEAD_BYTES - name
-
-
-def _whole(chunk: Chunk) -> bytes:
-    """What is in a chunk; raises ValueError if it is not what was written."""
-    if chunk.compression == "zstd":
-        data = ZstdDecompressor().decompress(chunk.data, max_output_size=chunk.uncompressed_size)
-    elif chunk.compression:
-        raise ValueError(f"compressed with {chunk.compression}, which is not read")
-    else:
-        data = chunk.data
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise ValueError("its checksum is another")
-    return data
-
-
-def _begin_of(compression: str, data: bytes) -> bytes:
-    """As much of a chunk as its bytes that were written give."""
-    return ZstdDecompressor().decompressobj().decompress(data) if compression == "zstd" else data
-
-
-def _records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Message]]:
-    at = 0
-    while at + HEAD_BYTES <= len(data):
-        length = struct.unpack("<Q", data[at + 1 : at + HEAD_BYTES])[0]
-        end = at + HEAD_BYTES + length
-        if end > len(data):
-            break
-        stream = ReadDataStream(BytesIO(data[at + HEAD_BYTES : end]))
-        if data[at] == Opcode.MESSAGE:
-            yield at, Message.read(stream, length)
-        elif data[at] == Opcode.CHANNEL:
-            yield at, Channel.read(stream)
-        elif data[at] == Opcode.SCHEMA:
-            yield at, Schema.read(stream)
-        at = end
-    if at < len(data) and not cut:
-        raise ValueError("a record goes beyond its chunk")
 
 
 _READERS: dict[int, Any] = {

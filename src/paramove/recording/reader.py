@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import struct
+import contextlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, McapRecord, Message
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import StreamReader
-from zstandard import ZstdError  # comes with mcap
 
 from paramove.bus import topics
+from paramove.input_error import InputError
+from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
 
-# What mcap and its decompressors raise where a file ends too early or holds something else.
-_DAMAGE = (McapError, EOFError, struct.error, ZstdError, ValueError, OverflowError, MemoryError)
+MESSAGE_BYTES = 2**24
+"""Of one message: as much as the largest topic allows."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Recorded:
     sequence: int
 
 
-def read(path: Path, only: Collection[str] = ()) -> Iterator[Recorded]:
+def read(path: Path, only: Collection[str] = (), raising: type[InputError] = InputError) -> Iterator[Recorded]:
     """The messages of a recording in the order in which they were written.
 
     A file that ends in the middle of a record (its writer was killed) or is damaged gives all messages before that.
@@ -46,9 +47,11 @@ def read(path: Path, only: Collection[str] = ()) -> Iterator[Recorded]:
     Args:
         path: The file.
         only: Names of topics; empty for all.
+        raising: Class of what is raised for a message that is none.
 
     Raises:
         FileNotFoundError: There is no such file.
+        InputError: A message is none of its topic's type, or too large.
         KeyError: The file holds a topic that the topic table does not know.
     """
     types: dict[int, Any] = {}
@@ -59,9 +62,10 @@ def read(path: Path, only: Collection[str] = ()) -> Iterator[Recorded]:
                 if not only or record.topic in only:
                     types[record.id], names[record.id] = topics.by_name(record.topic).type, record.topic
             elif isinstance(record, Message) and record.channel_id in types:
+                topic = names[record.channel_id]
                 yield Recorded(
-                    names[record.channel_id],
-                    _decoded(types[record.channel_id], names[record.channel_id], record.data),
+                    topic,
+                    _decoded(path, types[record.channel_id], topic, record, raising),
                     record.log_time,
                     record.publish_time,
                     record.sequence,
@@ -70,17 +74,28 @@ def read(path: Path, only: Collection[str] = ()) -> Iterator[Recorded]:
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
     """The records up to the first that is cut off or damaged; chunks are compared with their checksums."""
-    records = StreamReader(file, validate_crcs=True, record_size_limit=max(size, 1)).records
-    while True:
-        try:
-            record = next(records)
-        except (StopIteration, *_DAMAGE):
-            return
-        yield record
+    found = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=min(max(size, 1), RECORD_BYTES))
+    allowed = allowance(size)
+    with contextlib.suppress(*WRONG):
+        for record in found.records:
+            if isinstance(record, Chunk):
+                data = whole(record, allowed)
+                allowed -= len(data)
+                yield from (one for _, one in records(data, cut=False))
+            else:
+                yield record
 
 
-def _decoded(message_type: Any, topic: str, data: bytes) -> Any:
+def _decoded(path: Path, message_type: Any, topic: str, message: Message, raising: type[InputError]) -> Any:
     """The view of the simulator is kept as JPEG; everything else as it was said."""
     if topic == topics.TRUTH_VIEW.name:
         message_type = topics.CAMERA_IMAGE.type
-    return message_type.FromString(data)
+    try:
+        if len(message.data) > MESSAGE_BYTES:
+            raise ValueError(f"{len(message.data)} bytes, at most {MESSAGE_BYTES} are read")
+        return message_type.FromString(message.data)
+    except (DecodeError, ValueError) as error:
+        raise raising(
+            f"{path}: message {message.sequence} on {topic} is no {message_type.DESCRIPTOR.full_name} ({error}); "
+            "it was recorded by something else, or damaged: record it again"
+        ) from error

@@ -1,0 +1,74 @@
+"""Chunks of MCAP files: what is in them, which may claim to be any size and is never more than is allowed."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+
+import lz4.frame  # type: ignore[import-untyped]  # comes with mcap, as zstandard does
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Schema
+from zstandard import ZstdDecompressor, ZstdError
+
+HEAD_BYTES = 9  # opcode and length of a record
+RECORD_BYTES = 128 * 2**20
+"""Of one record in a file, and of a chunk decompressed. Our chunks have 64 KiB, those of other writers some MiB."""
+ALWAYS_BYTES = 16 * 2**20
+MOST_RATIO = 100
+"""All chunks together may be so many times as large as their file; measured: 2 to 20."""
+WRONG = (McapError, ValueError, EOFError, struct.error, ZstdError, OverflowError, MemoryError, KeyError, RuntimeError)
+"""What a record that is damaged makes its reader raise."""
+
+
+def allowance(file_bytes: int) -> int:
+    """Bytes to which all chunks of a file of that size may decompress together."""
+    return ALWAYS_BYTES + MOST_RATIO * file_bytes
+
+
+def whole(chunk: Chunk, most_bytes: int) -> bytes:
+    """What is in a chunk; raises one of WRONG if it is not what was written, or more than `most_bytes`."""
+    if chunk.uncompressed_size > min(most_bytes, RECORD_BYTES):
+        raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
+    data = begin(chunk.compression, chunk.data, chunk.uncompressed_size + 1)
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError(f"it claims {chunk.uncompressed_size} bytes and has others")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("its checksum is another")
+    return data
+
+
+def begin(compression: str, data: bytes, most_bytes: int) -> bytes:
+    """The first bytes of what was compressed, as many as `data` gives and are allowed; raises one of WRONG."""
+    if compression == "zstd":
+        return bytes(ZstdDecompressor().stream_reader(data).read(most_bytes))
+    if compression == "lz4":
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most_bytes))
+    if compression:
+        raise ValueError(f"compressed with {compression}, which is not read")
+    return data[:most_bytes]
+
+
+def records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Message]]:
+    """The records in a chunk's data, with their offsets; raises one of WRONG if the last is not whole and not `cut`."""
+    at = 0
+    while at + HEAD_BYTES <= len(data):
+        length = struct.unpack_from("<Q", data, at + 1)[0]
+        end = at + HEAD_BYTES + length
+        if end > len(data):
+            break
+        stream = ReadDataStream(BytesIO(data[at + HEAD_BYTES : end]))
+        if data[at] == Opcode.MESSAGE:
+            yield at, Message.read(stream, length)
+        elif data[at] == Opcode.CHANNEL:
+            yield at, Channel.read(stream)
+        elif data[at] == Opcode.SCHEMA:
+            yield at, Schema.read(stream)
+        elif not data[at]:
+            break  # there is no record of kind 0
+        at = end
+    if at < len(data) and not cut:
+        raise ValueError("a record goes beyond its chunk, or is none")
