@@ -7,8 +7,10 @@ end of a limb ("End Site") is a point too: `<joint>_end`.
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
-from collections.abc import Iterator
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +20,13 @@ from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.documents.files import read_text
 
+MOST_LEVELS = 200
+MOST_JOINTS = 1000
+LINE_LETTERS = 2**20
+FRAMES_AT_ONCE = 10_000
+"""Of which the turns of all joints are in memory."""
 CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 
 
@@ -53,11 +61,7 @@ def read_bvh(path: Path) -> list[RawTake]:
 
     Raises DemonstrationError with the line of what is wrong.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig", errors="strict")
-    except UnicodeDecodeError as error:
-        raise DemonstrationError(f"{path} is no text, so no BVH file: {error}") from error
-    motion = parse(text, str(path))
+    motion = parse(read_text(path, "BVH file", DemonstrationError), str(path))
     names = tuple(joint.name for joint in motion.joints)
     positions = joint_positions(motion.joints, motion.values)
     time: Floats = np.arange(len(positions), dtype=np.float64) * motion.frame_time
@@ -66,6 +70,13 @@ def read_bvh(path: Path) -> list[RawTake]:
 
 def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
     """Forward kinematics. Shapes: values (T, C), C channels of all joints in their order -> (T, J, 3)."""
+    places = np.zeros((len(values), len(joints), 3))
+    for begin in range(0, len(values), FRAMES_AT_ONCE):
+        places[begin : begin + FRAMES_AT_ONCE] = _places(joints, values[begin : begin + FRAMES_AT_ONCE])
+    return places
+
+
+def _places(joints: tuple[Joint, ...], values: Floats) -> Floats:
     places = np.zeros((len(values), len(joints), 3))
     turns: list[NDArray[np.float64]] = []
     column = 0
@@ -96,14 +107,17 @@ def parse(text: str, source: str) -> Motion:
 class _Parser:
     def __init__(self, text: str, source: str) -> None:
         self._source = source
-        self._words = list(_words(text))
-        self._at = 0
+        self._lines = text.splitlines()
+        self._line = 0  # so many were begun
+        self._words: list[str] = []  # of the line that was begun last, those that were not read yet
+        if any(len(line) > LINE_LETTERS for line in self._lines):
+            raise DemonstrationError(f"{source}: a line of more than {LINE_LETTERS} characters; no BVH file has one")
         self._joints: list[Joint] = []
 
     def motion(self) -> Motion:
         self._expect("HIERARCHY")
         self._expect("ROOT")
-        self._joint(self._next("the name of the root"), -1)
+        self._joint(self._next("the name of the root"), -1, 1)
         self._expect("MOTION")
         self._expect("Frames:")
         frames = self._number("how many frames there are")
@@ -114,9 +128,11 @@ class _Parser:
             raise self._wrong(f"a frame time of {frame_time:g} s; expected such as 0.0083333")
         return Motion(tuple(self._joints), self._values(frames), frame_time)
 
-    def _joint(self, name: str, parent: int) -> None:
+    def _joint(self, name: str, parent: int, level: int) -> None:
+        if level > MOST_LEVELS or len(self._joints) == MOST_JOINTS:
+            raise self._wrong(f"more than {MOST_LEVELS} joints below each other, or than {MOST_JOINTS} altogether")
         if any(joint.name == name for joint in self._joints):
-            raise self._wrong(f"a second joint '{name}'; each needs a name of its own")
+            raise self._wrong(f"a second joint '{name:.80}'; each needs a name of its own")
         number = len(self._joints)
         self._joints.append(Joint(name, parent, np.zeros(3)))
         self._expect("{")
@@ -126,10 +142,10 @@ class _Parser:
         self._joints[number] = Joint(name, parent, offset, channels)
         while (word := self._next("JOINT, End Site or }")) != "}":
             if word == "JOINT":
-                self._joint(self._next("the name of a joint"), number)
+                self._joint(self._next("the name of a joint"), number, level + 1)
             elif word == "End":
                 self._expect("Site")
-                self._joint(f"{name}_end", number)
+                self._joint(f"{name}_end", number, level + 1)
             else:
                 raise self._wrong(f"'{word}'; expected JOINT, End Site or }}")
 
@@ -139,37 +155,45 @@ class _Parser:
         found = tuple(self._next("the name of a channel") for _ in range(int(count)))
         for name in found:
             if not CHANNEL.fullmatch(name):
-                raise self._wrong(f"channel '{name}'; expected such as Xposition or Zrotation")
+                raise self._wrong(f"channel '{name:.40}'; expected such as Xposition or Zrotation")
         return found
 
     def _values(self, frames: float) -> Floats:
         width = sum(len(joint.channels) for joint in self._joints)
-        words = [word for _, word in self._words[self._at :]]
-        line = self._words[self._at][0] if words else 0
-        try:
-            values = np.array(words, dtype=np.float64)
-        except ValueError as error:
-            at = next(n for n, word in enumerate(words) if not _is_number(word))
-            raise self._wrong(f"'{words[at]}' is no number", self._words[self._at + at][0]) from error
-        if values.size != width * frames or frames < 1 or width == 0:
+        if len(self._joints) > 2 * width:
+            raise self._wrong(f"{len(self._joints)} joints have only {width} channels")
+        self._peek()
+        first, found = self._line, array("d")
+        rest = itertools.chain([self._words[::-1]], map(str.split, self._lines[first:]))
+        for line, words in enumerate(rest, start=first):
+            try:
+                row = [float(word) for word in words]
+            except ValueError as error:
+                bad = next(word for word in words if not _is_number(word))
+                raise self._wrong(f"'{bad:.40}' is no number", line) from error
+            if not all(map(math.isfinite, row)):
+                at = next(place for place, value in enumerate(row) if not math.isfinite(value))
+                raise self._wrong(f"{words[at]:.40} in frame {(len(found) + at) // max(width, 1)}", line)
+            found.extend(row)
+        if len(found) != width * frames or frames < 1 or width == 0:
             raise self._wrong(
-                f"{values.size} numbers follow; {frames:g} frames of {width} channels need {width * frames:g}. "
+                f"{len(found)} numbers follow; {frames:g} frames of {width} channels need {width * frames:g}. "
                 "The file is cut off, or its number of frames is wrong",
-                line,
+                first,
             )
-        if not np.isfinite(values).all():
-            at = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise self._wrong(f"{words[at]} in frame {at // width}", self._words[self._at + at][0])
-        return values.reshape(-1, width)
+        return np.array(found).reshape(-1, width)
 
     def _peek(self) -> str:
-        return self._words[self._at][1] if self._at < len(self._words) else ""
+        """The next word, "" at the end."""
+        while not self._words and self._line < len(self._lines):
+            self._words = self._lines[self._line].split()[::-1]
+            self._line += 1
+        return self._words[-1] if self._words else ""
 
     def _next(self, what: str) -> str:
-        if self._at == len(self._words):
+        if not self._peek():
             raise self._wrong(f"the file ends; expected {what}")
-        self._at += 1
-        return self._words[self._at - 1][1]
+        return self._words.pop()
 
     def _expect(self, word: str) -> None:
         found = self._next(word)
@@ -183,14 +207,7 @@ class _Parser:
         return float(word)
 
     def _wrong(self, message: str, line: int = 0) -> DemonstrationError:
-        line = line or (self._words[max(self._at - 1, 0)][0] if self._words else 1)
-        return DemonstrationError(f"{self._source}:{line}: {message}")
-
-
-def _words(text: str) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(text.splitlines(), start=1):
-        for word in line.split():
-            yield number, word
+        return DemonstrationError(f"{self._source}:{line or max(self._line, 1)}: {message}")
 
 
 def _is_number(word: str) -> bool:

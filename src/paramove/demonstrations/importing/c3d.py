@@ -15,6 +15,8 @@ import numpy as np
 from paramove.demonstrations.importing import c3d_process
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents.arrays import read_arrays
+from paramove.documents.files import size_of
 
 TIME_LIMIT_S = 120.0
 
@@ -24,6 +26,7 @@ def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
 
     Raises DemonstrationError if the file cannot be read, which names the reader's complaint.
     """
+    size_of(path, "C3D file", DemonstrationError)
     with tempfile.TemporaryDirectory(prefix="paramove-c3d-") as folder:
         result = Path(folder) / "result.npz"
         command = [sys.executable, c3d_process.__file__, str(path), str(result)]
@@ -34,8 +37,7 @@ def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
         if done.returncode != 0 or not result.is_file():
             said = " ".join(done.stderr.split())[-300:] or f"the reader ended with {done.returncode}"
             raise DemonstrationError(f"{path} cannot be read as C3D: {said}; export it again")
-        with np.load(result, allow_pickle=False) as arrays:
-            found = {key: arrays[key] for key in arrays.files}
+        found = read_arrays(result, raising=DemonstrationError)
     positions = np.asarray(found["positions"], dtype=np.float64)
     names = tuple(str(name).strip() for name in found["points"])
     rate_hz = float(found["rate_hz"])

@@ -3,17 +3,25 @@
 python c3d_process.py FILE.c3d RESULT.npz
 """
 
+import os
 import resource
 import sys
 
 import numpy as np
 
-MEMORY_BYTES = 8 * 2**30
+MEMORY_BYTES = 768 * 2**20
+MEMORY_PER_BYTE = 40
+"""Of the file."""
+CPU_S = 4
+CPU_BYTES_PER_S = 2**20
 
 
 def main(source: str, result: str) -> int:
     """Points, their names, unit, rate; 0, or 1 with the reader's complaint on standard error."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    size = os.stat(source).st_size
+    memory, seconds = MEMORY_BYTES + MEMORY_PER_BYTE * size, CPU_S + size // CPU_BYTES_PER_S
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     import ezc3d
 
     try:
@@ -29,7 +37,7 @@ def main(source: str, result: str) -> int:
             unit=units[0] if units else "",
             rate_hz=float(read["header"]["points"]["frame_rate"]),
         )
-    except (OSError, RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
+    except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, MemoryError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     return 0

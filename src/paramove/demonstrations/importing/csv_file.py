@@ -5,17 +5,22 @@ from __future__ import annotations
 import csv
 import math
 import re
+from array import array
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.documents.files import size_of, unreadable
 
 COLUMN = re.compile(r"(.+?)[ _.:/-]?([xyz])", re.IGNORECASE)
 TIMES = {"time": 1.0, "time_s": 1.0, "t": 1.0, "time_ms": 1e-3, "time_ns": 1e-9, "timestamp": 1.0}
 """Names of columns with times, and their unit in seconds."""
 PASSED_OVER = {"frame", "frames", "index", "sample"}
+LINE_LETTERS = 2**20
+"""Of a line; a longer one is cut, and refused for its number of cells."""
 LOST = {"", "nan", "na", "null", "none", "-"}
 
 
@@ -24,21 +29,43 @@ def read_csv(path: Path) -> list[RawTake]:
 
     Raises DemonstrationError with line and column of what is wrong.
     """
+    size_of(path, "CSV file", DemonstrationError)
+    rows = _rows(path)
+    header = [name.strip() for name in next(rows, (0, []))[1]]
+    times, points = _columns(path, header) if header else (None, {})
+    lines, numbers = array("q"), array("d")
+    for line, row in rows:
+        lines.append(line)
+        numbers.extend(_numbers(path, line, header, row))
+    if not lines:
+        raise DemonstrationError(f"{path}: expected a header and a line for each frame, found {len(header)} columns")
+    values = np.array(numbers).reshape(len(lines), -1)
+    positions = np.stack([values[:, columns] for columns in points.values()], axis=1)
+    time = None if times is None else _time(path, lines, values[:, times], header[times])
+    return [RawTake(path.stem, time, positions, tuple(points))]
+
+
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """The cells of each line that is not empty, with its number; raises DemonstrationError for what is no CSV."""
+    number = 0
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            head = file.readline(LINE_LETTERS)
+            file.seek(0)
+            lines = iter(lambda: file.readline(LINE_LETTERS), "")
+            for row in (reader := csv.reader(lines, delimiter=max(",;\t", key=head.count), strict=True)):
+                if any(row):
+                    yield number + 1, row
+                number = reader.line_num
     except UnicodeDecodeError as error:
         raise DemonstrationError(f"{path} is no UTF-8 text: {error}") from error
-    head = text.split("\n", 1)[0]
-    separator = max(",;\t", key=head.count)
-    rows = [row for row in enumerate(csv.reader(text.splitlines(), delimiter=separator), start=1) if any(row[1])]
-    if len(rows) < 2:
-        raise DemonstrationError(f"{path}: expected a header and a line for each frame, found {len(rows)} lines")
-    header = [name.strip() for name in rows[0][1]]
-    times, points = _columns(path, header)
-    values = np.array([_numbers(path, line, header, row) for line, row in rows[1:]])
-    positions = np.stack([values[:, columns] for columns in points.values()], axis=1)
-    time = None if times is None else _time(path, rows, values[:, times], header[times])
-    return [RawTake(path.stem, time, positions, tuple(points))]
+    except csv.Error as error:
+        raise DemonstrationError(
+            f"{path}:{number + 1}: {error}; expected cells of at most {csv.field_size_limit()} characters, with closed "
+            "quotes or none"
+        ) from error
+    except OSError as error:
+        raise DemonstrationError(unreadable(path, error)) from error
 
 
 def _columns(path: Path, header: list[str]) -> tuple[int | None, dict[str, list[int]]]:
@@ -51,7 +78,7 @@ def _columns(path: Path, header: list[str]) -> tuple[int | None, dict[str, list[
         parts = COLUMN.fullmatch(name)
         if parts is None or parts[2].lower() in found.get(parts[1], {}):
             raise DemonstrationError(
-                f"{path}:1: column {number + 1} is called '{name}'; expected wrist_x, wrist_y, wrist_z, once for "
+                f"{path}:1: column {number + 1} is called '{name:.80}'; expected wrist_x, wrist_y, wrist_z, once for "
                 f"each point, and {', '.join(TIMES)} for times"
             )
         found.setdefault(parts[1], {})[parts[2].lower()] = number
@@ -79,9 +106,9 @@ def _numbers(path: Path, line: int, header: list[str], row: list[str]) -> list[f
     return values
 
 
-def _time(path: Path, rows: list[tuple[int, list[str]]], values: Floats, name: str) -> Floats:
+def _time(path: Path, lines: Sequence[int], values: Floats, name: str) -> Floats:
     bad = np.flatnonzero(np.isnan(values))
     if bad.size:
-        raise DemonstrationError(f"{path}:{rows[int(bad[0]) + 1][0]}: {name} is empty; every frame has a time")
+        raise DemonstrationError(f"{path}:{lines[int(bad[0])]}: {name} is empty; every frame has a time")
     result: Floats = (values - values[0]) * TIMES[name.lower()]
     return result
