@@ -66,7 +66,7 @@ def _value(field: Any, generator: random.Random) -> Any:
     return generator.choice([0, 1, 127, 128, 2**31 - 1])
 
 
-def mutate(content: bytes, other: bytes, generator: random.Random) -> bytes:
+def mutate(content: bytes, other: bytes, generator: random.Random, max_bytes: int = MAX_BYTES) -> bytes:
     """One to four mutations."""
     found = bytearray(content)
     for _ in range(generator.choice([1, 1, 1, 2, 4])):
@@ -95,7 +95,7 @@ def mutate(content: bytes, other: bytes, generator: random.Random) -> bytes:
                 b"\x1a\x00" * 2000,
             ]
             found[at:at] = generator.choice(bomb)
-    return bytes(found[:MAX_BYTES])
+    return bytes(found[:max_bytes])
 
 
 class Fuzzer:

@@ -16,6 +16,7 @@ from typing import Annotated
 import typer
 
 from paramove.cli.completions import typed_words
+from paramove.input_error import InputError
 from paramove.linear_algebra_threads import ONE_THREAD
 
 COMMANDS: dict[str, tuple[str, str]] = {
@@ -85,7 +86,11 @@ def main() -> None:
     """Entry point of the `paramove` script."""
     for name, number in ONE_THREAD.items():  # numpy looks when it is imported, which is later
         os.environ.setdefault(name, number)
-    build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
+    try:
+        build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
+    except InputError as error:  # of a command that has nothing more to say of it
+        sys.stderr.write(f"{error}\n")
+        sys.exit(error.exit_code)
 
 
 if __name__ == "__main__":
