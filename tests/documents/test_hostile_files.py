@@ -19,8 +19,7 @@ from paramove.bus.topics import HUMAN_ARM_POSE
 from paramove.demonstrations.pose_recording import PoseRecording, read_poses, write_poses
 from paramove.recording.recovery import recover
 
-MOST_S = 20.0
-"""On a busy machine; by itself none takes two."""
+MOST_S = 5.0
 MOST_MIB = 700.0
 """Numpy, OpenCV and compiled kernels take 300 of them before any file is read."""
 

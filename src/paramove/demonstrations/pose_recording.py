@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from paramove.recording.reader import read
 from paramove.recording.writer import RecordingWriter
 
 BILLION = 1_000_000_000
+MOST_UNSEEN = 2_000_000
+MOST_RATIO = 20
+"""Above `MOST_UNSEEN` places, the points that there are may be so many times as many as those that are seen."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +52,27 @@ def read_poses(path: Path) -> PoseRecording:
     """
     part = path.with_name(path.name + ".part")
     file = path if path.is_file() or not part.is_file() else part
-    times, poses, frames = [], [], set()
+    times, columns, frames = array("q"), dict[str, int](), set()
+    rows_seen, columns_seen, places_seen = array("q"), array("q"), array("d")
     with contextlib.suppress(FileNotFoundError):
         for recorded in read(file, [HUMAN_ARM_POSE.name], DemonstrationError):
-            times.append(recorded.message.captured.ToNanoseconds())
-            poses.append({point.name: (point.x, point.y, point.z) for point in recorded.message.points})
+            for point in recorded.message.points:
+                rows_seen.append(len(times))
+                columns_seen.append(columns.setdefault(point.name, len(columns)))
+                places_seen.extend((point.x, point.y, point.z))
+            captured_ns = recorded.message.captured.ToNanoseconds()
+            if not 0 <= captured_ns < 2**63:
+                raise DemonstrationError(f"{file}: pose {len(times)} was captured at {captured_ns / 1e9:g} s: damaged")
+            times.append(captured_ns)
             frames.add(recorded.message.frame)
-    if not poses:
+            if len(times) * len(columns) > max(MOST_UNSEEN, MOST_RATIO * len(rows_seen)):
+                raise DemonstrationError(
+                    f"{file}: {len(columns)} names of points in {len(times)} poses, of which a pose has "
+                    f"{len(rows_seen) / len(times):.1f}; expected poses of the same points"
+                )
+    if not times:
         raise _nothing(file)
-    time_ns = np.array(times, dtype=np.int64)
+    time_ns = np.array(times)
     backwards = np.flatnonzero(np.diff(time_ns) <= 0)
     if backwards.size:
         first = int(backwards[0])
@@ -66,10 +82,9 @@ def read_poses(path: Path) -> PoseRecording:
         )
     if len(frames) > 1:
         raise DemonstrationError(f"{file}: poses in different frames: {', '.join(sorted(frames))}; record them apart")
-    names = tuple(dict.fromkeys(name for pose in poses for name in pose))
-    unseen = (np.nan, np.nan, np.nan)
-    rows = [[pose.get(name, unseen) for name in names] for pose in poses]
-    return PoseRecording(time_ns, np.array(rows, dtype=np.float64).reshape(len(rows), -1, 3), names, frames.pop())
+    positions = np.full((len(times), len(columns), 3), np.nan)
+    positions[np.array(rows_seen), np.array(columns_seen)] = np.array(places_seen).reshape(-1, 3)
+    return PoseRecording(time_ns, positions, tuple(columns), frames.pop())
 
 
 def _nothing(file: Path) -> DemonstrationError:

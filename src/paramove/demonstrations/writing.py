@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
 from paramove.demonstrations.movement import DemonstrationError, Floats, Movement, Side
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
+from paramove.documents.findings import findings
 
 LIBRARY = "paramove demonstrations"
 BETWEEN_NS = 2 * BILLION
@@ -140,16 +142,19 @@ def _together(takes: Iterable[Take]) -> tuple[PoseRecording, list[Segment]]:
 
 
 def _segment(recording: str, start: float, end: float, label: Label) -> Segment:
-    return Segment(
-        recording=recording,
-        start=start,
-        end=end,
-        action=label.action,
-        theta=list(label.theta),
-        subject=label.subject,
-        repetition=label.repetition,
-        side=label.side,
-    )
+    try:
+        return Segment(
+            recording=recording,
+            start=start,
+            end=end,
+            action=label.action,
+            theta=list(label.theta),
+            subject=label.subject,
+            repetition=label.repetition,
+            side=label.side,
+        )
+    except ValidationError as error:
+        raise DemonstrationError(f"the label of {recording}, {start:g} to {end:g} s: {findings(error)}") from error
 
 
 def _in_order(takes: Sequence[Take], segments: Sequence[Segment]) -> list[Segment]:

@@ -23,6 +23,7 @@ from paramove.phmm.training_checks import check_training
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+MOST_FRAMES = 100_000
 
 
 class ParameterEstimate(NamedTuple):
@@ -257,6 +258,9 @@ class ParametricHMM(ABC):
         counts = {name: getattr(self, name) for name in ("n_states", "d_min", "d_max")}
         if not all(type(count) is int for count in counts.values()) or not 1 <= self.d_min <= self.d_max:
             raise ValueError(f"expected whole numbers with 1 <= d_min <= d_max, found {counts}")
+        frames = self.resampled_frames
+        if frames is not None and (type(frames) is not int or not 2 <= frames <= MOST_FRAMES):
+            raise ValueError(f"expected resampled_frames from 2 to {MOST_FRAMES}, found {frames!r:.40}")
         if self.n_states < 1 or not isinstance(self.description, MovementDescription | None):
             raise ValueError(f"expected at least one state, found {self.n_states}")
 

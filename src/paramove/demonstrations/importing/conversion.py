@@ -20,6 +20,9 @@ from paramove.supervision.names import nearest
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"
+LONGEST_S = 1e7
+SHORTEST_S = 1e-9
+"""Between two frames: times are written in whole nanoseconds."""
 
 DIRECTIONS = {
     "forward": (1.0, 0.0, 0.0),
@@ -107,8 +110,11 @@ def _time(raw: RawTake, options: ImportOptions, file: Path) -> Floats:
         return result
     if raw.time is None:
         raise DemonstrationError(f"{file} has neither times nor a frame rate; give --rate")
-    steps = np.diff(raw.time)
-    bad = np.flatnonzero(~(steps > 0.0))
+    if len(raw.time) and not np.ptp(raw.time) < LONGEST_S:
+        raise DemonstrationError(
+            f"{file}: its times go from {raw.time[0]:g} to {raw.time[-1]:g} s; expected seconds, at most {LONGEST_S:g}"
+        )
+    bad = np.flatnonzero(~(np.diff(raw.time) > SHORTEST_S))
     if bad.size:
         frame = int(bad[0]) + 1
         raise DemonstrationError(

@@ -60,7 +60,10 @@ def _one(path: Path, arrays: Arrays) -> RawTake:
 def _many(path: Path, arrays: Arrays) -> tuple[list[RawTake], list[str]]:
     names = tuple(str(name) for name in arrays["points"])
     flat = np.asarray(arrays["flat"], dtype=np.float64).reshape(len(arrays["flat_time"]), len(names), 3)
-    offsets = arrays["offsets"].astype(int)
+    offsets = np.concatenate([[0], arrays["offsets"].astype(int), [len(flat)]])
+    if (np.diff(offsets) < 0).any() or len(offsets) < len(arrays["action"]) + 3:
+        raise DemonstrationError(f"{path}: expected offsets of each movement, increasing, up to {len(flat)} frames")
+    offsets = offsets[1:-1]
     without, takes, left_out = 0, [], []
     for number in range(len(arrays["action"])):
         if not arrays["ok"][number]:
