@@ -241,13 +241,7 @@ def _refusal(event: Event) -> str:
 
 
 class _Reader:
-    """Builtin data of the events of a text, which are read once; collects positions and findings on the way.
-
-    Attributes:
-        positions: Of keys and elements.
-        refused: What is never needed, and hides all other findings.
-        findings: What is wrong with values and keys.
-    """
+    """Builtin data of the events of a text, which are read once; `refused` is what hides all other findings."""
 
     def __init__(self, text: str, source: str) -> None:
         self.positions: dict[KeyPath, Position] = {}
@@ -272,9 +266,6 @@ class _Reader:
                 value = self._value(event, ())
         return value
 
-    def _next(self) -> Event:
-        return next(self._events)
-
     def _value(self, event: Event, path: KeyPath) -> Any:
         """Data of what begins with an event."""
         self._refuse_unwanted(event)
@@ -289,7 +280,7 @@ class _Reader:
 
     def _list(self, path: KeyPath) -> list[Any]:
         result: list[Any] = []
-        while not isinstance(event := self._next(), CollectionEndEvent):
+        while not isinstance(event := next(self._events), CollectionEndEvent):
             place = (*path, str(len(result)))
             self.positions[place] = self._at(event)
             result.append(self._value(event, place))
@@ -297,14 +288,15 @@ class _Reader:
 
     def _mapping(self, path: KeyPath) -> dict[str, Any]:
         result: dict[str, Any] = {}
-        while not isinstance(event := self._next(), CollectionEndEvent):
+        while not isinstance(event := next(self._events), CollectionEndEvent):
             key = event.value if isinstance(event, ScalarEvent) else ""
             where, place = self._at(event), (*path, key)
             self._refuse_unwanted(event)
             if not isinstance(event, ScalarEvent) or self._tag(event) != "str":
                 if isinstance(event, CollectionStartEvent):
                     self._value(event, place)
-                shown = f"'{key}'" if isinstance(event, ScalarEvent) else f"a {_kind(event)}"
+                kind = "a mapping" if isinstance(event, MappingStartEvent) else "a list"
+                shown = f"'{key}'" if isinstance(event, ScalarEvent) else kind
                 self.findings.append(LaunchFileError(where, f"key {shown} is no string; write it in quotes"))
             elif _CONTROL.search(key):
                 self.findings.append(LaunchFileError(where, f"control characters in the key {key[:80]!r}"))
@@ -313,7 +305,7 @@ class _Reader:
                 self.findings.append(LaunchFileError(where, f"duplicate key '{key}': it is in line {first.line} too"))
             else:
                 self.positions[place] = where
-            value = self._value(self._next(), place)
+            value = self._value(next(self._events), place)
             result.setdefault(key, value)
         return result
 
@@ -353,7 +345,3 @@ class _Reader:
 
     def _at(self, event: Event) -> Position:
         return Position(self._source, event.start_mark.line + 1, event.start_mark.column + 1)
-
-
-def _kind(event: Event) -> str:
-    return "mapping" if isinstance(event, MappingStartEvent) else "list"
