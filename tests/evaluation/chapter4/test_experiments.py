@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from paramove.evaluation.chapter4.experiments import QUICK, Scale, experiments
 from paramove.evaluation.chapter4.kinds import IPHMM_3, KINDS, QPHMM_3
-from paramove.evaluation.chapter4.summary import Interval, over_seeds
+from paramove.evaluation.chapter4.summary import Interval, fitted_name, over_seeds
 from paramove.evaluation.chapter4.targets import targets_of
 
 
@@ -38,18 +38,22 @@ def test_an_interval_of_seeds_is_student_s() -> None:
     assert np.isnan(over_seeds([1.0]).low)
 
 
+def around(value: float) -> Interval:
+    return Interval(value, value - 0.01, value + 0.01, 5, value - 0.02, value + 0.02)
+
+
 def row(name: str, **changed: float) -> dict[str, object]:
     usual = {"theta": 0.8, "synthesis_pointing": 1.6, "correct": 0.99, "covered": 0.95}
     usual |= dict.fromkeys(("action", "redirect", "aborted", "stopped"), 1.0)
-    measures = {key: Interval(value, value - 0.01, value + 0.01, 5) for key, value in (usual | changed).items()}
+    measures = {key: around(value) for key, value in (usual | changed).items()}
     return {"name": name, "states": 20, **measures}
 
 
 def summary(**changed: float) -> dict[str, object]:
-    jerk = {"training": "9 pairs, demonstrated", "model": "linear", "jerk": Interval(0.5, 0.4, 0.6, 10)}
+    jerk = {"training": "9 pairs, demonstrated", "model": "linear", "jerk": around(0.5)}
     return {
         "models": [row(kind.name, **(changed if kind.name == QPHMM_3 else {})) for kind in KINDS],
-        "classification": {"hmmlearn": Interval(0.87, 0.85, 0.89, 5), "plain HMM": Interval(1.0, 1.0, 1.0, 5)},
+        "classification": {"hmmlearn": around(0.88), "plain HMM": around(1.0)},
         "redirect": [{**jerk, "most_jerk": changed.get("most_jerk", 0.7)}],
     }
 
@@ -70,6 +74,21 @@ def test_all_goals_met() -> None:
 def test_the_worst_model_decides(measure: str, value: float, missed: str) -> None:
     targets = targets_of(summary(**{measure: value}))
     assert [target.what for target in targets if not target.met] == [missed]
+
+
+def test_a_goal_shows_how_its_seeds_differ() -> None:
+    found = {target.what: target for target in targets_of(summary(synthesis_pointing=1.69))}["synthesis, QPHMM"]
+    assert found.met
+    assert "1.67 to 1.71" in found.measured
+
+
+@pytest.mark.parametrize(
+    ("hidden", "said"), [([[0, 0], [0, 0]], "quadratic"), ([[0, 0], [0, 2]], "0 to 2 hidden units"), ([[], []], "")]
+)
+def test_a_row_is_named_by_what_was_fitted(hidden: list[list[int]], said: str) -> None:
+    name = fitted_name("NPHMM 3×3", [{"hidden": units} for units in hidden])
+    assert name.startswith("NPHMM 3×3")
+    assert name.removeprefix("NPHMM 3×3").count(said) == 1 if said else name == "NPHMM 3×3"
 
 
 def test_two_by_two_models_are_no_goal() -> None:

@@ -1,6 +1,7 @@
 """The report on tracking: complete, self-contained, and with every number as JSON."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from paramove.evaluation.chapter6.measures import Track
 from paramove.evaluation.chapter6.report import typical, write_results
 from paramove.evaluation.chapter6.strips import certainty_colour, drawn
 from paramove.evaluation.chapter6.summary import summarised
+from paramove.evaluation.chapter6.tables import hand_table
 from paramove.observation.cameras import CalibratedCamera
 from tests.evaluation.chapter6.made_up_tracks import act, result
 
@@ -73,6 +75,12 @@ def test_every_kind_has_its_place(written):
     for title in ("6.7.1.1", "6.7.1.2", "6.7.2", "Where single views fail", "table 6.1"):
         assert title in page
     assert page.count("box_01") == 1, "the clip with the median error is shown, not the best"
+
+
+def test_table_6_1_stands_beside_ours_in_the_same_axes():
+    """Thesis table 6.1, RMS after the median: 0.89 along its x, which is our y; 1.79 along its y, which is our x."""
+    page = hand_table({"median: RMS": (2.0, 2.8, 2.6)})
+    assert [float(cell) for cell in re.findall(r"<td class=n>([\d.]+)</td>", page)] == [2.0, 2.8, 2.6, 1.79, 0.89, 1.59]
 
 
 def test_something_is_said_beside_every_experiment_of_the_thesis():

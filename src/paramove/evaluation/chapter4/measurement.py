@@ -25,7 +25,7 @@ from paramove.evaluation.chapter4.unfinished import aborted, stopped
 from paramove.evaluation.movements.measures import covered, theta_error
 from paramove.evaluation.movements.method import Estimate
 from paramove.hmm.synthesis import Path
-from paramove.phmm import InterpolativePHMM, MovementClassifier, ParametricHMM, PolynomialPHMM
+from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, PolynomialPHMM
 
 Floats = NDArray[np.float64]
 Values = dict[str, list[float]]
@@ -52,7 +52,8 @@ def measured_kind(name: str, states: int, seed: int, every: int = 1) -> dict[str
     if isinstance(models["reaching"], InterpolativePHMM):
         corners = (models["reaching"].at(theta) for theta in ((0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)))
         durations = {"durations": [model.expected_durations().tolist() for model in corners]}
-    return {"values": values, "seconds": seconds, **durations}
+    hidden = [model.n_hidden_ for model in models.values() if isinstance(model, NeuralPHMM)]
+    return {"values": values, "seconds": seconds, **durations, **({"hidden": hidden} if hidden else {})}
 
 
 def trained(kind: Kind, states: int, shown: Shown) -> ParametricHMM:

@@ -75,7 +75,7 @@ def write_results(results: Results, folder: Path) -> tuple[dict[str, Any], list[
 
 
 def plain(value: Any) -> Any:
-    """Intervals as [mean, low, high, number of seeds]; NaN as null."""
+    """Intervals as [mean, low, high, number of seeds, least, most of single seeds]; NaN as null."""
     if isinstance(value, Interval):
         return [None if np.isnan(one) else one for one in value]
     if isinstance(value, dict):

@@ -37,23 +37,30 @@ SHARES = ("covered", "correct", *UNTYPICAL)
 
 
 class Interval(NamedTuple):
-    """Mean over seeds, and the interval that holds the true mean with 95 % (Student's t; NaN with one seed)."""
+    """Mean over seeds, and the interval that holds the true mean with 95 % (Student's t; NaN with one seed).
+
+    Attributes:
+        least, most: of single seeds.
+    """
 
     mean: float
     low: float
     high: float
     seeds: int
+    least: float
+    most: float
 
 
 def over_seeds(values: Iterable[float], *, share: bool = False) -> Interval:
     """From one value per seed; the interval of shares ends at 0 and 1."""
     each = np.array(list(values))
     mean, count = float(each.mean()), len(each)
+    ends = float(each.min()), float(each.max())
     if count < 2:
-        return Interval(mean, float("nan"), float("nan"), count)
+        return Interval(mean, float("nan"), float("nan"), count, *ends)
     half = float(student.ppf(0.975, count - 1) * each.std(ddof=1) / np.sqrt(count))
     low, high = (max(0.0, mean - half), min(1.0, mean + half)) if share else (mean - half, mean + half)
-    return Interval(mean, low, high, count)
+    return Interval(mean, low, high, count, *ends)
 
 
 def of_group(results: Results, group: str, **labels: Any) -> list[dict[str, Any]]:
@@ -64,7 +71,7 @@ def of_group(results: Results, group: str, **labels: Any) -> list[dict[str, Any]
 
 
 def summarised(results: Results) -> dict[str, Any]:
-    """All numbers as plain JSON; intervals as [mean, low, high, seeds]."""
+    """All numbers as plain JSON; intervals as [mean, low, high, seeds, least, most]."""
     return {
         "models": _models(results),
         "classification": {
@@ -88,7 +95,7 @@ def _models(results: Results) -> list[dict[str, Any]]:
         each = [measures_of(one["values"]) for one in own]
         rows.append(
             {
-                "name": name,
+                "name": fitted_name(name, own),
                 "states": states,
                 **{
                     measure: over_seeds((one[measure] for one in each), share=measure in SHARES) for measure in MEASURES
@@ -98,6 +105,16 @@ def _models(results: Results) -> list[dict[str, Any]]:
         )
     order = list(dict.fromkeys(row["name"] for row in rows))
     return sorted(rows, key=lambda row: (row["states"], order.index(row["name"])))
+
+
+def fitted_name(name: str, found: Results) -> str:
+    """A model's name with what was fitted: cross validation chooses a network's hidden units, and may choose none."""
+    units = sorted({number for one in found for number in one.get("hidden", ())})
+    if not units:
+        return name
+    if units == [0]:
+        return f"{name} (no hidden unit: a quadratic)"
+    return f"{name} ({units[0]} to {units[-1]} hidden units)"
 
 
 def measures_of(values: Mapping[str, Sequence[float]]) -> dict[str, float]:

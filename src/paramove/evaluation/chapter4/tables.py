@@ -135,7 +135,7 @@ def interval(found: Interval | None, digits: int = 2) -> str:
 
 
 def _percent(found: Interval) -> Interval:
-    return Interval(100.0 * found.mean, 100.0 * found.low, 100.0 * found.high, found.seeds)
+    return found._replace(mean=100.0 * found.mean, low=100.0 * found.low, high=100.0 * found.high)
 
 
 def _rate(value: float | None) -> str:

@@ -137,7 +137,7 @@ def _numbers(
     if summary["table 6.1"] is not None:
         told = (
             "“estimate”: the best hypothesis (6.16); “median”: the same after a median over five frames; “refined”: "
-            "the pose drawn to the mean of the hypotheses around (6.18). The thesis's axes differ: its x is our y."
+            "the pose drawn to the mean of the hypotheses around (6.18). Axes are ours: the thesis's y stands under x."
         )
         parts.append(section("The hand at 50 fps (table 6.1)", told, hand_table(summary["table 6.1"])))
     return parts
