@@ -152,8 +152,8 @@ def check_python(words):
     if words[1] == "-c":
         compile(words[2], "<command>", "exec")
         return
-    assert words[1] == "-m", f"only modules are checked: {shlex.join(words)}"
-    check_options((sys.executable, "-m", words[2]), words[3:])
+    program = words[1:3] if words[1] == "-m" else words[1:2]
+    check_options((sys.executable, *program), words[1 + len(program) :])
 
 
 def check_options(command, words):
