@@ -22,14 +22,13 @@ SAYS = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
 class Config(NodeConfig, PointingSetup):
-    rim_clearance: float = RecognizerOptions.rim_clearance  # m
     motion: MotionThresholds = MotionThresholds()
     pointing: PointingThresholds = PointingThresholds()
 
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
-    recognizer = Recognizer(RecognizerOptions(config.motion, config.pointing, config.rim_clearance))
+    recognizer = Recognizer(RecognizerOptions(config.motion, config.pointing))
     pointing = config.pointing_source(bus.run_folder)
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")

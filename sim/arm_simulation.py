@@ -21,6 +21,7 @@ from sim.human import PersonLook, add_arm, add_cloth, place_arm
 from sim.performances_scene import PATTERNS, colour
 from sim.simulation import Simulation
 from sim.small_person import SmallPerson, shoulder_from_table, table_from_shoulder, turn_of_table
+from sim.tool_box import NOMINAL, Measures
 from sim.world import World
 
 FloatArray = NDArray[np.float64]
@@ -48,11 +49,12 @@ class ArmSimulation(Simulation):
         camera: bool = True,
         video: bool = False,
         firmware_log: BinaryIO | None = None,
+        measures: Measures = NOMINAL,
     ) -> None:
         self._seed = seed
         self.person = SmallPerson(self._stream(PERSON))
         self.cameras = draw_arm_cameras(self._stream(CAMERAS))
-        super().__init__(seed, description, camera, video, firmware_log)
+        super().__init__(seed, description, camera, video, firmware_log, measures)
         noise = self._stream(NOISE)
         level = float(noise.uniform(*NOISE_RANGE))
         self._arm_cameras = ArmCameras(self.world.model, self.cameras, level, noise) if camera else None

@@ -19,7 +19,6 @@ WIDTH_PX, HEIGHT_PX = 480, 360
 FOCAL_PX = 600.0
 LOOK_AT = (0.155, -0.015, tool_box.SURFACE_Z)  # shoulder frame
 DISTANCE = 0.60
-ELEVATION_DEG = 52.0  # above it, a cylinder at the bottom of its compartment could be seen
 AZIMUTH_DEG = 12.0
 SEEN_MARGIN_PX = 6.0
 UNSEEN_MARGIN_PX = 25.0
@@ -75,6 +74,7 @@ class Looks:
         camera: See `Camera`.
         pixel_noise: Standard deviation, of 255.
         rules: Colour -> name of its opening.
+        measures: Of the tool box, and of the nominal camera.
     """
 
     seed: int
@@ -82,9 +82,10 @@ class Looks:
     camera: Camera
     pixel_noise: float
     rules: dict[str, str]
+    measures: tool_box.Measures
 
     @classmethod
-    def draw(cls, seed: int) -> Looks:
+    def draw(cls, seed: int, measures: tool_box.Measures = tool_box.NOMINAL) -> Looks:
         """The looks of a seed."""
         draw = streams(seed)
         light = draw["light"].uniform(0.5, 1.6, 2)
@@ -92,20 +93,21 @@ class Looks:
         return cls(
             seed=seed,
             brightness=(float(light[0]), float(light[1])),
-            camera=draw_camera(draw["camera"]),
+            camera=draw_camera(draw["camera"], measures.camera_elevation_deg),
             pixel_noise=float(draw["noise"].uniform(2.0, 6.0)),
             rules={
                 colour: tool_box.OPENINGS[place].name for colour, place in zip(tool_box.COLOURS, places, strict=True)
             },
+            measures=measures,
         )
 
 
-def draw_camera(draw: np.random.Generator, most_draws: int = 2000) -> Camera:
+def draw_camera(draw: np.random.Generator, elevation_deg: float, most_draws: int = 2000) -> Camera:
     """A camera near the nominal pose, drawn again until it sees the working area and not the instructor at rest."""
     for _ in range(most_draws):
         moved, turned = draw.uniform(-0.05, 0.05, 3), draw.uniform(-6.0, 6.0, 3)
         scale, k1 = float(draw.uniform(0.9, 1.1)), float(draw.uniform(-0.1, 0.1))
-        camera = _camera(moved, turned, scale, k1)
+        camera = _camera(elevation_deg, moved, turned, scale, k1)
         if sees_enough(camera):
             return camera
     raise RuntimeError(f"no camera in {most_draws} draws sees the working area; the nominal view is too narrow")
@@ -123,8 +125,8 @@ def sees_enough(camera: Camera) -> bool:
     return not bool(visible.any())
 
 
-def _camera(moved: FloatArray, turned_deg: FloatArray, scale: float, k1: float) -> Camera:
-    elevation, azimuth = np.deg2rad((ELEVATION_DEG, AZIMUTH_DEG))
+def _camera(elevation_deg: float, moved: FloatArray, turned_deg: FloatArray, scale: float, k1: float) -> Camera:
+    elevation, azimuth = np.deg2rad((elevation_deg, AZIMUTH_DEG))
     backward = np.array((np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)))
     right = np.cross((0.0, 0.0, 1.0), backward)
     right /= np.linalg.norm(right)

@@ -11,6 +11,7 @@ from paramove.robots.description import RobotDescription
 from sim import tool_box
 from sim.arm_simulation import POINTING, ArmSimulation
 from sim.place_instructor import OBJECT, START, PlaceInstructor
+from sim.tool_box import NOMINAL, Measures
 
 
 class PlaceSimulation(ArmSimulation):
@@ -23,8 +24,9 @@ class PlaceSimulation(ArmSimulation):
         camera: bool = True,
         video: bool = False,
         firmware_log: BinaryIO | None = None,
+        measures: Measures = NOMINAL,
     ) -> None:
-        super().__init__(seed, description, camera, video, firmware_log)
+        super().__init__(seed, description, camera, video, firmware_log, measures)
         self.world.place(OBJECT, tool_box.standing_centre(*START))
 
     def light(self) -> RawImage | None:

@@ -61,7 +61,7 @@ def build(world_looks: Looks, furnish: Furnish | None = None) -> mujoco.MjModel:
     world_from_shoulder = shoulder_in_world(spec)
     _add_lights(spec, world_looks.brightness)
     _add_surroundings(spec, world_from_shoulder)
-    _add_box(spec, world_from_shoulder)
+    _add_box(spec, world_from_shoulder, world_looks.measures)
     _add_cylinders(spec, world_from_shoulder)
     _add_hand(spec, world_from_shoulder)
     _add_cameras(spec, world_looks, world_from_shoulder)
@@ -160,14 +160,15 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> N
     )
 
 
-def _add_box(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
+def _add_box(spec: mujoco.MjSpec, world_from_shoulder: FloatArray, measures: tool_box.Measures) -> None:
     """The tool box, openings up. The instructor turns it, so it is moved from outside (mocap)."""
     body = spec.worldbody.add_body(name="box", mocap=True, pos=world_from_shoulder + tool_box.CENTRE)
     centre = np.array(tool_box.CENTRE)
     hx, hy, hz = tool_box.HALF_SIZE
     places_in_box = [item.centre - centre for item in tool_box.OPENINGS]
     half = opening.TILE_HALF
-    pieces = opening.wedges(tool_box.OPENING_RADIUS, tool_box.CHAMFER, tool_box.COMPARTMENT_DEPTH)
+    shape = (measures.opening_radius, measures.chamfer)
+    pieces = opening.wedges(*shape, tool_box.COMPARTMENT_DEPTH)
     for number, piece in enumerate(pieces):
         spec.add_mesh(name=f"wedge_{number}", uservert=piece.ravel())
         for item, place in zip(tool_box.OPENINGS, places_in_box, strict=True):
@@ -188,7 +189,7 @@ def _add_box(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
     for number, place in enumerate([*places_in_box, np.array((0.0, hy + half, 0.0))]):
         _add_block(body, f"box_gap_{number}", (row_x - half, row_x + half), (edge, place[1] - half), (low, top))
         edge = place[1] + half
-    _add_box_surfaces(spec, body, places_in_box)
+    _add_box_surfaces(spec, body, places_in_box, shape)
 
 
 def _add_block(body: Any, name: str, x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> None:
@@ -203,11 +204,13 @@ def _add_block(body: Any, name: str, x: tuple[float, float], y: tuple[float, flo
     )
 
 
-def _add_box_surfaces(spec: mujoco.MjSpec, body: Any, places_in_box: list[FloatArray]) -> None:
+def _add_box_surfaces(
+    spec: mujoco.MjSpec, body: Any, places_in_box: list[FloatArray], shape: tuple[float, float]
+) -> None:
     centres = np.array(places_in_box)[:, :2]
-    vertices, triangles = opening.cover(tool_box.HALF_SIZE, centres, tool_box.OPENING_RADIUS, tool_box.CHAMFER)
+    vertices, triangles = opening.cover(tool_box.HALF_SIZE, centres, *shape)
     _add_surface(spec, body, "box_cover", vertices, triangles, (0.0, 0.0, 0.0), "box")
-    vertices, triangles = opening.lining(tool_box.OPENING_RADIUS, tool_box.CHAMFER, tool_box.COMPARTMENT_DEPTH)
+    vertices, triangles = opening.lining(*shape, tool_box.COMPARTMENT_DEPTH)
     for number, place in enumerate(places_in_box):
         _add_surface(spec, body, f"lining_{number}", vertices, triangles, place, "lining")
 

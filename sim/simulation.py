@@ -21,6 +21,7 @@ from sim import looks, scene
 from sim.camera import Eye, Image, Sensor
 from sim.instructor import Instructor
 from sim.looks import Looks
+from sim.tool_box import NOMINAL, Measures
 from sim.world import World
 
 _log = logging.getLogger(__name__)
@@ -42,6 +43,7 @@ class Simulation:
         camera: Whether the camera's images are rendered.
         video: Whether the view for people is rendered.
         firmware_log: Gets every frame that the firmware plays, 28 little-endian int16 a millisecond.
+        measures: Of the tool box and of the nominal camera.
 
     Attributes:
         physics_s, rendering_s: Wall time spent since the start.
@@ -54,10 +56,11 @@ class Simulation:
         camera: bool = True,
         video: bool = False,
         firmware_log: BinaryIO | None = None,
+        measures: Measures = NOMINAL,
     ) -> None:
         self._firmware_log = firmware_log
         draws = looks.streams(seed)
-        self.looks = Looks.draw(seed)
+        self.looks = Looks.draw(seed, measures)
         self.world = self._new_world(description)
         self.firmware = Firmware(description)
         self.firmware.reset(description.base_pose)

@@ -26,6 +26,7 @@ from paramove.bus.node import Bus, NodeConfig, main
 from paramove.robots.description import RobotDescription
 from sim import truth
 from sim.simulation import CAMERA_HZ, Simulation
+from sim.tool_box import NOMINAL, Measures
 from sim.world import log_warnings_of_mujoco
 
 HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
@@ -55,6 +56,7 @@ class Config(NodeConfig):
         camera: Whether the camera's images are rendered; without, no graphics library is needed.
         video: Whether a view for people is rendered too.
         max_duration_s: Simulated time after which the run ends.
+        measures: Of the tool box and of the nominal camera.
         firmware_log: Whether every frame that the firmware plays is written to the run folder (56 kB/s), for those who
             judge afterwards whether the arm ever jumped.
         pace: Simulated seconds per second when nobody waits for anybody (not in lockstep).
@@ -67,6 +69,7 @@ class Config(NodeConfig):
     max_duration_s: float = Field(default=600.0, gt=0)
     pace: float = Field(default=1.0, gt=0)
     firmware_log: bool = False
+    measures: Measures = NOMINAL
 
 
 def run(
@@ -82,7 +85,7 @@ def run(
         if config.firmware_log:  # without a buffer: nothing is lost when the process is killed
             log = open_files.enter_context((bus.run_folder / FIRMWARE_LOG).open("xb", buffering=0))
         description = RobotDescription.load(config.robot)
-        simulation = kind(config.seed, description, config.camera, config.video, log)
+        simulation = kind(config.seed, description, config.camera, config.video, log, config.measures)
         open_files.callback(simulation.close)
         simulation.write_measures(bus.run_folder)
         _loop(bus, config, simulation, say_more)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import opening
+
 SURFACE_Z = -0.134  # the working plane
 X_RANGE = (0.100, 0.240)
 Y_RANGE = (-0.170, 0.130)
@@ -36,6 +38,32 @@ HALF_SIZE = (
     THICKNESS / 2,
 )
 CENTRE = (sum(X_RANGE) / 2, sum(Y_RANGE) / 2, SURFACE_Z - THICKNESS / 2)
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What may differ between worlds, and no node is told.
+
+    Attributes:
+        camera_elevation_deg: Above the working plane. From above 52 degrees, a cylinder in its compartment can be seen.
+        opening_radius: Free radius of every opening, m, above a cylinder's.
+        chamfer: Height and width of the openings' chamfer, m.
+    """
+
+    camera_elevation_deg: float = 52.0
+    opening_radius: float = OPENING_RADIUS
+    chamfer: float = CHAMFER
+
+    def __post_init__(self) -> None:
+        widest = opening.TILE_HALF
+        if not CYLINDER_RADIUS < self.opening_radius < self.opening_radius + self.chamfer < widest:
+            raise ValueError(
+                f"openings of radius {self.opening_radius} m with a chamfer of {self.chamfer} m: a radius above "
+                f"{CYLINDER_RADIUS} m, and with the chamfer below {widest} m, expected"
+            )
+
+
+NOMINAL = Measures()
 
 
 @dataclass(frozen=True)

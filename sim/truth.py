@@ -29,7 +29,7 @@ def layout(simulation: Simulation) -> TruthLayout:
         message.world_from_table.extend(simulation.world_from_table.ravel().tolist())
     for item in tool_box.OPENINGS:
         x, y, _ = item.centre + origin
-        message.openings.add(name=item.name, x=x, y=y, radius=tool_box.OPENING_RADIUS)
+        message.openings.add(name=item.name, x=x, y=y, radius=looks.measures.opening_radius)
     for colour, opening in looks.rules.items():
         message.rules.add(object=colour, opening=opening)
     return message

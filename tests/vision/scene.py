@@ -76,7 +76,7 @@ def _world(opening_radius: float | None) -> str:
 
 
 def _box_with_opening(radius: float, x: float = 0.155, y: float = -0.02) -> str:
-    """The box with one round opening at the centre (24 flat sides), 8 cm deep."""
+    """The box, here light, with one round opening at the centre (24 flat sides), 8 cm deep and dark inside."""
     reach = 0.03  # of the sectors around the opening; four boxes make up the rest of the upper face
     half = radius + reach - 0.005
     sides = (
@@ -85,7 +85,7 @@ def _box_with_opening(radius: float, x: float = 0.155, y: float = -0.02) -> str:
         (x, y + half + (0.17 - half) / 2, half, (0.17 - half) / 2),
         (x, y - half - (0.17 - half) / 2, half, (0.17 - half) / 2),
     )
-    look = 'rgba="0.13 0.13 0.14 1" material="matt"/>'
+    look = 'rgba="0.50 0.50 0.52 1" material="matt"/>'
     outer = "".join(f'<geom type="box" pos="{a} {b} -0.04" size="{c} {d} 0.04" {look}' for a, b, c, d in sides)
     sectors = ""
     for angle in np.arange(24) * 2 * np.pi / 24:
@@ -93,6 +93,11 @@ def _box_with_opening(radius: float, x: float = 0.155, y: float = -0.02) -> str:
         a, b = x + away * np.cos(angle), y + away * np.sin(angle)
         sectors += (
             f'<geom type="box" pos="{a} {b} -0.04" size="{reach} 0.012 0.04" euler="0 0 {np.rad2deg(angle)}" {look}'
+        )
+        a, b = x + radius * np.cos(angle), y + radius * np.sin(angle)
+        sectors += (
+            f'<geom type="box" pos="{a} {b} -0.0405" size="0.0003 0.0035 0.04" euler="0 0 {np.rad2deg(angle)}" '
+            'rgba="0.06 0.06 0.06 1" material="matt"/>'
         )
     corner = "".join(
         f'<geom type="box" pos="{x + i * half} {y + j * half} -0.04" size="0.02 0.02 0.04" {look}'

@@ -11,11 +11,10 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from paramove.vision.colour_tracker import ColourTracker
 from paramove.vision.homography import PlaneHomography
-from paramove.vision.recognizer import Recognizer, RecognizerOptions
+from paramove.vision.recognizer import Recognizer
 from tests.vision.scene import CYLINDER_HEIGHT, WORKING_AREA, Scene
 
 RIM_RADIUS = 0.020  # of the rendered opening, without chamfer
-OPTIONS = RecognizerOptions(rim_clearance=RIM_RADIUS - 0.010 + 0.001)
 PERIOD_NS = 66_666_667
 OPENING = (0.155, -0.02)
 HAND_ABOVE = 0.052  # the hand's centre above that of a cylinder held at its upper end
@@ -27,7 +26,7 @@ class Story:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.tracker = ColourTracker()
-        self.recognizer = Recognizer(OPTIONS)
+        self.recognizer = Recognizer()
         self.calibration: PlaneCalibration | None = None
         self.gestures: list[Gesture] = []
         self.tick = 0
@@ -49,7 +48,7 @@ class Story:
         self.scene.hide(name)
         homography = PlaneHomography.fit(points, WORKING_AREA)
         self.calibration = homography.to_message()
-        self.tracker, self.recognizer, self.gestures = ColourTracker(), Recognizer(OPTIONS), []
+        self.tracker, self.recognizer, self.gestures = ColourTracker(), Recognizer(), []
         return homography
 
     def kinds(self, name: str) -> list[str]:

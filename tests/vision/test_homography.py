@@ -49,14 +49,14 @@ def test_lens_distortion_costs_less_than_a_millimetre(k1: float, focal_px: float
     assert np.linalg.norm(mapped - _grid(), axis=1).max() < 0.001
 
 
-def test_away_from_camera_moves_by_the_distance_and_up_in_the_image() -> None:
-    homography = PlaneHomography.fit(SEEN, CORNERS)
-    here = np.array(homography.plane_from_image(210, 170))
-    moved = np.array(homography.away_from_camera(210, 170, 0.01))
-    assert_allclose(np.linalg.norm(moved - here), 0.01, rtol=1e-9, atol=0)
-    u, v = homography.image_from_plane(*moved)
-    assert v < 170
-    assert abs(u - 210) < 1
+@pytest.mark.parametrize("elevation_deg", [35.0, 52.0, 65.0])
+def test_a_circle_is_foreshortened_by_the_sine_of_the_elevation(elevation_deg: float) -> None:
+    away, across, elevation = 0.6, np.array([(-0.05, 0.05), (0.05, 0.05), (0.05, -0.05), (-0.05, -0.05)]), elevation_deg
+    sine, cosine = np.sin(np.deg2rad(elevation)), np.cos(np.deg2rad(elevation))
+    depth = away + across[:, 1] * cosine
+    image = 560 * np.column_stack([across[:, 0], -across[:, 1] * sine]) / depth[:, None] + (240, 180)
+    homography = PlaneHomography.fit(image, across)
+    assert homography.foreshortening(240, 180) == pytest.approx(sine, rel=0.002)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.many_worlds import RESTS, View, tolerance
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.robots.description import RobotDescription
+from sim import tool_box
+from sim.scene import ROBOT_MODEL
+from sim.tool_box import Measures
+from sim.world import OPENINGS_UP
 from tests.vision.scene import Look, Scene
 from tests.vision.stories import OPENING, RIM_RADIUS, Story, segment, show_rule
 
@@ -41,3 +47,41 @@ def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
     pointed = [g for g in story.gestures if g.kind == Gesture.KIND_POINTED_AT]
     assert [g.object for g in pointed] == ["green"]
     assert np.hypot(pointed[0].x - x, pointed[0].y - y) < 0.003
+
+
+@pytest.fixture(scope="module")
+def hoap3() -> RobotDescription:
+    return RobotDescription.load(ROBOT_MODEL.parent)
+
+
+@pytest.mark.parametrize(
+    ("seed", "elevation_deg", "diameter_mm", "chamfer_mm"),
+    [
+        (0, 35, 25, 2),
+        (1, 35, 34, 8),
+        (2, 42, 28, 6),
+        (3, 52, 28, 6),
+        (4, 52, 34, 2),
+        (5, 58, 25, 4),
+        (6, 65, 25, 2),
+        (7, 65, 34, 8),
+    ],
+)
+def test_rules_hold_whatever_camera_and_openings(
+    seed: int, elevation_deg: float, diameter_mm: float, chamfer_mm: float, hoap3: RobotDescription
+) -> None:
+    """Nobody tells the robot of either: it sees from where the camera looks, and where the rims are."""
+    measures = Measures(elevation_deg, diameter_mm / 2000, chamfer_mm / 1000)
+    view = View(seed, hoap3, measures)
+    try:
+        assert view.calibrate(lambda: np.zeros(2)) == []
+        view.park()
+        view.world.move_box(np.zeros(3), OPENINGS_UP)
+        view.see(RESTS)
+        colour = tool_box.COLOURS[seed % 3]
+        rule = view.show_rule(colour, np.array((0.175, 0.03 * (seed % 3) - 0.05)))
+    finally:
+        view.close()
+    opening = next(item for item in tool_box.OPENINGS if item.name == view.looks.rules[colour])
+    assert rule is not None
+    assert np.linalg.norm(rule - opening.centre[:2]) < min(0.0045, tolerance(measures))

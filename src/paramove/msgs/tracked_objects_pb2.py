@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/tracked_objects.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xa1\x01\n\x0eTrackedObjects\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\x12-\n\x07objects\x18\x05 \x03(\x0b\x32\x1c.paramove.msgs.TrackedObject\"\xc1\x02\n\rTrackedObject\x12\x0c\n\x04name\x18\x01 \x01(\t\x12/\n\x04kind\x18\x02 \x01(\x0e\x32!.paramove.msgs.TrackedObject.Kind\x12\x0c\n\x04u_px\x18\x03 \x01(\x01\x12\x0c\n\x04v_px\x18\x04 \x01(\x01\x12\x0f\n\x07\x61rea_px\x18\x05 \x01(\x01\x12\x10\n\x08width_px\x18\x06 \x01(\x01\x12\x11\n\theight_px\x18\x07 \x01(\x01\x12\x12\n\nconfidence\x18\x08 \x01(\x01\x12\x0f\n\x07left_px\x18\t \x01(\x01\x12\x0e\n\x06top_px\x18\n \x01(\x01\x12,\n\x07outline\x18\x0b \x03(\x0b\x32\x1b.paramove.msgs.OutlinePoint\"<\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x0f\n\x0bKIND_OBJECT\x10\x01\x12\r\n\tKIND_HAND\x10\x02\"*\n\x0cOutlinePoint\x12\x0c\n\x04u_px\x18\x01 \x01(\x01\x12\x0c\n\x04v_px\x18\x02 \x01(\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/tracked_objects.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xcb\x01\n\x0eTrackedObjects\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12\x10\n\x08width_px\x18\x03 \x01(\r\x12\x11\n\theight_px\x18\x04 \x01(\r\x12-\n\x07objects\x18\x05 \x03(\x0b\x32\x1c.paramove.msgs.TrackedObject\x12(\n\x08openings\x18\x06 \x03(\x0b\x32\x16.paramove.msgs.Opening\"[\n\x07Opening\x12\x0c\n\x04u_px\x18\x01 \x01(\x01\x12\x0c\n\x04v_px\x18\x02 \x01(\x01\x12\x0f\n\x07\x61rea_px\x18\x03 \x01(\x01\x12\x10\n\x08width_px\x18\x04 \x01(\x01\x12\x11\n\theight_px\x18\x05 \x01(\x01\"\xcf\x02\n\rTrackedObject\x12\x0c\n\x04name\x18\x01 \x01(\t\x12/\n\x04kind\x18\x02 \x01(\x0e\x32!.paramove.msgs.TrackedObject.Kind\x12\x0c\n\x04u_px\x18\x03 \x01(\x01\x12\x0c\n\x04v_px\x18\x04 \x01(\x01\x12\x0f\n\x07\x61rea_px\x18\x05 \x01(\x01\x12\x10\n\x08width_px\x18\x06 \x01(\x01\x12\x11\n\theight_px\x18\x07 \x01(\x01\x12\x12\n\nconfidence\x18\x08 \x01(\x01\x12\x0f\n\x07left_px\x18\t \x01(\x01\x12\x0e\n\x06top_px\x18\n \x01(\x01\x12,\n\x07outline\x18\x0b \x03(\x0b\x32\x1b.paramove.msgs.OutlinePoint\x12\x0c\n\x04lean\x18\x0c \x01(\x01\"<\n\x04Kind\x12\x14\n\x10KIND_UNSPECIFIED\x10\x00\x12\x0f\n\x0bKIND_OBJECT\x10\x01\x12\r\n\tKIND_HAND\x10\x02\"*\n\x0cOutlinePoint\x12\x0c\n\x04u_px\x18\x01 \x01(\x01\x12\x0c\n\x04v_px\x18\x02 \x01(\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,11 +33,13 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.tracked_objec
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_TRACKEDOBJECTS']._serialized_start=88
-  _globals['_TRACKEDOBJECTS']._serialized_end=249
-  _globals['_TRACKEDOBJECT']._serialized_start=252
-  _globals['_TRACKEDOBJECT']._serialized_end=573
-  _globals['_TRACKEDOBJECT_KIND']._serialized_start=513
-  _globals['_TRACKEDOBJECT_KIND']._serialized_end=573
-  _globals['_OUTLINEPOINT']._serialized_start=575
-  _globals['_OUTLINEPOINT']._serialized_end=617
+  _globals['_TRACKEDOBJECTS']._serialized_end=291
+  _globals['_OPENING']._serialized_start=293
+  _globals['_OPENING']._serialized_end=384
+  _globals['_TRACKEDOBJECT']._serialized_start=387
+  _globals['_TRACKEDOBJECT']._serialized_end=722
+  _globals['_TRACKEDOBJECT_KIND']._serialized_start=662
+  _globals['_TRACKEDOBJECT_KIND']._serialized_end=722
+  _globals['_OUTLINEPOINT']._serialized_start=724
+  _globals['_OUTLINEPOINT']._serialized_end=766
 # @@protoc_insertion_point(module_scope)

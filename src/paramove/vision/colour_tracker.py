@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.vision.full_size import FullSize, Size
+from paramove.vision.openings import find_openings
 
 Image = NDArray[Any]  # uint8; cv2's own annotations say only integer or floating
 MOST_PIECES = 6
@@ -60,7 +61,7 @@ DEFAULT_COLOURS = (
 class Region:
     """One measured region. Pixels; u right, v down; the middle of the first pixel is 0.
 
-    (u, v) is the centre of gravity, for a hand the middle of its palm.
+    (u, v) is the centre of gravity, for a hand the middle of its palm; `lean` is du/dv along the long axis.
     """
 
     u_px: float
@@ -70,6 +71,7 @@ class Region:
     top_px: float
     width_px: float
     height_px: float
+    lean: float
     outline: NDArray[np.float64]  # [M, 2] convex hull
 
 
@@ -109,6 +111,7 @@ class ColourTracker:
         small = cv2.resize(image_bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
         hsv, chroma = _hue_and_chroma(small)
         _, coloured = cv2.threshold(chroma, int(_least_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
+        tracked.openings.extend(find_openings(hsv[:, :, 2]))
         for colour in self._colours:
             box = self._find(_of_colour(hsv, coloured, colour))
             region = None if box is None else _measure(image_bgr, box, colour)
@@ -153,6 +156,7 @@ class ColourTracker:
             height_px=region.height_px,
             left_px=region.left_px,
             top_px=region.top_px,
+            lean=region.lean,
             confidence=1.0,
         )
         if colour.hand:
@@ -164,7 +168,8 @@ class ColourTracker:
         if self._stands_still(recent):
             area, height = median(r.area_px for r in recent), median(r.height_px for r in recent)
             lower = region.top_px + region.height_px - region.v_px
-            self._full_size.learn(colour.name, region.u_px, region.v_px, Size(area, height, lower))
+            size = Size(area, height, region.width_px, lower, region.lean)
+            self._full_size.learn(colour.name, region.u_px, region.v_px, size)
         found.confidence = self._full_size.visible_share(colour.name, region.u_px, region.v_px, region.area_px)
         return found
 
@@ -239,7 +244,7 @@ def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) ->
     left_edge, right_edge = _extent(columns)
     top_edge, bottom_edge = _extent(rows)
     u, v = float(columns @ np.arange(columns.size)) / area, float(rows @ np.arange(rows.size)) / area
-    outline = np.zeros((0, 2))
+    lean, outline = _lean(weight, u, v), np.zeros((0, 2))
     if outlined:
         outline = _outline(weight, left, top)
         u, v = _palm(weight)
@@ -251,8 +256,17 @@ def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) ->
         top_px=top + top_edge,
         width_px=right_edge - left_edge,
         height_px=bottom_edge - top_edge,
+        lean=lean,
         outline=outline,
     )
+
+
+def _lean(weight: NDArray[np.float64], u: float, v: float) -> float:
+    """du/dv of the principal axis through the centre (u, v)."""
+    du, dv = np.arange(weight.shape[1]) - u, np.arange(weight.shape[0]) - v
+    uu, vv = float(weight.sum(axis=0) @ du**2), float(weight.sum(axis=1) @ dv**2)
+    uv = float(dv @ weight @ du)
+    return float(np.tan(0.5 * np.arctan2(2 * uv, vv - uu)))
 
 
 def _palm(weight: NDArray[np.float64]) -> tuple[float, float]:

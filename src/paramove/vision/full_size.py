@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,17 +11,40 @@ from numpy.typing import NDArray
 PLACE_RADIUS_PX = 24.0
 """Nearer samples belong to one place: about one object's width apart, over which the size changes by < 3 %."""
 ACCEPT_RATIO = 0.85
-"""A sample below this share of what is expected is partly hidden. Depth over the working area changes areas by 13 %."""
+"""A sample below this share of what is expected is partly hidden, unless it is as slender as expected."""
+AS_SLENDER = 0.11
+"""Depth changes height and width alike, what hides a part does not: largest difference of the logarithms of both."""
 PLACES_PER_OBJECT = 12
 
 
 @dataclass(frozen=True)
 class Size:
-    """An object that nothing hides: area, height, and from its centre to its lower border; px."""
+    """An upright round object that nothing hides; px.
+
+    Attributes:
+        area_px: Of its region.
+        height_px, width_px: Of the region's box.
+        lower_px: From its centre to its lower border.
+        lean: du/dv along its axis.
+    """
 
     area_px: float
     height_px: float
+    width_px: float
     lower_px: float
+    lean: float
+
+    def foot_px(self, foreshortening: float) -> tuple[float, float]:
+        """(u, v) from its centre to where its axis meets the surface.
+
+        The lower end is a circle seen at a slant. The tracker puts the lower border where the region is half as wide as
+        usual: at √3/2 of the radius of that circle below its middle.
+
+        Args:
+            foreshortening: Height over width, in the image, of a circle on the surface.
+        """
+        down_px = self.lower_px - math.sqrt(3) / 4 * foreshortening * self.width_px
+        return self.lean * down_px, down_px
 
 
 @dataclass
@@ -34,22 +58,24 @@ class FullSize:
     """Learns, from objects at rest, how large they are in the image as a function of the image point.
 
     Perspective makes sizes change smoothly over the image, alike for all objects: log area of object k is modelled as
-    c_k + a·u + b·v with a and b shared (least squares with a weak ridge on a and b). The largest steady area seen at a
-    place is the full one, as anything that hides an object makes it smaller. No truth and no camera model is used.
+    c_k + a·u + b·v with a and b shared (least squares with a weak ridge on a and b), the lean likewise
+    without the logarithm. The largest steady area seen at a place is the full one, as anything that hides an object
+    makes it smaller. No truth and no camera model is used.
     """
 
     def __init__(self) -> None:
         self._places: dict[str, list[_Place]] = {}
         self._model: dict[str, NDArray[np.float64]] = {}
-        self._slope: NDArray[np.float64] = np.zeros((2, 3))
+        self._slope: NDArray[np.float64] = np.zeros((2, 5))
 
     def expected(self, name: str, u_px: float, v_px: float) -> Size | None:
         """Full size of the object at an image point; None before it was first seen at rest."""
         if name not in self._model:
             return None
         point = np.array([u_px, v_px]) / 100.0
-        area, height, lower = np.exp(self._model[name] + point @ self._slope)
-        return Size(float(area), float(height), float(lower))
+        *logs, lean = self._model[name] + point @ self._slope
+        area, height, width, lower = (float(np.exp(number)) for number in logs)
+        return Size(area, height, width, lower, float(lean))
 
     def visible_share(self, name: str, u_px: float, v_px: float, area_px: float) -> float:
         """Area over full area at that image point, 0 to 1; 1 for an object not known yet."""
@@ -60,10 +86,11 @@ class FullSize:
         """Take in one sample of an object that stands still."""
         area_px = size.area_px
         full = self.expected(name, u_px, v_px)
-        if full is not None and area_px < ACCEPT_RATIO * full.area_px:
-            return
-        if full is not None and area_px > full.area_px / ACCEPT_RATIO:
-            self._places[name] = []  # what was learned of it was partly hidden
+        if full is not None and not _as_slender(size, full):
+            if area_px < ACCEPT_RATIO * full.area_px:
+                return
+            if area_px > full.area_px / ACCEPT_RATIO:
+                self._places[name] = []  # what was learned of it was partly hidden
         places = self._places.setdefault(name, [])
         near = min(places, key=lambda place: _distance(place, u_px, v_px), default=None)
         if near is None or _distance(near, u_px, v_px) > PLACE_RADIUS_PX:
@@ -79,15 +106,21 @@ class FullSize:
         names = sorted(self._places)
         rows = [(index, place) for index, name in enumerate(names) for place in self._places[name]]
         design = np.zeros((len(rows) + 2, len(names) + 2))
-        value = np.zeros((len(rows) + 2, 3))
+        value = np.zeros((len(rows) + 2, 5))
         for row, (index, place) in enumerate(rows):
             design[row, index] = 1.0
             design[row, -2:] = place.u_px / 100.0, place.v_px / 100.0
-            value[row] = np.log([place.size.area_px, place.size.height_px, place.size.lower_px])
+            size = place.size
+            value[row, :4] = np.log([size.area_px, size.height_px, size.width_px, size.lower_px])
+            value[row, 4] = size.lean
         design[-2, -2] = design[-1, -1] = 0.2  # ridge: without spread of places the size is taken as constant
         solution = np.linalg.lstsq(design, value, rcond=None)[0]
         self._slope = np.asarray(solution[-2:], dtype=np.float64)
         self._model = {name: np.asarray(solution[i], dtype=np.float64) for i, name in enumerate(names)}
+
+
+def _as_slender(one: Size, other: Size) -> bool:
+    return abs(math.log(one.height_px * other.width_px / (other.height_px * one.width_px))) < AS_SLENDER
 
 
 def _distance(place: _Place, u_px: float, v_px: float) -> float:

@@ -104,16 +104,15 @@ class PlaneHomography:
         mapped = np.array([self.plane_from_image(u, v) for u, v, _, _ in self.correspondences])
         return np.asarray(np.linalg.norm(mapped - self.correspondences[:, 2:], axis=1), dtype=np.float64)
 
-    def away_from_camera(self, u_px: float, v_px: float, distance: float) -> tuple[float, float]:
-        """(x, y), m: the plane point under (u, v), moved by `distance`, m, to where the camera looks: up in the image.
+    def foreshortening(self, u_px: float, v_px: float) -> float:
+        """Height over width of the box around a small circle of the plane, as it is seen near (u, v).
 
-        Assumes that image up is away from the camera, which holds for a camera that is not rolled by more than a few
-        degrees: a roll of 6 degrees turns the direction by about 6 degrees.
+        Straight from above it is 1; of a camera that is not rolled, it is the sine of its elevation.
         """
-        here = np.array(self.plane_from_image(u_px, v_px))
-        behind = np.array(self.plane_from_image(u_px, v_px - 1.0))
-        moved = here + distance * (behind - here) / np.linalg.norm(behind - here)
-        return float(moved[0]), float(moved[1])
+        x, y = self.plane_from_image(u_px, v_px)
+        along_x, along_y = (np.array(self.image_from_plane(x + dx, y + dy)) for dx, dy in ((1e-3, 0.0), (0.0, 1e-3)))
+        across, down = np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]])
+        return float(np.linalg.norm(down) / np.linalg.norm(across))
 
     def _refuse_mirrored(self, image: Matrix) -> None:
         depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]

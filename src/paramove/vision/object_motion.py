@@ -55,14 +55,14 @@ class State(enum.Enum):
 class Happening:
     """A moment of one object; (u, v) px.
 
-    `sunk`: seen to sink, (u, v) counted from the opening's near rim. `placed`: False if nobody saw where it happened.
+    `in_motion`: it vanished while it moved. `placed`: False if nobody saw where it happened.
     """
 
     kind: Gesture.Kind
     u_px: float
     v_px: float
     confidence: float
-    sunk: bool = False
+    in_motion: bool = False
     placed: bool = True
 
 
@@ -119,18 +119,15 @@ class ObjectMotion:
         return [self._vanish()]
 
     def _vanish(self) -> Happening:
-        confidence = 1.0
-        if self.state is State.RESTING and self.place is not None:
-            u, v, sunk = self.place.u_px, self.place.v_px, False
-        else:
-            last = last_place(self.name, list(self._history), self._full_size)
-            u, v, sunk, confidence = last.u_px, last.v_px, last.sunk, last.confidence
-        unwatched = self.blind and self.state is State.MOVING  # it went on while nobody saw where to
+        moving = self.state is State.MOVING
+        u, v = last_place(self.name, list(self._history), self._full_size)
+        if not moving and self.place is not None:
+            u, v = self.place.u_px, self.place.v_px
+        unwatched = self.blind and moving  # it went on while nobody saw where to
         self.state, self.place = State.UNSEEN, None
         self._history.clear()
-        return Happening(
-            Gesture.KIND_VANISHED, u, v, 0.3 * confidence if unwatched else confidence, sunk, not unwatched
-        )
+        confidence = 0.2 if unwatched else 0.7 if moving else 1.0
+        return Happening(Gesture.KIND_VANISHED, u, v, confidence, moving, not unwatched)
 
     def _while_resting(self, sample: Sample) -> list[Happening]:
         assert self.place is not None

@@ -10,6 +10,7 @@ from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.vision.full_size import FullSize
 from paramove.vision.homography import PlaneHomography
 from paramove.vision.object_motion import Happening, MotionThresholds, ObjectMotion, State
+from paramove.vision.openings import SeenOpenings
 from paramove.vision.pointing import Pointing, PointingThresholds
 from paramove.vision.sinking import Sample
 
@@ -26,19 +27,10 @@ CLOCK_BACK_S = 5.0
 
 @dataclass(frozen=True)
 class RecognizerOptions:
-    """Thresholds, and what is known of the tool box.
-
-    Attributes:
-        rim_clearance: Horizontal gap between the lower border of a standing object and an opening's near rim, m.
-            A sinking object is first cut off by that rim, so it is seen this much nearer to the camera than it is.
-            Cylinder of 20 mm, opening of 28 mm with a chamfer of 6 mm at 45 degrees, seen from 52 degrees above the
-            plane: the chamfer's lower end cuts, which on the plane is seen at 14 mm + 6 mm / tan 52 degrees; less the
-            radius of 10 mm.
-    """
+    """Thresholds."""
 
     motion: MotionThresholds = field(default_factory=MotionThresholds)
     pointing: PointingThresholds = field(default_factory=PointingThresholds)
-    rim_clearance: float = 0.0087
 
 
 class Recognizer:
@@ -50,6 +42,7 @@ class Recognizer:
     def __init__(self, options: RecognizerOptions | None = None) -> None:
         self._options = options or RecognizerOptions()
         self._full_size = FullSize()
+        self._openings = SeenOpenings()
         self._objects: dict[str, ObjectMotion] = {}
         self._last_seen: dict[str, Sample] = {}
         self._pointing = Pointing(self._options.pointing)
@@ -75,6 +68,7 @@ class Recognizer:
         if not all(_in_some_image(one) for one in tracked.objects):
             usable = [one for one in tracked.objects if _in_some_image(one)]
             tracked = TrackedObjects(captured=tracked.captured, objects=usable)
+        self._openings.see(tracked.openings)
         hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
         said: list[Gesture] = []
         for name, happening in self._follow_objects(tracked, hand, now_s):
@@ -142,10 +136,25 @@ class Recognizer:
             confidence=happening.confidence,
         )
         if homography is not None and name and happening.placed:
-            clearance = self._options.rim_clearance if happening.sunk else 0.0
+            if happening.in_motion:
+                self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
-            gesture.x, gesture.y = homography.away_from_camera(happening.u_px, happening.v_px, clearance)
+            gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
         return gesture
+
+    def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
+        """An object that vanished over an opening stood where one would be seen whose foot is the opening's middle.
+
+        The homography says how much a circle on the plane is foreshortened, the object's own image how far below its
+        middle its foot is seen, and both together from where the camera looks.
+        """
+        full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
+        if full is None:
+            return
+        du, dv = full.foot_px(homography.foreshortening(gesture.u_px, gesture.v_px))
+        opening = self._openings.at(gesture.u_px + du, gesture.v_px + dv)
+        if opening is not None:
+            gesture.u_px, gesture.v_px, gesture.confidence = opening[0] - du, opening[1] - dv, 1.0
 
 
 class _HandPresence:
