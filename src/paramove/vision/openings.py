@@ -30,8 +30,8 @@ ROUNDNESS = 0.95
 """Area over that of the ellipse of the same second moments: 1 for an ellipse, 0.95 for a rectangle."""
 SOLIDITY = 0.9
 """Area over that of the convex hull."""
-HIDDEN_SHARE = 0.95
-"""What hides a part of an opening makes it smaller than this share; noise changes the area by 1 %."""
+HIDDEN_SHARE = 0.85
+"""What hides a part of an opening makes it smaller than this share; noise changes a small one by some %."""
 MOVED_HALF_AXES = 0.25
 """What is farther from where it was seen before is something dark that moves."""
 STEADY, SAMPLES = 8, 30
