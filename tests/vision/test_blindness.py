@@ -18,11 +18,11 @@ GAPS = [30, 45]  # camera periods: 2 s and 3 s
 PLACES = {"yellow": (0.14, -0.10), "green": (0.17, -0.03), "blue": (0.13, 0.05)}
 
 
-def _laid(scene: Scene) -> Story:
+def _laid(scene: Scene, **others: tuple[float, float]) -> Story:
     """Three objects at rest, the view calibrated."""
     story = Story(scene)
     story.calibrate()
-    for name, place in PLACES.items():
+    for name, place in (PLACES | others).items():
         scene.stand(name, *place)
     story.step(14)
     assert [story.kinds(name) for name in PLACES] == [["APPEARED"]] * 3
@@ -85,7 +85,7 @@ def test_an_object_that_is_carried_during_the_gap(gap: int, seen_again: bool) ->
 def test_while_the_robot_relocates_an_object(gap: int) -> None:
     """The gap covers half of the way; the others stay, the carried one vanishes where it is seen to sink."""
     with Scene(Look.random(5), 5, opening_radius=RIM_RADIUS) as scene:
-        story = _laid(scene)
+        story = _laid(scene, green=(0.18, -0.07))  # not in front of the opening
         x, y = PLACES["blue"]
 
         def carried(path: np.ndarray) -> None:
