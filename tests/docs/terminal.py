@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -85,10 +86,13 @@ def heard(running: subprocess.Popen[str], *words: str) -> None:
 
 @contextlib.contextmanager
 def launched(command: str, environment: Mapping[str, str]) -> Iterator[subprocess.Popen[str]]:
-    """An application, which ends with the test."""
+    """An application, which ends with the test, and after five minutes in any case: then nothing is to be read."""
     with started(f"exec {command}", environment) as running:
+        ends = threading.Timer(300.0, running.kill)
+        ends.start()
         try:
             yield running
         finally:
+            ends.cancel()
             if running.poll() is None:
                 running.terminate()
