@@ -134,6 +134,7 @@ def test_only_what_is_needed_is_behind_a_module():
         behind = modules_behind(f"paramove.demonstrations.{module}")
         assert {name.split(".")[1] for name in behind} <= {
             "demonstrations",
+            "documents",
             "hmm",
             "phmm",
             "input_error",

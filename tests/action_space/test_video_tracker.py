@@ -118,7 +118,7 @@ def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
         ("upper_arm: 28", "upper_arm: Input should be less than 0.6; expected as"),
         ("upper_am: 0.28", "upper_am: Extra inputs are not permitted"),
         ("shoulder: [1, 2]", "shoulder.2: Field required"),
-        ("shoulder: [", "expected a YAML file with"),
+        ("shoulder: [", "person.yaml:1:12"),
     ],
 )
 def test_a_wrong_person_is_told_with_an_example(tmp_path, text, told):

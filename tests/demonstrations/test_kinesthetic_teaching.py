@@ -1,6 +1,7 @@
 """An emulated arm is led by hand to places; a model of the segments leads to a place that was not shown."""
 
 import itertools
+import select
 
 import numpy as np
 import pytest
@@ -54,7 +55,9 @@ class Hands:
             with self.emulator.lock:
                 for servo, count in zip(self.emulator.bus.servos, ROBOT.units.to_counts(row), strict=True):
                     servo.turned(float(count))
-            _, angles = self.limp.measured()
+            while (measured := self.limp.measured()) is None:
+                select.select([], [], [], 0.005)  # nobody turns a joint in no time: it is believed after a while
+            _, angles = measured
             self.now_ns += PERIOD_NS
             teacher.hear(self.now_ns, angles)
 

@@ -29,7 +29,7 @@ def test_a_corrupt_image_is_left_out_and_told() -> None:
     colour_tracker.run(bus, colour_tracker.Config())
     assert len(bus.said) == 2
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
-    assert "cannot be decoded" in bus.states[1][1]
+    assert "('jpeg', 16 bytes)" in bus.states[1][1]
 
 
 def test_colours_come_from_the_parameters() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import time
@@ -198,7 +199,8 @@ class Exchange:
         """Makes `wait` return at once and for good. May be called from a signal handler."""
         self.stopped = True
         if not self._closed:
-            os.eventfd_write(self._wake, 1)
+            with contextlib.suppress(OSError):  # another thread is closing it just now
+                os.eventfd_write(self._wake, 1)
 
     def close(self) -> None:
         """Closes everything. Messages said just before still arrive, for `publisher.LINGER_MS` at most."""
