@@ -28,6 +28,7 @@ from paramove.robots.dynamixel.wire_faults import WireFaults
 BITS_PER_BYTE = 10
 """Start bit, eight bits, stop bit."""
 IDLE_S = 0.005
+PSEUDO_TERMINALS = "/dev/pts/"
 """Between two looks at a quiet line, and of the servos' time at most before what was heard is answered."""
 LATE_S = 0.02
 """So much the servos' time may be behind; what the system does not let them have beyond, passes them by."""
@@ -127,8 +128,11 @@ class DynamixelEmulator:
         os.set_blocking(self._ours, False)
         self.port = os.ttyname(self._theirs)
         if self.link is not None:
-            if self.link.exists() and not self.link.is_symlink():
-                raise InputError(f"{self.link} is there already and no link: name another place for the port")
+            ours = self.link.is_symlink() and os.readlink(self.link).startswith(PSEUDO_TERMINALS)
+            if os.path.lexists(self.link) and not ours:
+                raise InputError(
+                    f"{self.link} is there already and no link to a pseudo-terminal: name another place for the port"
+                )
             self.link.unlink(missing_ok=True)
             self.link.symlink_to(self.port)
         self._wanted = self.plugged_in = True
