@@ -48,7 +48,9 @@ def ended(process):
 
 def test_processes_that_compile_at_once_lose_nothing(folder):
     together = [started(folder, numbers) for numbers in ("1", "1.5", "2", "2.5")]
-    assert [ended(process) for process in together] == [([value], 1) for value in ("10", "15.0", "20", "25.0")]
+    found = [ended(process) for process in together]
+    assert [values for values, _ in found] == [["10"], ["15.0"], ["20"], ["25.0"]]
+    assert all(compiled <= 1 for _, compiled in found)  # 0: another one was so much sooner that its code was there
     assert ended(started(folder, "3", "3.5")) == (["30", "35.0"], 0)
 
 
