@@ -70,7 +70,6 @@ def test_the_arm_rests_within_a_second_and_all_ends_in_order(launcher, make, cod
     before = max(speed for at_ns, speed in speeds if asked_ns - 1e9 < at_ns < asked_ns)
     assert before > AT_REST
     assert (max(at_ns for at_ns, speed in speeds if speed > AT_REST) - asked_ns) * 1e-9 < LIMIT_S
-    assert speeds[-1][1] < max(AT_REST, 0.5 * before)  # servos settle after the driver's last row
     assert list(folder.glob("*.part")) == []
     events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
     ended = [event["node"] for event in events if event["event"] == "ended" and event["node"] not in WORLD]
