@@ -17,7 +17,7 @@ from tests.supervision.conftest import until
 from tests.supervision.test_unread_terminal import full_pipe, stopped_terminal
 
 MOVING = 0.4  # rad/s of the fastest joint, by its servo
-AT_REST = 0.01  # m/s of the gripper, by the simulated world
+AT_REST = 0.005  # m/s of the gripper, by the simulated world
 LIMIT_S = 1.0
 WORLD = ("judge", "dynamixel_emulator")
 """End with the recorder, in any order."""
@@ -68,7 +68,8 @@ def test_the_arm_rests_within_a_second_and_all_ends_in_order(launcher, make, cod
     folder = launcher.latest.resolve()
     speeds = gripper_speeds(folder / "truth.mcap")
     before = max(speed for at_ns, speed in speeds if asked_ns - 1e9 < at_ns < asked_ns)
-    assert before > AT_REST
+    assert before > 2 * AT_REST
+    assert max(speed for _, speed in speeds[-2:]) < AT_REST
     assert (max(at_ns for at_ns, speed in speeds if speed > AT_REST) - asked_ns) * 1e-9 < LIMIT_S
     assert list(folder.glob("*.part")) == []
     events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]

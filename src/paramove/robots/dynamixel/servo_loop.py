@@ -9,16 +9,19 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+
 from paramove.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.exit_movement import LONGEST_S, MARGIN_S, movement_to
-from paramove.robots.dynamixel.servo_arm import ArmReading, Patience, ServoArm
+from paramove.robots.dynamixel.servo_arm import ArmReading, Counts, Patience, ServoArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_checks import JointServo
 from paramove.robots.dynamixel.servo_port import PortLostError, ServoPort
@@ -39,6 +42,8 @@ WATCHDOG_SHARE = 0.5
 REST_S = 0.0002
 """A loop that is late gives up its lock for so long each period: else it takes it again before whoever waits for it."""
 NOT_EMULATED = "its servos are not emulated by this launch"
+SETTLED_S, LONGEST_SETTLING_S = 0.1, 0.4
+"""Servos lag behind their goals: at the end an arm has come to rest if for so long none moves by more than a pulse."""
 TICK_S = 0.02
 """The driver's logic is asked so often; at once where something is wrong."""
 
@@ -309,10 +314,20 @@ class ServoLoop:
         time.sleep(max(0.0, begun_s + self._period_s - time.monotonic()))
 
     def _end(self, rests: bool) -> None:
-        """Come to rest by what the reader still holds, then the last word to every servo."""
+        """Come to rest by what the reader still holds, wait for the servos, then the last word to each of them."""
+        measured: deque[Counts] = deque(maxlen=1 + round(SETTLED_S / self._period_s))
+        stands_s = None
         try:
-            while self._arm.holds and self._reader is not None and not self._reader.at_rest:
+            while self._arm.holds and self._reader is not None:
                 self._arm.command(self._reader.play())
+                if self._reader.at_rest:
+                    stands_s = stands_s or time.monotonic()
+                    reading = self._arm.measured()
+                    if reading is not None:
+                        measured.append(reading.counts)
+                    settled = len(measured) == measured.maxlen and np.ptp(measured, axis=0).max() <= 1
+                    if settled or time.monotonic() - stands_s > LONGEST_SETTLING_S:
+                        break
                 time.sleep(self._period_s)
         except PortLostError as error:
             self.lost = str(error)
