@@ -293,7 +293,8 @@ def test_the_last_word_goes_to_every_servo_even_if_one_does_not_answer(arm, emul
     assert memory(emulator, "Torque Enable") == [1, 0, 0]
 
 
-def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_is_in(emulator, port):
+def arm_across_the_seam(emulator, port, at):
+    """Its last joint, whose range has the servo's zero in it, and the servo of it."""
     across = JointCalibration(
         id=3, model="xl330_m288", firmware=46, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
         min_counts=3000, max_counts=5200,
@@ -301,8 +302,12 @@ def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_i
     with emulator.lock:
         servo = emulator.bus.servos[2]
         servo.preset("Operating Mode", 4)
-        servo.turned(100.0)  # beyond the seam: 4196 in the counts of the joint
-    arm = ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S)
+        servo.turned(at)
+    return ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S), servo
+
+
+def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_is_in(emulator, port):
+    arm, servo = arm_across_the_seam(emulator, port, 100.0)  # 4196 in the counts of the joint
     assert arm.measured().counts[2] == 4196
     with emulator.lock:
         servo.turned(4196.0)  # counted on beyond its turn,
@@ -320,15 +325,7 @@ def test_a_joint_across_the_seam_counts_on_and_its_goals_find_the_turn_that_it_i
 
 
 def test_a_servo_that_loses_a_turn_and_its_torque_while_it_holds_is_where_it_was(emulator, port):
-    across = JointCalibration(
-        id=3, model="xl330_m288", firmware=46, sign=1, operating_mode=4, homing_offset=0, zero_counts=4096,
-        min_counts=3000, max_counts=5200,
-    )  # fmt: skip
-    with emulator.lock:
-        servo = emulator.bus.servos[2]
-        servo.preset("Operating Mode", 4)
-        servo.turned(4196.0)
-    arm = ServoArm((*JOINTS[:2], replace(JOINTS[2], calibration=across)), ServoChain(port), PERIOD_S)
+    arm, servo = arm_across_the_seam(emulator, port, 4196.0)
     assert arm.measured().counts[2] == 4196
     assert arm.take_hold() == ()
     with emulator.lock:
