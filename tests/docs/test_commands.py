@@ -11,6 +11,7 @@ the line before the block, change that:
                                    the exit code that is expected, 0 if it is left out
 """
 
+import contextlib
 import functools
 import itertools
 import re
@@ -24,8 +25,11 @@ from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
+from typer.testing import CliRunner
 
+from paramove.cli.main import build
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from tests.docs.command_line import unknown
 from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks
 from tests.docs.terminal import ENVIRONMENT, attended
 from tests.robots.dynamixel.koch_arm import hands, koch_servos
@@ -131,21 +135,15 @@ def check_make(words):
 
 
 def check_paramove(words):
-    if words[1] == "launch":
-        answer = run(["paramove", *words[1:], "--check"])
-        assert answer.returncode == 0, answer.stderr
-        return
     if words[1].startswith("-"):
         check_options(("paramove",), words)
         return
-    path = []
-    for word in words[1:]:
-        commands = re.findall(r"^│ ([\w-]+) ", help_of(("paramove", *path)).partition(" Commands ")[2], re.M)
-        if word not in commands:
-            break
-        path.append(word)
-    assert path, f"no such command: {shlex.join(words)}"
-    check_options(("paramove", *path), words)
+    wrong = unknown(words[1:])
+    assert not wrong, f"{shlex.join(words)}: {wrong} is unknown"
+    if words[1] == "launch":
+        with contextlib.chdir(ROOT):
+            answer = CliRunner().invoke(build("launch"), [*words[1:], "--check"])
+        assert answer.exit_code == 0, answer.output
 
 
 def check_python(words):

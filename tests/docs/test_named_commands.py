@@ -1,13 +1,12 @@
 """Every `paramove` command that a message or a docstring of the code names exists, with its options."""
 
 import ast
-import functools
 import re
 
 import pytest
-import typer
 
-from paramove.cli.main import COMMANDS, build
+from paramove.cli.main import COMMANDS
+from tests.docs.command_line import unknown
 from tests.docs.markdown import ROOT
 
 NAMED = re.compile(r"([`'\"]?)paramove ([a-z][^`'\"\n;:,()]*)")
@@ -19,26 +18,6 @@ def named_commands(text):
     for quote, words in NAMED.findall(text):
         if quote or words.split()[0] in COMMANDS:
             yield words.split()
-
-
-@functools.cache
-def command_line(name):
-    return typer.main.get_command(build(name))
-
-
-def unknown(words):
-    """What of a command does not exist; "" if all does."""
-    if words[0] not in COMMANDS:
-        return words[0]
-    command = command_line(words[0])
-    for number, word in enumerate(words):
-        if word in getattr(command, "commands", {}):
-            command = command.commands[word]
-        elif hasattr(command, "commands") and re.fullmatch(r"[a-z_-]+", word) and number < 2:
-            return word
-    known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
-    options = {word.partition("=")[0].rstrip(".]") for word in words if re.match(r"--?[a-z]", word)}
-    return " ".join(sorted(options - known - {"--help"}))
 
 
 def test_commands_named_in_the_code_exist():
