@@ -218,14 +218,32 @@ def test_one_silent_servo_does_not_keep_the_others_from_being_asked(chain):
     assert chain.has_room()
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [lambda chain: chain.read(1, REGISTERS["Present Position"]), lambda chain: chain.ping(1)],
-    ids=["read", "ping"],
-)
+ASKS = {
+    "read": lambda chain: chain.read(1, REGISTERS["Present Position"]) == 1000,
+    "ping": lambda chain: chain.ping(1) is not None,
+    "write": lambda chain: chain.write(1, REGISTERS["Goal Position"], 1000) is None,
+}
+
+
+@pytest.mark.parametrize("ask", ASKS.values(), ids=ASKS)
 def test_a_pause_of_the_machine_is_no_silent_servo(chain, emulator, ask, monkeypatch):
     monkeypatch.setattr("paramove.robots.dynamixel.servo_chain.ATTEMPTS_S", (*ATTEMPTS_S[:-1], 60.0))
     chain.port.latency_s = 0.005
     emulator.lock.acquire()
     Timer(0.06, emulator.lock.release).start()
-    assert ask(chain) is not None
+    assert ask(chain)
+
+
+@pytest.mark.parametrize(("ask", "answer_bytes"), [("ping", 14), ("write", 11)])
+def test_answers_to_all_attempts_may_come_together(chain, emulator, ask, answer_bytes, monkeypatch):
+    monkeypatch.setattr("paramove.robots.dynamixel.servo_chain.ATTEMPTS_S", (*ATTEMPTS_S[:-1], 60.0))
+    chain.port.latency_s = 0.005
+    read, kept = chain.port.readPort, bytearray()
+
+    def read_together(most):
+        kept.extend(read(most))
+        return bytes(kept) if len(kept) == len(ATTEMPTS_S) * answer_bytes else b""
+
+    monkeypatch.setattr(chain.port, "readPort", read_together)
+    assert ASKS[ask](chain)
+    assert chain.counts.missing == 2

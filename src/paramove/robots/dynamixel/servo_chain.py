@@ -137,11 +137,8 @@ class ServoChain:
     def ping(self, number: int, patient: bool = True) -> PingedServo | None:
         """Ask one servo whether it is there, as patiently as a read asks, or once."""
         packet = [0, 0, 0, 0, number, 3, 0, Instruction.PING, 0, 0]
-        for patience_s in ATTEMPTS_S if patient else ATTEMPTS_S[:1]:
-            answers = self._exchange(lambda: self._sdk.txPacket(self.port, packet), {number: PING_DATA}, patience_s)
-            if number in answers:
-                return _pinged(answers[number])
-        return None
+        answer = self._insist(packet, number, PING_DATA, ATTEMPTS_S if patient else ATTEMPTS_S[:1])
+        return None if answer is None else _pinged(answer)
 
     def ping_all(self) -> list[PingedServo]:
         """All servos that answer at this baud rate, by ID.
@@ -166,17 +163,11 @@ class ServoChain:
 
     def write(self, number: int, register: Register, value: int) -> None:
         """Write one number of one servo. Raises ServoError."""
-        data = list(_bytes(register, value))
-        for patience_s in ATTEMPTS_S:
-            answers = self._exchange(
-                lambda: self._sdk.txPacket(self.port, _write_packet(number, register.address, data)),
-                {number: 0},
-                patience_s,
-            )
-            if number in answers:
-                _check(number, answers[number], f"write {register.name} = {value}")
-                return
-        raise _silent(number, f"write {register.name}")
+        packet = _write_packet(number, register.address, list(_bytes(register, value)))
+        answer = self._insist(packet, number, 0, ATTEMPTS_S)
+        if answer is None:
+            raise _silent(number, f"write {register.name}")
+        _check(number, answer, f"write {register.name} = {value}")
 
     def reboot(self, number: int) -> None:
         """Switch a servo off and on: torque off, errors cleared. Raises ServoError."""
@@ -235,8 +226,26 @@ class ServoChain:
             if isinstance(packet, Packet) and packet.instruction == Instruction.STATUS:
                 self._late.heard(len(packet.parameters) - 1)
 
-    def _exchange(self, send: Callable[[], int], sizes: dict[int, int], patience_s: float = 0.0) -> dict[int, Packet]:
-        """Ask, and wait for the answer of each of these servos with so many bytes of data."""
+    def _insist(self, packet: list[int], number: int, size: int, attempts_s: Sequence[float]) -> Packet | None:
+        """Ask one servo more than once if need be; answers to its first questions may come with that to the last."""
+        late = 0
+        for patience_s in attempts_s:
+            stray = self.counts.stray
+            answers = self._exchange(
+                lambda: self._sdk.txPacket(self.port, list(packet)), {number: size}, patience_s, late
+            )
+            if number in answers:
+                return answers[number]
+            late += self.counts.stray == stray
+        return None
+
+    def _exchange(
+        self, send: Callable[[], int], sizes: dict[int, int], patience_s: float = 0.0, late: int = 0
+    ) -> dict[int, Packet]:
+        """Ask, and wait for the answer of each of these servos with so many bytes of data.
+
+        `late`: so many times the same was asked before and nobody answered yet.
+        """
         self._late.asked()
         self._send(send)
         self.counts.asked += len(sizes)
@@ -244,7 +253,7 @@ class ServoChain:
         self.port.setPacketTimeout(answer_bytes, len(sizes), patience_s)
         noisy, stray, owing = self.counts.noisy, self.counts.stray, bool(self._late)
         found = self._answers(dict(sizes))
-        answers = self._trusted(found, sizes)
+        answers = self._trusted(found, sizes, late)
         if self.counts.stray > stray and not owing:  # else they are answers that came too late
             self.counts.noisy = noisy + 1
         if any(len(packet.parameters) - 1 in sizes.values() for packet in found):
@@ -293,10 +302,10 @@ class ServoChain:
         self.counts.noise += noise
         return found
 
-    def _trusted(self, answers: list[Packet], sizes: dict[int, int]) -> dict[int, Packet]:
-        """By ID; none of them if one came twice or was not asked for: then who said what is not known."""
+    def _trusted(self, answers: list[Packet], sizes: dict[int, int], late: int) -> dict[int, Packet]:
+        """By ID; none of them if one came more often than it was asked, or unasked: then who said what is not known."""
         by_id = {packet.id: packet for packet in answers}
-        if len(by_id) == len(answers) and by_id.keys() <= sizes.keys():
+        if len(answers) - len(by_id) <= late and by_id.keys() <= sizes.keys():
             return by_id
         self.counts.stray += len(answers)
         return {}
