@@ -1,0 +1,172 @@
+"""What a change of the code leaves equal: payloads of repeatable runs, and numbers of short evaluations.
+
+    python studies/payload_hashes.py measure before.json     with the code before the change (half an hour)
+    python studies/payload_hashes.py measure after.json      with the code after it, on the same machine
+    python studies/payload_hashes.py compare before.json after.json
+
+Applications run in simulated time, so one seed gives the same messages each time. Of each recorded topic all payloads
+are hashed, without sentences for people, and truth too. Status and images are left out: a status follows the wall
+clock, and an image is as large as everything else. Of an evaluation all numbers are kept but times. The hashes hold on
+one machine: rendering and linear algebra differ between processors in the last bits.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from google.protobuf import descriptor_pool, message_factory  # type: ignore[import-untyped]
+from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[import-untyped]
+from mcap.reader import make_reader
+
+APPLICATIONS = ("rule_learning", "pointing", "relocate_by_pointing")
+SEEDS = range(3)
+EVALUATIONS = {
+    "chapter2": "paramove evaluate chapter2 --seed 0 --out {out} --json {out}/numbers.json",
+    "chapter4": "paramove evaluate chapter4 --quick --out {out} --json {out}/numbers.json",
+    "imitation": "paramove evaluate imitation --repetitions 10 --no-raster --report {out}",
+    "real": "paramove evaluate real --task pointing --method quadratic --out {out} --json {out}/numbers.json",
+    "real_images": "paramove evaluate real-images --out {out} --json {out}/numbers.json",
+}
+NOT_MET = 3
+"""Exit code of an evaluation that measured everything and missed a goal."""
+FREE_TEXT = frozenset({"sentence", "reason", "refusal"})
+LEFT_OUT = ("status/", "clock")
+RENAMED: dict[str, str] = {}
+"""Topics: name before the change -> name after it."""
+TIMES = ("second", "minute", "time", "_ms", "took", "date", "commit", "version")
+
+
+def payload_hashes(recording: Path) -> dict[str, list[Any]]:
+    """By topic: how many messages, and the hash of all payloads in order.
+
+    Messages are decoded by the schemas in the file.
+    """
+    hashes: dict[str, tuple[int, Any]] = {}
+    classes: dict[int, Any] = {}
+    with recording.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if schema is None or channel.topic.startswith(LEFT_OUT) or schema.name.endswith("Image"):
+                continue
+            if schema.id not in classes:
+                classes[schema.id] = _message_class(schema.name, schema.data)
+            one = classes[schema.id].FromString(message.data)
+            _clear_text(one)
+            count, digest = hashes.setdefault(channel.topic, (0, hashlib.sha256()))
+            payload = one.SerializeToString(deterministic=True)
+            digest.update(len(payload).to_bytes(4, "little") + payload)
+            hashes[channel.topic] = (count + 1, digest)
+    return {topic: [count, digest.hexdigest()] for topic, (count, digest) in sorted(hashes.items())}
+
+
+def _message_class(name: str, descriptors: bytes) -> Any:
+    pool = descriptor_pool.DescriptorPool()
+    for file in FileDescriptorSet.FromString(descriptors).file:
+        pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
+
+
+def _clear_text(message: Any) -> None:
+    for field, value in message.ListFields():
+        if field.name in FREE_TEXT:
+            message.ClearField(field.name)
+        elif field.message_type is not None and not field.message_type.GetOptions().map_entry:
+            for one in [value] if hasattr(value, "ListFields") else value:
+                _clear_text(one)
+
+
+def numbers_in(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Numbers, words and truth values of a JSON document by their paths, without times."""
+    if isinstance(value, dict):
+        for key, one in value.items():
+            if not any(word in key for word in TIMES):
+                yield from numbers_in(one, f"{path}.{key}")
+    elif isinstance(value, list):
+        for number, one in enumerate(value):
+            yield from numbers_in(one, f"{path}[{number}]")
+    elif not isinstance(value, str):
+        yield path, value
+
+
+def measure(out: Path, seeds: list[int], applications: list[str], evaluations: list[str]) -> int:
+    """Runs everything and writes the file; the exit code."""
+    found: dict[str, Any] = {"hashes": {}, "numbers": {}}
+    failed = 0
+    with tempfile.TemporaryDirectory(prefix="payloads-") as folder:
+        for application in applications:
+            for seed in seeds:
+                runs = Path(folder, application, str(seed))
+                command = f"paramove launch {application} --headless --seed {seed} --runs {runs}"
+                failed += _run(command, (0,))
+                found["hashes"][f"{application} {seed}"] = {
+                    topic: one
+                    for name in ("recording.mcap", "truth.mcap")
+                    if (recording := runs / "latest" / name).exists()
+                    for topic, one in payload_hashes(recording).items()
+                }
+        for name in evaluations:
+            results = Path(folder, name)
+            failed += _run(EVALUATIONS[name].format(out=results), (0, NOT_MET))
+            found["numbers"][name] = {
+                f"{file.name}{path}": value
+                for file in sorted(results.rglob("*.json"))
+                for path, value in numbers_in(json.loads(file.read_text(encoding="utf-8")))
+            }
+        out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    return int(failed > 0)
+
+
+def _run(command: str, good: tuple[int, ...]) -> bool:
+    sys.stdout.write(f"$ {command}\n")
+    sys.stdout.flush()
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    answer = subprocess.run(shlex.split(command), env=environment, capture_output=True, text=True, check=False)
+    if answer.returncode not in good:
+        sys.stdout.write(f"exit code {answer.returncode}\n{answer.stdout[-2000:]}{answer.stderr[-2000:]}\n")
+    return answer.returncode not in good
+
+
+def differences(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
+    """One line for each topic or number that is not the same."""
+    for kind in ("hashes", "numbers"):
+        for name in sorted({*before[kind], *after[kind]}):
+            old, new = before[kind].get(name, {}), after[kind].get(name, {})
+            if kind == "hashes":
+                old = {RENAMED.get(topic, topic): one for topic, one in old.items()}
+            for key in sorted({*old, *new}):
+                if old.get(key) != new.get(key) and not (old.get(key) != old.get(key) and new.get(key) != new.get(key)):
+                    yield f"{name}: {key}: {old.get(key, 'nothing')} before, {new.get(key, 'nothing')} after"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    measuring = commands.add_parser("measure", help="run everything and write FILE")
+    measuring.add_argument("file", type=Path)
+    measuring.add_argument("--seeds", type=int, nargs="*", default=list(SEEDS))
+    measuring.add_argument("--applications", nargs="*", default=list(APPLICATIONS), choices=APPLICATIONS)
+    measuring.add_argument("--evaluations", nargs="*", default=list(EVALUATIONS), choices=list(EVALUATIONS))
+    comparing = commands.add_parser("compare", help="exit code 1 if anything differs")
+    comparing.add_argument("before", type=Path)
+    comparing.add_argument("after", type=Path)
+    chosen = parser.parse_args()
+    if chosen.command == "measure":
+        sys.exit(measure(chosen.file, chosen.seeds, chosen.applications, chosen.evaluations))
+    before, after = (json.loads(file.read_text(encoding="utf-8")) for file in (chosen.before, chosen.after))
+    found = list(differences(before, after))
+    same = sum(len(one) for kind in ("hashes", "numbers") for one in before[kind].values()) - len(found)
+    sys.stdout.write("".join(f"{line}\n" for line in found) + f"{same} equal, {len(found)} different\n")
+    sys.exit(bool(found))
+
+
+if __name__ == "__main__":
+    main()
