@@ -48,7 +48,7 @@ def at_terminal(command: str, keys: str, environment: Mapping[str, str]) -> tupl
     try:
         os.write(keyboard, keys.encode())
         with started(command, environment, terminal) as running:
-            output, _ = running.communicate(timeout=60)
+            output, _ = running.communicate(timeout=300)
     finally:
         os.close(keyboard)
         os.close(terminal)
@@ -69,7 +69,7 @@ def attended(command: str, steps: Iterable[Step], environment: Mapping[str, str]
             act()
             running.stdin.write(line)
             running.stdin.flush()
-        rest, _ = running.communicate(timeout=60)
+        rest, _ = running.communicate(timeout=300)
     return running.returncode, "".join(said) + rest
 
 

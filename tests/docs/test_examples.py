@@ -39,7 +39,7 @@ def test_commands_of_the_example_run(example):
             env=ENVIRONMENT,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=600,
             check=False,
         )
         assert answer.returncode == int(block.remark or 0), f"{block}\n{answer.stdout}{answer.stderr}"
