@@ -33,9 +33,9 @@ from paramove.action_space.particle_filter import FilterOptions
 from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.evaluation.chapter6.performances import kind_named, perform
 from paramove.observation import ArmObserver, ObservationOptions
 from sim.performances import Studio
+from sim.persons.performances import kind_named, perform
 
 THESIS_MATCH_MS = 1.24
 THESIS_FPS = 8.0

@@ -37,9 +37,9 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT))
 FOLDER = ROOT / "docs" / "results"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-CODE = ("src", "sim", "nodes", "launch", "robot_description", "benchmarks")
+CODE = ("src", "studies", "sim", "nodes", "launch", "robot_description", "benchmarks")
 NOT_MET = 3
-"""Exit code of a command of `paramove evaluate` that measured everything and missed a goal."""
+"""Exit code of a study that measured everything and missed a goal."""
 VALUE = re.compile(r"(?P<shown>[^\s|(]+)<!--=(?P<path>[^|\n]+?)-->")
 BLOCK = re.compile(r"^<!--=(?P<path>[^|\n]+?) ?(?P<row>\|.*)?-->\n(?P<head>```\w*\n|\|.*\n\|[-:| ]+\|\n)", re.M)
 
@@ -147,7 +147,7 @@ def chapter2(out: Path) -> dict[str, Any]:
 
 def chapter4(out: Path) -> dict[str, Any]:
     """All but what only the plots need."""
-    from paramove.evaluation.chapter4.findings import THESIS_CLASSIFICATION
+    from studies.chapter4.findings import THESIS_CLASSIFICATION
 
     found = load(out / "numbers.json")
     noise = [[name, *(row[cm][0] for cm in sorted(row, key=float))] for name, row in found["noise"].items()]
@@ -180,7 +180,7 @@ def chapter6(out: Path) -> dict[str, Any]:
 
 def table_6_1(out: Path) -> dict[str, Any]:
     """The thesis's table 6.1 and ours, in our axes."""
-    from paramove.evaluation.chapter6.findings import TABLE_6_1
+    from studies.chapter6.findings import TABLE_6_1
 
     ours = load(out / "numbers.json")["table 6.1"]
     names = (*TABLE_6_1, "refined: mean", "refined: RMS", "refined: max")
@@ -189,7 +189,7 @@ def table_6_1(out: Path) -> dict[str, Any]:
 
 def imitation(out: Path) -> dict[str, Any]:
     """The rows of the command's table; medians by place; the ranges of targets at the edges of the table."""
-    from paramove.evaluation.imitation.thesis import compared
+    from studies.imitation.thesis import compared
 
     found, few = load(out / "imitation.json"), load(out / "10" / "imitation.json")
     rows = [
@@ -430,41 +430,41 @@ Path(sys.argv[1], "new_take.csv").write_text("\\n".join(lines))
 """As step 9 of the tutorial does."""
 MEASUREMENTS = {
     "chapter2": Measurement(
-        tuple(f"paramove evaluate chapter2 --seed {n} --out {{out}}/{n} --json {{out}}/{n}.json" for n in range(3)),
+        tuple(f"python -m studies chapter2 --seed {n} --out {{out}}/{n} --json {{out}}/{n}.json" for n in range(3)),
         chapter2,
         "a minute",
     ),
     "chapter4": Measurement(
-        ("paramove evaluate chapter4 --seeds 0-4 --jobs 2 --out {out} --json {out}/numbers.json",),
+        ("python -m studies chapter4 --seeds 0-4 --jobs 2 --out {out} --json {out}/numbers.json",),
         chapter4,
         "10 minutes",
     ),
     "chapter6": Measurement(
-        ("python -m sim.performances", "paramove evaluate chapter6 --jobs 2 --out {out} --json {out}/numbers.json"),
+        ("python -m sim.performances", "python -m studies chapter6 --jobs 2 --out {out} --json {out}/numbers.json"),
         chapter6,
         "90 minutes",
     ),
     "chapter6_50fps": Measurement(
         (
             "python -m sim.performances --kind pointing_50fps",
-            "paramove evaluate chapter6 --kind pointing_50fps --jobs 2 --out {out} --json {out}/numbers.json",
+            "python -m studies chapter6 --kind pointing_50fps --jobs 2 --out {out} --json {out}/numbers.json",
         ),
         table_6_1,
         "10 minutes",
     ),
     "imitation": Measurement(
         (
-            "paramove evaluate imitation --report {out}",
-            "paramove evaluate imitation --repetitions 10 --no-raster --report {out}/10",
+            "python -m studies imitation --report {out}",
+            "python -m studies imitation --repetitions 10 --no-raster --report {out}/10",
         ),
         imitation,
         "a minute",
     ),
     "real_images": Measurement(
-        ("paramove evaluate real-images --out {out} --json {out}/numbers.json",), real_images, "a minute"
+        ("python -m studies real-images --out {out} --json {out}/numbers.json",), real_images, "a minute"
     ),
     "movements": Measurement(
-        ("paramove evaluate peers --on real --jobs 2 --out {out} --json {out}/numbers.json",), movements, "hours"
+        ("python -m studies peers --on real --jobs 2 --out {out} --json {out}/numbers.json",), movements, "hours"
     ),
     "pointing": Measurement(("paramove launch pointing --headless --runs {out}/0",), pointing, "a minute"),
     "relocation": Measurement(

@@ -13,6 +13,7 @@ Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint 
 """
 
 from pathlib import Path
+from typing import Any
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
@@ -34,7 +35,8 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     driver = ArmDriver(RobotDescription.load(config.robot), no_program=lambda: launch.why_no_program(bus.settings))
-    hear = {topics.ARM_TRAJECTORY: driver.on_trajectory, topics.WIRE_HOAP3_STATE: driver.on_robot_state}
+    hear: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
+    hear |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
     hear |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.sentence)
     for event in bus.events(*HEARS, tick=True):

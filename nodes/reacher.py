@@ -8,6 +8,7 @@ Says    arm/trajectory          JointTrajectory         event   rad
 """
 
 from pathlib import Path
+from typing import Any
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
@@ -40,8 +41,9 @@ def run(bus: Bus, config: Config) -> None:
             hear[HEARS.index(event.topic)](event.message)
             continue
         said = task.tick(event.now_ns)
-        for topic, messages in zip(SAYS, (said.trajectories, said.speech), strict=True):
-            for message in messages:
+        messages: tuple[Any, ...] = (said.trajectories, said.speech)
+        for topic, some in zip(SAYS, messages, strict=True):
+            for message in some:
                 bus.publish(topic, message)
         if task.failure:
             bus.failed(task.failure)

@@ -9,6 +9,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
         speech               Speech             event
 """
 
+from typing import Any
+
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.rules.relocator import Relocator
@@ -32,8 +34,9 @@ def run(bus: Bus, config: Config) -> None:
             hear[HEARS.index(event.topic)](event.message)
             continue
         said = relocator.tick(event.now_ns * 1e-9)
-        for topic, messages in zip(SAYS, (said.goals, said.stages, said.speech), strict=True):
-            for message in messages:
+        messages: tuple[Any, ...] = (said.goals, said.stages, said.speech)
+        for topic, some in zip(SAYS, messages, strict=True):
+            for message in some:
                 bus.publish(topic, message)
         if relocator.failure:
             bus.failed(relocator.failure)

@@ -36,18 +36,18 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until all objects are put away, the arm is not armed any more, or the bus closes."""
     places = config.model_dump(exclude={"surface_x", "surface_y"})
-    options = RuleLearnerOptions(**places, surface=Surface(config.surface_x, config.surface_y))
-    learner = RuleLearner(options, f"goal-{bus.now_ns}")
-    hear = dict(zip(HEARS, (learner.on_gesture, learner.on_goal_status, learner.on_safety), strict=True))
+    surface = Surface(config.surface_x, config.surface_y)
+    learner = RuleLearner(RuleLearnerOptions(**places, surface=surface), f"goal-{bus.now_ns}")
+    hear = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")
     for event in bus.events(*HEARS, tick=True):
         if not isinstance(event, Tick):
-            hear[event.topic](event.message)
+            hear[HEARS.index(event.topic)](event.message)
             continue
         said = learner.tick(event.now_ns * 1e-9)
-        messages = (said.goals, said.calibrations, said.rules, said.stages, said.speech)
-        for topic, message in ((topic, one) for topic, some in zip(SAYS, messages, strict=True) for one in some):
-            bus.publish(topic, message)
+        for topic, new in zip(SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech), strict=True):
+            for message in new:  # type: ignore[attr-defined]
+                bus.publish(topic, message)
         if learner.failure:
             bus.failed(learner.failure)
         if learner.finished or learner.failure:

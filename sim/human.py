@@ -36,6 +36,10 @@ CAPSULE, ELLIPSOID = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPS
 Colour = tuple[float, float, float]
 
 
+Pattern = Literal["plain", "stripes", "checks", "speckles"]
+"""Of cloth."""
+
+
 @dataclass(frozen=True)
 class PersonLook:
     """Clothes and skin.
@@ -49,7 +53,7 @@ class PersonLook:
 
     cloth: Colour = (0.25, 0.35, 0.60)
     second: Colour = (0.55, 0.60, 0.75)
-    pattern: Literal["plain", "stripes", "checks", "speckles"] = "plain"
+    pattern: Pattern = "plain"
     skin: Colour = (0.86, 0.66, 0.54)
     hair: Colour = (0.20, 0.14, 0.10)
     trousers: Colour = (0.18, 0.20, 0.25)

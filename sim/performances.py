@@ -22,7 +22,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from paramove.demonstrations.recorded_people import RecordingsError
 from paramove.demonstrations.synthetic import RESTING_STERNUM, SAMPLE_RATE_HZ
-from paramove.evaluation.chapter6.clips import (
+from paramove.input_error import InputError
+from paramove.observation.cameras import CalibratedCamera
+from sim.camera import Eye, Image
+from sim.human import place_arm, place_torso
+from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px
+from sim.persons.clips import (
     Clip,
     Truth,
     clips_folder,
@@ -31,13 +36,8 @@ from paramove.evaluation.chapter6.clips import (
     write_clip,
     write_manifest,
 )
-from paramove.evaluation.chapter6.performances import KINDS, Kind, Performance, kind_named, perform, stream
-from paramove.evaluation.chapter6.performers import WRIST
-from paramove.input_error import InputError
-from paramove.observation.cameras import CalibratedCamera
-from sim.camera import Eye, Image
-from sim.human import place_arm, place_torso
-from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px
+from sim.persons.performances import KINDS, Kind, Performance, kind_named, perform, stream
+from sim.persons.performers import WRIST
 from sim.worn_markers import place_markers
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Lens:
     def __init__(self, camera: CalibratedCamera) -> None:
         width, height = camera.width_px, camera.height_px
         grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 1, 2).astype(np.float64)
-        ideal = cv2.undistortPointsIter(
+        ideal = cv2.undistortPointsIter(  # type: ignore[call-overload]  # R and P may be None
             grid,
             camera.matrix,
             camera.distortion,
@@ -75,7 +75,8 @@ class Lens:
     def image(self, picture: Image) -> Image:
         """The image RGB [240, 320, 3] of a picture of `rendered_px()`."""
         smaller = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
-        return np.asarray(cv2.remap(smaller, *self._maps, cv2.INTER_LINEAR), dtype=np.uint8)
+        whole, parts = self._maps
+        return np.asarray(cv2.remap(smaller, whole, parts, cv2.INTER_LINEAR), dtype=np.uint8)
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.evaluation.chapter6.performances import Performance
 from paramove.observation.cameras import CalibratedCamera
-from sim.human import PersonLook, add_person, camera_frame
+from sim.human import Pattern, PersonLook, add_person, camera_frame
+from sim.persons.performances import Performance
 from sim.worn_markers import add_markers, mute
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +41,7 @@ FOCAL_PX = 345.0
 NAMES = tuple(f"camera_{number}" for number in (1, 2, 3, 4))
 LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "mass": 0.0}
 BOX, CYLINDER = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
-PATTERNS = ("plain", "stripes", "checks", "speckles")
+PATTERNS: tuple[Pattern, ...] = ("plain", "stripes", "checks", "speckles")
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ def _picture(rng: np.random.Generator, kind: str, base: tuple[float, ...], secon
             x, y = rng.integers(0, TEXTURE_PX - 24, 2)
             w, h = rng.integers(8, 40, 2)
             share[y : y + h, x : x + w] = rng.random()
-    return (1.0 - share[..., None]) * np.array(base) + share[..., None] * np.array(second)
+    return np.asarray((1.0 - share[..., None]) * np.array(base) + share[..., None] * np.array(second))
 
 
 def _add_room(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
@@ -250,11 +250,11 @@ def _add_room(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
     )  # fmt: skip
     for number in range(6):  # shelves, boxes and bags along the walls and on the floor
         half = rng.uniform(0.08, 0.3, 3)
-        place = np.array([rng.uniform(-1.3, 0.9), rng.uniform(1.4, 1.9), -0.74 + half[2]])
+        corner = np.array([rng.uniform(-1.3, 0.9), rng.uniform(1.4, 1.9), -0.74 + half[2]])
         if number % 2:
-            place[:2] = rng.uniform(-1.3, -1.1), rng.uniform(-1.6, 1.6)
+            corner[:2] = rng.uniform(-1.3, -1.1), rng.uniform(-1.6, 1.6)
         spec.worldbody.add_geom(
-            name=f"thing_{number}", type=BOX, pos=place, size=half, quat=_upright(rng),
+            name=f"thing_{number}", type=BOX, pos=corner, size=half, quat=_upright(rng),
             rgba=(*colour(rng.random(), 0.5, float(rng.uniform(0.2, 0.8))), 1.0), **LOOKS_ONLY,
         )  # fmt: skip
 

@@ -47,7 +47,7 @@ class PlaceInstructor(ArmInstructor):
         super().hear(request, name)
 
     def _scripts(self) -> dict[int, Callable[[str], Script]]:
-        more = {
+        more: dict[int, Callable[[str], Script]] = {
             Speech.REQUEST_POINT_AT_PLACE: self._point_at_free_place,
             Speech.REQUEST_POINT_AT_OBJECT: self._point_at_object,
         }

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from paramove.demonstrations.reaching import table_place
-from paramove.evaluation.chapter6.performances import Performance, assembled, kind_named, pointed_once
-from paramove.evaluation.chapter6.performers import draw_performer
 from paramove.msgs.truth_pb2 import TruthArm
 from paramove.observation.cameras import write_cameras
 from sim.performances import Studio
+from sim.persons.performances import Performance, assembled, kind_named, pointed_once
+from sim.persons.performers import draw_performer
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]

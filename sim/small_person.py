@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from ruamel.yaml import YAML
 
 from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ
-from paramove.evaluation.chapter6.performances import pointed_once
-from paramove.evaluation.chapter6.performers import ELBOW, INDEX, SHOULDER, WRIST, Performer, draw_performer, in_person
 from paramove.observation.arm_body import ArmSizes
 from sim import tool_box
+from sim.persons.performances import pointed_once
+from sim.persons.performers import ELBOW, INDEX, SHOULDER, WRIST, Performer, draw_performer, in_person
 
 FloatArray = NDArray[np.float64]
 

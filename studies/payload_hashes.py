@@ -31,11 +31,11 @@ from mcap.reader import make_reader
 APPLICATIONS = ("rule_learning", "pointing", "relocate_by_pointing")
 SEEDS = range(3)
 EVALUATIONS = {
-    "chapter2": "paramove evaluate chapter2 --seed 0 --out {out} --json {out}/numbers.json",
-    "chapter4": "paramove evaluate chapter4 --quick --out {out} --json {out}/numbers.json",
-    "imitation": "paramove evaluate imitation --repetitions 10 --no-raster --report {out}",
-    "real": "paramove evaluate real --task pointing --method quadratic --out {out} --json {out}/numbers.json",
-    "real_images": "paramove evaluate real-images --out {out} --json {out}/numbers.json",
+    "chapter2": "python -m studies chapter2 --seed 0 --out {out} --json {out}/numbers.json",
+    "chapter4": "python -m studies chapter4 --quick --out {out} --json {out}/numbers.json",
+    "imitation": "python -m studies imitation --repetitions 10 --no-raster --report {out}",
+    "real": "python -m studies real --task pointing --method quadratic --out {out} --json {out}/numbers.json",
+    "real_images": "python -m studies real-images --out {out} --json {out}/numbers.json",
 }
 NOT_MET = 3
 """Exit code of an evaluation that measured everything and missed a goal."""

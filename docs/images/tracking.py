@@ -16,8 +16,8 @@ from paramove.action_space.tracker import ActionTracker
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import believed
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.evaluation.chapter6.clips import clips_folder, read_clip
 from paramove.observation.arm_observer import ArmObserver
+from sim.persons.clips import clips_folder, read_clip
 
 MOMENTS_S = (0.6, 1.2, 1.5, 2.2)
 SHOWN = 40

@@ -13,8 +13,8 @@ from pathlib import Path
 _FOLDER = Path(__file__).resolve().parents[1]
 _IMPORTED_NS = time.clock_gettime_ns(time.CLOCK_REALTIME)
 _IMPORT = re.compile(
-    rb"^[ \t]*(?:from[ \t]+((?:paramove|sim)\b[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.*)|"
-    rb"import[ \t]+((?:paramove|sim)\.[\w.]+))",
+    rb"^[ \t]*(?:from[ \t]+((?:paramove|sim|studies)\b[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.*)|"
+    rb"import[ \t]+((?:paramove|sim|studies)\.[\w.]+))",
     re.MULTILINE,
 )
 

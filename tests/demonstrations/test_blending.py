@@ -19,8 +19,8 @@ from paramove.demonstrations import (
     train_pointing_model,
 )
 from paramove.demonstrations.blending import phase
-from paramove.evaluation.chapter4.redirect import place_misses
 from paramove.phmm import InterpolativePHMM
+from studies.chapter4.redirect import place_misses
 
 exact = Demonstrator(variation=Variation.none())
 

@@ -6,6 +6,7 @@ import re
 import typer
 
 from paramove.cli.main import COMMANDS, build
+from studies.__main__ import app as studies
 
 
 @functools.cache
@@ -14,14 +15,21 @@ def command_line(name):
 
 
 def unknown(words):
-    """What of a command does not exist; "" if all does."""
-    if words[0] not in COMMANDS:
-        return words[0]
-    command = command_line(words[0])
+    """What of a `paramove` command does not exist; "" if all does."""
+    return unknown_to(command_line(words[0]), words) if words[0] in COMMANDS else words[0]
+
+
+def unknown_study(words):
+    """The same of `python -m studies`."""
+    return unknown_to(typer.main.get_command(studies), ["studies", *words])
+
+
+def unknown_to(command, words):
+    """What of a command and those below it does not exist."""
     for number, word in enumerate(words):
         if word in getattr(command, "commands", {}):
             command = command.commands[word]
-        elif hasattr(command, "commands") and re.fullmatch(r"[a-z_-]+", word) and number < 2:
+        elif hasattr(command, "commands") and re.fullmatch(r"[a-z_-]+", word) and number < 2 and word != words[0]:
             return word
     known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
     options = {word.partition("=")[0].rstrip(".]") for word in words if re.match(r"--?[a-z]", word)}

@@ -29,7 +29,7 @@ from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from tests.docs.command_line import unknown
+from tests.docs.command_line import unknown, unknown_study
 from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks
 from tests.docs.terminal import ENVIRONMENT, attended
 from tests.robots.dynamixel.koch_arm import hands, koch_servos
@@ -150,6 +150,10 @@ def check_python(words):
     if words[1] == "-c":
         compile(words[2], "<command>", "exec")
         return
+    if words[1:3] == ["-m", "studies"]:
+        wrong = unknown_study(words[3:])
+        assert not wrong, f"{shlex.join(words)}: {wrong} is unknown"
+        return
     program = words[1:3] if words[1] == "-m" else words[1:2]
     check_options((sys.executable, *program), words[1 + len(program) :])
 
@@ -207,6 +211,12 @@ CHECKS = {
 
 def test_a_wrong_command_is_found():
     """The checks themselves can fail."""
-    for words in ("make no-such-target", "paramove launch no_such", "paramove topic hz --no-such", "paramove nothing"):
+    for words in (
+        "make no-such-target",
+        "paramove launch no_such",
+        "paramove topic hz --no-such",
+        "paramove nothing",
+        "python -m studies nothing",
+    ):
         with pytest.raises(AssertionError):
             CHECKS[words.split()[0]](words.split())

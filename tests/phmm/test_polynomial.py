@@ -12,13 +12,13 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
 from paramove.demonstrations import nine_pairs, redirect_demonstrations
-from paramove.evaluation.chapter4.redirect import jerk
 from paramove.hmm import TrainingOptions
 from paramove.hmm.estimation import Evaluator
 from paramove.hmm.training import LikelihoodDecreaseWarning, equal_segments
 from paramove.phmm import CubicPHMM, LinearPHMM, PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.features import Monomials
 from paramove.phmm.regression import RegressedParameters, train_regressed
+from studies.chapter4.redirect import jerk
 from tests.phmm.movements import numerical_gradient, shown, wave
 
 PROPERTY = settings(max_examples=12, deadline=None, derandomize=True)

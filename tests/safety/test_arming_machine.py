@@ -211,4 +211,4 @@ ArmingMachine.TestCase.settings = settings(deadline=None, max_examples=80, state
 
 
 class TestArming(ArmingMachine.TestCase):
-    """`paramove evaluate faults` names it."""
+    """`python -m studies faults` names it."""

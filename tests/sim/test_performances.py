@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.evaluation.chapter6.clips import TABLE, read_clips
-from paramove.evaluation.chapter6.performances import kind_named, perform, stream
 from sim import performances, performances_scene
 from sim.performances import Lens, Studio, contact_sheet, missing
 from sim.performances_scene import Room, as_calibrated, draw_cameras, rendered_px
+from sim.persons.clips import TABLE, read_clips
+from sim.persons.performances import kind_named, perform, stream
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Processes of the real demo, killed while it runs in real time at half the pace: what follows, but not how soon.
 
-`paramove evaluate kills` does all cases and measures the times.
+`python -m studies kills` does all cases and measures the times.
 """
 
 import os
@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from paramove.evaluation.faults.kill_cases import cases_of
-from paramove.evaluation.faults.kill_run import KillResult, KillRun
 from paramove.supervision.launch_file import load
+from studies.faults.kill_cases import cases_of
+from studies.faults.kill_run import KillResult, KillRun
 
 ROOT = Path(__file__).parents[2]
 FILE = load(ROOT / "launch", "rule_learning", ["sim", "real_time"]).file

@@ -12,12 +12,6 @@ from rich.progress import Progress
 from rich.table import Table
 
 from paramove.cli import completions
-from paramove.cli.evaluate_chapters import chapter2, chapter4
-from paramove.cli.evaluate_faults import faults, kills
-from paramove.cli.evaluate_imitation import imitation
-from paramove.cli.evaluate_movements import peers, real
-from paramove.cli.evaluate_real_images import real_images
-from paramove.cli.evaluate_tracking import chapter6
 from paramove.cli.evaluation_io import (
     PROGRESS,
     JsonFileOption,
@@ -28,15 +22,8 @@ from paramove.cli.evaluation_io import (
 from paramove.supervision import exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
-app.command("kills")(kills)
-app.command("faults")(faults)
-app.command("imitation")(imitation)
-app.command("real")(real)
-app.command("peers")(peers)
-app.command("chapter2")(chapter2)
-app.command("chapter4")(chapter4)
-app.command("chapter6")(chapter6)
-app.command("real-images")(real_images)
+STUDIES = ("kills", "faults", "imitation", "real", "peers", "chapter2", "chapter4", "chapter6", "real-images")
+"""Commands of release 0.1.0 that are programs of the clone now."""
 
 RUNS = Path("runs/evaluation")
 
@@ -126,6 +113,15 @@ def homography(
     write_numbers(json_file, rows, console)
     good = all(row["grid_mm"]["median"] is not None and row["grid_mm"]["median"] <= GOAL_MM for row in rows)
     raise typer.Exit(exit_codes.OK if good else exit_codes.JUDGED_A_FAILURE)
+
+
+def _moved(context: typer.Context) -> None:
+    typer.echo(f"this is now: python -m studies {context.info_name} (from the root of a clone)", err=True)
+    raise typer.Exit(2)
+
+
+for _name in STUDIES:
+    app.command(_name, hidden=True, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(_moved)
 
 
 def _homography_table(rows: list[dict[str, Any]]) -> Table:

@@ -1,0 +1,1 @@
+"""Persons of the simulator: their bodies, their performances, and clips of them."""

@@ -1,0 +1,99 @@
+"""Movements to rasters of targets on the table, as the thesis recorded them (4.2.1), by the synthetic demonstrator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, redirect_demonstrations, table_targets
+from paramove.demonstrations.synthetic import Action
+from paramove.hmm import LeftRightHMM, resample
+from studies.movements.tasks import raster_tasks
+
+Floats = NDArray[np.float64]
+
+ACTIONS: tuple[Action, ...] = ("pointing", "reaching")
+COLUMNS, ROWS, REPETITIONS = 7, 5, 4
+FRAMES = 100
+REFERENCE_STATES, REFERENCE_FRAMES, COMPARED_SAMPLES = 80, 200, 200
+REDIRECT_S = 4.2
+OTHER_MOVEMENTS = 35
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Movements (T_k, 21), m, at 60 Hz, and their places (u, v) in [0, 1], shape (K, 2)."""
+
+    sequences: tuple[Floats, ...]
+    places: Floats
+
+    def at_corners(self) -> Shown:
+        """Those to the four corners of the region."""
+        return self._chosen(np.flatnonzero(np.isin(self.places, (0.0, 1.0)).all(axis=1)))
+
+    def repeated(self, repetitions: int) -> Shown:
+        """The first so many movements to each place."""
+        seen: dict[tuple[float, ...], int] = {}
+        kept = []
+        for number, place in enumerate(map(tuple, self.places.tolist())):
+            seen[place] = seen.get(place, 0) + 1
+            if seen[place] <= repetitions:
+                kept.append(number)
+        return self._chosen(np.array(kept))
+
+    def _chosen(self, numbers: NDArray[np.int64]) -> Shown:
+        return Shown(tuple(self.sequences[number] for number in numbers.tolist()), self.places[numbers])
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Training on 3 x 3 places, 10 times each, and tests on 7 x 5 places, 4 times each, of every action."""
+
+    train: Mapping[str, Shown]
+    test: Mapping[str, Shown]
+
+
+@lru_cache(maxsize=2)
+def raster(seed: int) -> Raster:
+    """The movements of one seed: the same that `python -m studies peers` shows to every method."""
+    tasks = raster_tasks((seed,))
+    folds = {action: tasks[f"raster/{action}"][0] for action in ACTIONS}
+    train: dict[str, Shown] = {
+        action: Shown(tuple(fold.train.sequences), fold.train.theta) for action, fold in folds.items()
+    }
+    test: dict[str, Shown] = {
+        action: Shown(tuple(fold.test.sequences), fold.test.theta) for action, fold in folds.items()
+    }
+    return Raster(train, test)
+
+
+@lru_cache(maxsize=4)
+def references(seed: int, action: str) -> Floats:
+    """The average of the test movements to each of the 35 places, from an 80-state HMM (4.2.4). (35, 200, 21), m."""
+    shown = raster(seed).test[action]
+    averages = []
+    for first in range(0, len(shown.sequences), REPETITIONS):
+        frames = [resample(one, REFERENCE_FRAMES) for one in shown.sequences[first : first + REPETITIONS]]
+        model = LeftRightHMM(REFERENCE_STATES, 2, 3).fit(frames)
+        averages.append(model.synthesize(COMPARED_SAMPLES))
+    return np.stack(averages)
+
+
+def denser_training(seed: int, columns: int, rows: int, repetitions: int, action: Action) -> Shown:
+    """Training movements to a raster of another size."""
+    targets, places = table_targets(columns, rows)
+    rng = np.random.default_rng([seed, 2, columns, ACTIONS.index(action)])
+    shown = demonstrations_at(targets, rng, action=action, repetitions=repetitions)
+    return Shown(tuple(shown.sequences), np.repeat(places, repetitions, axis=0))
+
+
+def redirects(seed: int, count: int = OTHER_MOVEMENTS) -> list[Floats]:
+    """Movements of another kind: to one place, over to another, and back (4.3), both drawn over the region."""
+    rng = np.random.default_rng([seed, 3])
+    pairs = rng.uniform(0.0, 1.0, (count, 4))
+    samples = round(REDIRECT_S * SAMPLE_RATE_HZ)
+    return redirect_demonstrations(pairs, rng, n_samples=samples).sequences

@@ -1,0 +1,40 @@
+"""Out-and-back movements that a person did not finish, made of finished ones.
+
+Half-way is half of the fingertip's way out, not half of the time, which such a movement spends at its target.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations import POINT_NAMES
+from studies.movements.disturbed import SENSOR_NOISE_M
+
+Floats = NDArray[np.float64]
+
+TIP = POINT_NAMES.index("index")
+
+
+def half_way(x: Floats) -> int:
+    """Frame in which the fingertip has gone half of its way to its farthest place from the start."""
+    tip = x.reshape(len(x), -1, 3)[:, TIP]
+    farthest = int(np.linalg.norm(tip - tip[0], axis=1).argmax())
+    way = np.cumsum(np.linalg.norm(np.diff(tip[: farthest + 1], axis=0), axis=1))
+    return 1 + int(np.searchsorted(way, 0.5 * way[-1])) if len(way) else 0
+
+
+def aborted(x: Floats, rng: np.random.Generator) -> Floats:
+    """Cut half-way, taken back along the same way, then at rest until the normal length. (T, 21) -> (T, 21), m."""
+    out = x[: half_way(x) + 1]
+    return _held(np.concatenate([out, out[-2::-1]])[: len(x)], len(x), rng)
+
+
+def stopped(x: Floats, rng: np.random.Generator) -> Floats:
+    """Cut half-way and held there until the normal length. (T, 21) -> (T, 21), m."""
+    return _held(x[: half_way(x) + 1], len(x), rng)
+
+
+def _held(x: Floats, n_frames: int, rng: np.random.Generator) -> Floats:
+    rest = np.repeat(x[-1:], n_frames - len(x), axis=0)
+    return np.concatenate([x, rest + SENSOR_NOISE_M * rng.standard_normal(rest.shape)])

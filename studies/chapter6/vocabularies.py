@@ -1,0 +1,125 @@
+"""What a tracker of chapter 6 knows: actions, grammar, and where theta leads, for each kind of clip (thesis 6.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.action_space.grammar import Grammar
+from paramove.action_space.grammar_file import parsed_grammar
+from paramove.action_space.placement import PersonPlacement
+from paramove.action_space.training import cached_action
+from paramove.action_space.vocabulary import ActionModel, Vocabulary, table_target
+from sim.persons.actions import EYE, FAR_ORIGIN, SHOWN, far_place
+from sim.persons.performances import recording_of
+from sim.persons.recorded import direction_place, recorded_demonstrations
+
+Floats = NDArray[np.float64]
+
+COMPLEX_POINTING = """
+begin: point(a)
+after:
+  point(a):
+    - redirect(a, b)
+    - withdraw(a)
+  redirect(a, b): withdraw(b)
+  withdraw(b): point(a)
+switching: {share: 0.1, before: 0.8}
+"""
+"""Simple and dual pointing, figure 6.26. What follows a place may be taken for the other until late: where the second
+place is not known, few hypotheses of going on to it are near the right one, and at first going back fits better."""
+
+ACTIONS: dict[str, tuple[str, ...]] = {
+    "pointing_50fps": ("pointing",),
+    "pointing": ("pointing",),
+    "pointing_far": ("pointing_far",),
+    "pouring": ("pouring",),
+    "box": ("table_to_box", "box_to_table"),
+    "complex": ("point", "redirect", "withdraw"),
+    "recorded": ("recorded_pointing",),
+}
+"""Of each kind of clip."""
+BY_OTHERS = "recorded_by_others"
+"""Clips of kind "recorded" again, with a model of the two other persons."""
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a tracker is given.
+
+    Attributes:
+        vocabulary, grammar: of the actions.
+        pointed: from the place where the tracker's theta leads (3,) and the person's placement to the place that is
+            meant in the world, (3,), m.
+    """
+
+    vocabulary: Vocabulary
+    grammar: Grammar
+    pointed: Callable[[Floats, PersonPlacement], Floats]
+
+
+def knowledge_of(kind: str, number: int, folder: Path | None = None) -> Knowledge:
+    """What is known when a clip is tracked.
+
+    Of a recorded person: what this person showed in all other directions (kind "recorded"), or what the other persons
+    showed in all directions (`BY_OTHERS`).
+
+    Args:
+        kind, number: of the clip. folder: of the recordings; only for recorded persons.
+
+    Raises RecordingsError for recorded persons where the recordings are absent.
+    """
+    if kind not in ("recorded", BY_OTHERS):
+        return _knowledge(kind)
+    played = recording_of(number, folder)
+    return _of_recorded(played.subject, None if kind == BY_OTHERS else played.target_id, folder)
+
+
+@cache
+def _of_recorded(subject: int, target: int | None, folder: Path | None) -> Knowledge:
+    vocabulary = Vocabulary([_recorded_action(subject, target, folder)])
+    return Knowledge(vocabulary, Grammar.choice(list(vocabulary.names)), as_it_is)
+
+
+@cache
+def _knowledge(kind: str) -> Knowledge:
+    names = ACTIONS[kind]
+    vocabulary = Vocabulary([_action(name) for name in names])
+    grammar = parsed_grammar(COMPLEX_POINTING) if kind == "complex" else Grammar.choice(list(names))
+    return Knowledge(vocabulary, grammar, on_far_plane if kind == "pointing_far" else as_it_is)
+
+
+def as_it_is(place: Floats, placement: PersonPlacement) -> Floats:
+    """A place within reach is the place that is meant."""
+    return place
+
+
+def on_far_plane(place: Floats, placement: PersonPlacement) -> Floats:
+    """Where the line from the person's eye through a far place meets the plane, which stands in the world. (3,), m.
+
+    The models' plane grows with the person; the plane that is pointed at does not.
+    """
+    eye = placement.in_world(EYE)
+    line = place - eye
+    return np.asarray(eye + (FAR_ORIGIN[0] - eye[0]) / line[0] * line)
+
+
+def _action(name: str) -> ActionModel:
+    target = far_place if name == "pointing_far" else table_target
+    return cached_action(name, "chapter 6, training movements", SHOWN[name], target=target)
+
+
+def _recorded_action(subject: int, target: int | None, folder: Path | None) -> ActionModel:
+    """Of the person without the movements to a target, or, without one, of all other persons."""
+    if target is None:
+        told, show = f"without person {subject}", partial(recorded_demonstrations, subject, folder)
+    else:
+        told = f"person {subject} without target {target}"
+        show = partial(recorded_demonstrations, None, folder, of_subject=subject, without_target=target)
+    source = f"pointing27 {told}, {folder or 'usual folder'}"
+    return cached_action("recorded_pointing", source, show, target=direction_place)

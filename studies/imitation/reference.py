@@ -1,0 +1,94 @@
+"""Local models for single targets, the references of thesis 5.2.7, and the movements made of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations.arm import POINT_NAMES
+from paramove.demonstrations.reaching import demonstrations_at, reaching_grid_demonstrations
+from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
+from paramove.hmm.sequences import resample
+from paramove.imitation.arm_pose import ArmPoseSolver
+from paramove.imitation.conversion import RobotMovement
+from paramove.imitation.motion import RelocationOptions
+from paramove.imitation.reaching_movement import ArmPoses
+from paramove.phmm import InterpolativePHMM
+from paramove.phmm.synchronisation import synchronised
+from studies.imitation.errors import Movement, RobotArm
+
+FloatArray = NDArray[np.float64]
+ReferenceKind = Literal["own", "global"]
+
+
+@dataclass(frozen=True)
+class References:
+    """Trains local models for targets that the interpolative model has not seen.
+
+    Attributes:
+        model: The interpolative model: numbers of states and frames, scale and shoulder come from it.
+        seed: Demonstrations of the references are drawn with it, others than those of the training.
+        repetitions: Demonstrations per target.
+        everything: The global model of the training (3.4.1); None if no reference is aligned by it.
+    """
+
+    model: InterpolativePHMM
+    seed: int
+    repetitions: int
+    everything: Parameters | None
+
+    @classmethod
+    def of(cls, model: InterpolativePHMM, seed: int, repetitions: int, training_repetitions: int = 10) -> References:
+        """With the global model, trained again on the demonstrations that trained `model`."""
+        shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=training_repetitions)
+        references = cls(model, seed, repetitions, None)
+        frames = [references._resampled(sequence) for sequence in shown.sequences]
+        return cls(model, seed, repetitions, references._empty().fit(frames).parameters)
+
+    def means(self, target: FloatArray, number: int, kind: ReferenceKind) -> FloatArray:
+        """State means [N, 21], m, of a local model for one target [3], m, frame of the demonstrations.
+
+        "own": an HMM with the same time restrictions, trained on this target alone, as in 4.2.4. "global": set up as
+        the local models of the interpolative model are, its states aligned by the global model (3.4.1), (3.7).
+        """
+        rng = np.random.default_rng([self.seed, 1, number])
+        shown = demonstrations_at(target, rng, repetitions=self.repetitions)
+        frames = [self._resampled(sequence) for sequence in shown.sequences]
+        if kind == "own":
+            return self._empty().fit(frames).parameters.means
+        if self.everything is None:
+            raise ValueError("references of the kind 'global' need the global model: make them with References.of")
+        return synchronised(self.everything, [frames], self._options(), 1)[0].means
+
+    def _options(self) -> TrainingOptions:
+        return self.model.options or TrainingOptions()
+
+    def _empty(self) -> LeftRightHMM:
+        model = self.model
+        return LeftRightHMM(model.n_states, model.d_min, model.d_max, options=self._options())
+
+    def _resampled(self, sequence: FloatArray) -> FloatArray:
+        frames = self.model.resampled_frames
+        return sequence if frames is None else resample(sequence, frames)
+
+
+def reference_movement(movement: RobotMovement, solver: ArmPoseSolver, means: FloatArray) -> Movement:
+    """A local model's means converted like the interpolative model's (5.7), on the robot."""
+    return on_robot(movement.converted(means, POINT_NAMES), solver)
+
+
+def on_robot(poses: ArmPoses, solver: ArmPoseSolver, options: RelocationOptions | None = None) -> Movement:
+    """What the robot's arm makes of arm poses: by the closed form alone, and within its joint limits."""
+    keep_out = options or RelocationOptions()
+    plain = solver.without_limits(poses.elbow, poses.gripper, poses.finger_to_thumb)
+    gripper = solver.moved_outward(poses.gripper, keep_out.reach_margin, keep_out.reach_width)
+    kept = solver.solve(poses.elbow, gripper, poses.finger_to_thumb)
+    return Movement(
+        poses,
+        RobotArm(plain.elbow, poses.gripper, plain.elbow_turn),
+        RobotArm(kept.elbow, gripper, kept.elbow_turn),
+        solver.outside_limits(plain.angles),
+    )

@@ -1,0 +1,198 @@
+"""`python -m studies real` and `peers`: movement models on recorded people, and beside other methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from platformdirs import user_cache_path
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, workspace_here, write_numbers
+from paramove.supervision import exit_codes
+
+if TYPE_CHECKING:
+    from studies.movements.sweep import Row
+    from studies.movements.tasks import Fold
+
+FOLDER = Path("runs/evaluation")
+TABLE_COLUMNS = (
+    *("dtw", "end", "theta", "theta_p95", "covered", "auroc_aborted", "auroc_stopped"),
+    *("correct", "correct_25", "correct_50", "correct_75", "correct_100"),
+)
+
+
+class Scope(StrEnum):
+    """On what the peers are compared."""
+
+    RASTER = "raster"
+    REAL = "real"
+    ALL = "all"
+
+
+DataOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="recordings (default: $PARAMOVE_DATA, or shared/data beside the clone)"),
+]
+OutOption = Annotated[Path | None, typer.Option(metavar="FOLDER", help="where report.html and movements.json go")]
+JobsOption = Annotated[int, typer.Option(min=1, help="processes at the same time")]
+SchedulerOption = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="compute on the cluster of this Dask scheduler: tcp://host:8786")
+]
+MethodsOption = Annotated[
+    list[str] | None, typer.Option("--method", metavar="TEXT", help="only methods whose name has this; may be repeated")
+]
+TasksOption = Annotated[
+    list[str] | None, typer.Option("--task", metavar="TEXT", help="only tasks whose name has this; may be repeated")
+]
+
+
+def real(
+    data: DataOption = None,
+    out: OutOption = None,
+    json_file: JsonFileOption = None,
+    jobs: JobsOption = 1,
+    scheduler: SchedulerOption = None,
+    methods: MethodsOption = None,
+    tasks: TasksOption = None,
+) -> None:
+    """Measure this project's movement models on recorded people: pointing, and movements at a table.
+
+    Whole directions and persons are left out. Ctrl-C and the same command again: goes on where it was. Exit codes: 0
+    measured; 66 no recordings or no cluster; 130 interrupted.
+    """
+    from studies.movements.ours import our_rows
+
+    rows = _chosen(our_rows(), methods)
+    folds = _tasks(Scope.REAL, data, tasks)
+    _compare("Movement models on recorded people", rows, folds, out, "real", json_file, jobs, scheduler, ())
+
+
+def peers(
+    on: Annotated[Scope, typer.Option(help="synthetic demonstrator, recorded people, or both")] = Scope.ALL,
+    data: DataOption = None,
+    out: OutOption = None,
+    json_file: JsonFileOption = None,
+    jobs: JobsOption = 1,
+    scheduler: SchedulerOption = None,
+    methods: MethodsOption = None,
+    tasks: TasksOption = None,
+) -> None:
+    """Measure this project's movement models beside other methods, by the same folds and resampling.
+
+    Needs `pip install 'paramove[peers]'`; methods whose library is missing are named and left out. Ctrl-C and the same
+    command again: goes on where it was. Exit codes: 0 measured; 66 no recordings, cluster or peer; 130 interrupted.
+    """
+    from studies.movements.ours import our_rows
+    from studies.movements.sweep import missing_libraries
+    from studies.peers.catalogue import peer_rows
+
+    theirs = peer_rows()
+    absent = {row.name: missing_libraries(row) for row in theirs}
+    without = sorted({library for names in absent.values() for library in names})
+    left_out = [name for name, names in absent.items() if names]
+    notes = [f"not installed: {', '.join(without)}; left out: {', '.join(left_out)}"] if left_out else []
+    for note in notes:
+        _say_error(f"{note}. pip install 'paramove[peers]' brings them")
+    if len(left_out) == len(theirs):
+        _say_error("no peer is installed: pip install 'paramove[peers]' brings them")
+        raise typer.Exit(exit_codes.INPUT_MISSING)
+    rows = _chosen([*our_rows(), *(row for row in theirs if not absent[row.name])], methods)
+    folds = _tasks(on, data, tasks)
+    _compare("Movement models beside other methods", rows, folds, out, "peers", json_file, jobs, scheduler, notes)
+
+
+def _chosen(rows: Sequence[Row], methods: list[str] | None) -> list[Row]:
+    chosen = [row for row in rows if not methods or any(text in row.name for text in methods)]
+    if not chosen:
+        raise typer.BadParameter(f"methods are {', '.join(row.name for row in rows)}", param_hint="--method")
+    return chosen
+
+
+def _tasks(on: Scope, data: Path | None, wanted: list[str] | None) -> dict[str, list[Fold]]:
+    from paramove.demonstrations.recorded_people import RecordingsError
+    from studies.movements.tasks import raster_tasks, real_tasks
+
+    folds: dict[str, list[Fold]] = {}
+    try:
+        if on is not Scope.RASTER:
+            folds |= real_tasks(data)
+        if on is not Scope.REAL:
+            folds |= raster_tasks()
+    except RecordingsError as error:
+        _say_error(str(error))
+        raise typer.Exit(exit_codes.INPUT_MISSING) from error
+    if not folds:
+        _say_error("nothing can be left out of these recordings: they are of one person, or of one target")
+        raise typer.Exit(exit_codes.INPUT_MISSING)
+    chosen = {name: found for name, found in folds.items() if not wanted or any(text in name for text in wanted)}
+    if not chosen:
+        raise typer.BadParameter(f"tasks are {', '.join(folds)}", param_hint="--task")
+    return chosen
+
+
+def _compare(
+    title: str,
+    rows: list[Row],
+    folds: Mapping[str, list[Fold]],
+    out: Path | None,
+    name: str,
+    json_file: Path | None,
+    jobs: int,
+    scheduler: str | None,
+    notes: Sequence[str],
+) -> None:
+    from studies.movements.report import plain, write_report
+    from studies.movements.summary import summarised
+    from studies.movements.sweep import ClusterMissingError, jobs_of, run_jobs
+
+    console = Console(highlight=False, emoji=False)
+    folder = (out or workspace_here() / FOLDER / name).resolve()
+    cache = user_cache_path("paramove") / "movements"
+    with Progress(*PROGRESS, console=console) as progress:
+        shown = progress.add_task("folds", total=None)
+
+        def finished(done: int, total: int, last: str) -> None:
+            progress.update(shown, completed=done, total=total, description=last[:60] or "folds")
+
+        try:
+            results = run_jobs(jobs_of(rows, folds), cache, workers=jobs, scheduler=scheduler, finished=finished)
+        except ClusterMissingError as error:
+            _say_error(str(error))
+            raise typer.Exit(exit_codes.INPUT_MISSING) from error
+        except KeyboardInterrupt:
+            console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
+            raise typer.Exit(130) from None
+    summary = summarised(results)
+    wide = Console(highlight=False, emoji=False, width=max(console.width, 150))
+    for task, found in summary.items():
+        wide.print(_table(task, found))
+    page = write_report(summary, folder, title=title, ours=frozenset(row.name for row in rows if row.ours), notes=notes)
+    console.print(f"report: {page}", markup=False, soft_wrap=True)
+    write_numbers(json_file, plain(summary), console)
+
+
+def _table(task: str, rows: dict[str, dict[str, Any]]) -> Table:
+    from studies.movements.report import formatted, heading, leading, shown_quantities
+
+    table = Table(title=task, show_edge=False, pad_edge=False, title_justify="left")
+    table.add_column("method", no_wrap=True)
+    shown = [quantity for quantity in shown_quantities(rows) if quantity.name in TABLE_COLUMNS]
+    for quantity in shown:
+        table.add_column(heading(quantity, task), justify="right")
+    table.add_column("learn, s", justify="right")
+    best = {quantity.name: leading(rows, quantity) for quantity in shown}
+    for name, row in rows.items():
+        cells = [formatted(quantity, row["measures"].get(quantity.name)) for quantity in shown]
+        marked = [f"[bold]{cell}[/]" if name in best[q.name] else cell for cell, q in zip(cells, shown, strict=True)]
+        table.add_row(name, *marked, f"{row['seconds']['fit']:.2f}")
+    return table
+
+
+def _say_error(text: str) -> None:
+    Console(stderr=True, highlight=False, markup=False).print(text, soft_wrap=True)

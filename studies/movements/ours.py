@@ -1,0 +1,84 @@
+"""This project's movement models as methods of the comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.hmm import TrainingOptions
+from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
+from studies.movements.method import (
+    BEGINNINGS,
+    CLASSES,
+    FRAMES,
+    SYNTHESIS,
+    THETA,
+    TYPICALITY,
+    Estimate,
+    Examples,
+    Method,
+    NotAble,
+)
+from studies.movements.sweep import Row
+
+Floats = NDArray[np.float64]
+FLOOR_M = 1e-4
+"""Recordings may hold a point that never moves: nothing is known better than to a tenth of a millimetre."""
+
+
+class Models(NotAble):
+    """A parametric HMM per action; with several actions they compete."""
+
+    can = frozenset({SYNTHESIS, THETA, TYPICALITY, CLASSES})
+
+    def __init__(self, make: Callable[[], ParametricHMM]) -> None:
+        self.make = make
+        model = make()
+        if isinstance(model, PolynomialPHMM) and model.residuals == "correlated":
+            self.can = Models.can | {BEGINNINGS}
+
+    def fit(self, examples: Examples) -> None:
+        """Learn from movements of one or several actions; nothing is chosen by parts of a person's movements."""
+        labels = np.array(examples.labels)
+        self.classifier = MovementClassifier(self.make())
+        self.classifier.fit(examples.sequences, examples.theta, list(labels), examples.groups)
+        self.model = self.classifier.models_[self.classifier.classes_[0]]
+
+    def synthesize(self, theta: Floats, n: int) -> Floats:
+        """The prototype."""
+        return self.model.synthesize(theta, n)
+
+    def estimate(self, x: Floats) -> Estimate:
+        """The likeliest theta and its covariance."""
+        found = self.model.estimate(x)
+        return Estimate(found.theta, found.covariance)
+
+    def classify(self, x: Floats, finished: bool) -> str:
+        """The most probable action."""
+        return self.classifier.classify(x, finished=finished).action
+
+    def score(self, x: Floats) -> float:
+        """How little strange the movement is; of models that do not know, the log-likelihood at the likeliest theta."""
+        if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
+            return -self.model.examine(x).strangeness
+        return self.model.estimate(x).log_likelihood
+
+
+def our_rows() -> list[Row]:
+    """All rows of this project."""
+    common: dict[str, Any] = {"resampled_frames": FRAMES, "options": TrainingOptions(floor_deviation=FLOOR_M)}
+    kinds: dict[str, Callable[[], ParametricHMM]] = {
+        "paramove, quadratic PHMM": partial(QuadraticPHMM, **common),
+        "paramove, linear PHMM": partial(LinearPHMM, **common),
+        "paramove, cubic PHMM": partial(CubicPHMM, **common),
+        "paramove, quadratic PHMM as in the thesis": partial(QuadraticPHMM, residuals="independent", **common),
+    }
+    return [Row(name, _maker(make), repr(make), ours=True) for name, make in kinds.items()]
+
+
+def _maker(make: Callable[[], ParametricHMM]) -> Callable[[int], Method]:
+    return lambda seed: Models(make)

@@ -1,0 +1,165 @@
+"""The report of a comparison: one HTML file that needs no other, and the numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from paramove.evaluation.report import STYLE
+from studies.movements import plots
+from studies.movements.summary import QUANTITIES, SECONDS, Measured, Quantity
+from studies.movements.tasks import FIRST_MS
+
+THETA_UNITS = {"pointing": "°", "table": "cm", "raster": "cm"}
+TEXTS = {
+    "pointing/direction": "Pointing, one target left out: per person, all directions but one are learned.",
+    "pointing/corners": "Pointing, learned from the corners: per person, the four corner directions of all depths are "
+    "learned, all other targets are asked.",
+    "table/actions": "Kinds of movement at the table, one person left out; finished movements.",
+    "table/beginnings": "Kinds of movement at the table while they go on, one person left out. All are cut at their "
+    "beginning by one absolute rule for speeds, and nobody is told how long a movement will be.",
+    **{
+        f"table/first {milliseconds} ms": f"Kinds of movement at the table after the first {milliseconds} ms, one "
+        "person left out. Learned from as much of the others' movements."
+        for milliseconds in FIRST_MS
+    },
+    "raster/actions": "Kinds of movement of the synthetic demonstrator; finished movements.",
+    "raster/beginnings": "Kinds of movement of the synthetic demonstrator while they go on.",
+}
+SECOND_HEADINGS = {
+    "fit": "learn, s",
+    "synthesize": "synthesise, ms",
+    "estimate": "θ, ms",
+    "classify": "action, ms",
+    "classify_beginning": "beginning, ms",
+}
+NOTE = (
+    "In brackets the interval that holds 95 % of the values when whole folds are drawn again. Bold: the best of the "
+    "column and all that its interval does not exclude. A dash: the method cannot do it. The tuned rows choose their "
+    "hyper-parameters inside the training folds."
+)
+
+
+def plain(summary: dict[str, dict[str, dict[str, Any]]]) -> dict[str, Any]:
+    """The summary as plain numbers, for JSON."""
+    return {
+        task: {
+            row: {
+                "measures": {name: found._asdict() for name, found in values["measures"].items()},
+                "seconds": values["seconds"],
+                "folds": values["folds"],
+            }
+            for row, values in rows.items()
+        }
+        for task, rows in summary.items()
+    }
+
+
+def write_report(
+    summary: dict[str, dict[str, dict[str, Any]]],
+    folder: Path,
+    *,
+    title: str,
+    ours: frozenset[str],
+    notes: Sequence[str] = (),
+) -> Path:
+    """Write `report.html` and `movements.json` into the folder. Returns the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(plain(summary), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    (folder / "movements.json").write_text(text, encoding="utf-8")
+    parts = [
+        f"<!doctype html><html lang=en><meta charset=utf-8><title>{escape(title)}</title>",
+        "<meta name=viewport content='width=device-width,initial-scale=1'>",
+        f"<style>{STYLE}main{{max-width:1500px}}</style>",
+        f"<header><div><h1>{escape(title)}</h1><p>{escape(NOTE)}</p></div></header><main>",
+        *(f"<section class=why>{escape(note)}</section>" for note in notes),
+        *(_section(task, rows, ours) for task, rows in summary.items()),
+        "</main></html>",
+    ]
+    page = folder / "report.html"
+    page.write_text("\n".join(parts), encoding="utf-8")
+    return page
+
+
+def _section(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -> str:
+    words = TEXTS.get(task, f"{task}: synthesis, parameters and rejection.")
+    folds = max(row["folds"] for row in rows.values())
+    if task.endswith("/beginnings"):
+        picture = plots.beginnings(rows, ours)
+    else:
+        names = ("dtw", "end", "theta", "covered", "auroc_aborted", "auroc_stopped", "auroc_others", "correct")
+        picture = plots.intervals(rows, [q for q in QUANTITIES if q.name in names], ours)
+    return (
+        f"<section><h2>{escape(task)}</h2><p class=why>{escape(words)} {folds} folds.</p>{picture}"
+        f"<div class=scroll>{_table(task, rows, ours)}</div></section>"
+    )
+
+
+def _table(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -> str:
+    shown = shown_quantities(rows)
+    asked = [name for name in SECONDS if any(name in row["seconds"] for row in rows.values())]
+    heads = "".join(f"<th class=n>{escape(heading(q, task))}</th>" for q in shown)
+    heads += "".join(f"<th class=n>{SECOND_HEADINGS[name]}</th>" for name in asked)
+    lines = []
+    for name, row in rows.items():
+        cells = "".join(f"<td class=n>{_cell(rows, name, q)}</td>" for q in shown)
+        cells += "".join(f"<td class=n>{_seconds(row, second)}</td>" for second in asked)
+        label = f"<b>{escape(name)}</b>" if name in ours else escape(name)
+        lines.append(f"<tr><td style='white-space:nowrap'>{label}</td>{cells}</tr>")
+    return f"<table><tr><th>method</th>{heads}</tr>{''.join(lines)}</table>"
+
+
+def shown_quantities(rows: dict[str, dict[str, Any]]) -> list[Quantity]:
+    """The quantities that any of the rows has."""
+    return [q for q in QUANTITIES if any(q.name in row["measures"] for row in rows.values())]
+
+
+def heading(quantity: Quantity, task: str) -> str:
+    """Heading of a column with its unit."""
+    unit = THETA_UNITS.get(task.split("/")[0], "") if quantity.unit == "θ" else quantity.unit
+    return f"{quantity.heading}, {unit}" if unit else quantity.heading
+
+
+def formatted(quantity: Quantity, found: Measured | None) -> str:
+    """A value as text: two digits for lengths and angles, one for per cent, three for AUROC."""
+    if found is None:
+        return "–"
+    digits = 3 if not quantity.unit else 1 if quantity.unit == "%" else 2
+    return f"{found.value:.{digits}f}"
+
+
+def leading(rows: dict[str, dict[str, Any]], quantity: Quantity) -> set[str]:
+    """The best row and those whose value lies within its interval; for coverage those whose interval holds 95 %."""
+    found: dict[str, Measured] = {
+        name: row["measures"][quantity.name] for name, row in rows.items() if quantity.name in row["measures"]
+    }
+    if not found:
+        return set()
+    if quantity.name == "covered":
+        return {name for name, one in found.items() if one.low <= 95.0 <= one.high}
+    if quantity.more_is_better:
+        best = max(found.values(), key=lambda one: one.value)
+        return {name for name, one in found.items() if one.value >= best.low}
+    best = min(found.values(), key=lambda one: one.value)
+    return {name for name, one in found.items() if one.value <= best.high}
+
+
+def _cell(rows: dict[str, dict[str, Any]], name: str, quantity: Quantity) -> str:
+    found: Measured | None = rows[name]["measures"].get(quantity.name)
+    text = formatted(quantity, found)
+    if found is None:
+        return text
+    digits = len(text.partition(".")[2])
+    interval = f"<br><span class=soft>[{found.low:.{digits}f}, {found.high:.{digits}f}]</span>"
+    value = f"<b>{text}</b>" if name in leading(rows, quantity) else text
+    return f"{value}{interval}"
+
+
+def _seconds(row: dict[str, Any], name: str) -> str:
+    value = row["seconds"].get(name)
+    if value is None:
+        return "–"
+    return f"{value:.2f}" if name == "fit" else f"{1000.0 * value:.1f}"

@@ -1,0 +1,237 @@
+"""The tasks: what is trained, what is tested, and along which folds.
+
+A fold leaves out a whole direction, person or raster, never single repetitions at random:
+
+- `pointing/direction`: per person, one of the targets is left out.
+- `pointing/corners`: per person, trained on the targets in the corners of the raster, those of all depths together,
+  tested on all others.
+- `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
+- `table/actions`: the kinds of movement, one person left out; whole movements.
+- `table/beginnings`: the same while they go on, all cut at their beginning by one absolute rule.
+- `table/first 100 ms` and more: the same, everybody sees that much from the beginning.
+- `raster/<action>`, `raster/actions`, `raster/beginnings`: the synthetic demonstrator; 3 x 3 targets 10 times against
+  7 x 5 targets 4 times; a fold is a seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, table_targets
+from paramove.demonstrations.recorded_people import (
+    RATE_HZ,
+    RecordedMovement,
+    Recordings,
+    RecordingsError,
+    data_folder,
+    load_recordings,
+)
+from studies.movements.measures import ThetaKind
+from studies.movements.method import Examples
+from studies.movements.per_action import first_frames
+
+Floats = NDArray[np.float64]
+RASTER_ACTIONS = ("reaching", "pointing")
+FIRST_MS = (100, 200, 400)
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Training and test of one fold.
+
+    Attributes:
+        task, name: which; folds of one task have different names.
+        train, test: movements.
+        others: movements of other kinds by whom or what was left out, for rejection.
+        kind: what theta is.
+        tip: which body point is the fingertip.
+        beginnings: the kind is asked while the movement goes on.
+    """
+
+    task: str
+    name: str
+    train: Examples
+    test: Examples
+    others: list[Floats]
+    kind: ThetaKind
+    tip: int
+    beginnings: bool = False
+
+    @property
+    def several_actions(self) -> bool:
+        """Whether classification is the task."""
+        return len(self.train.actions) > 1
+
+
+def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
+    """All tasks on recorded people, by name; those of a data set that the folder does not have are left out.
+
+    Raises RecordingsError where there is no folder, no data set, or a damaged one.
+    """
+    root = data_folder(folder)
+    found = [name for name in ("pointing27", "table_reach") if (root / name / "data.npz").is_file()]
+    if not found:
+        raise RecordingsError(f"{root} has neither pointing27/data.npz nor table_reach/data.npz")
+    tasks: dict[str, list[Fold]] = {}
+    if "pointing27" in found:
+        pointing = load_recordings("pointing27", root)
+        tasks |= {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
+    if "table_reach" in found:
+        tasks |= _table_tasks(load_recordings("table_reach", root))
+    return {name: folds for name, folds in tasks.items() if folds}
+
+
+def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
+    with_target = [action for action in table.actions if np.isfinite(_targets(table.of(action=action))).all()]
+    tasks = {f"table/{action}": _persons(table, action) for action in with_target}
+    if len(table.actions) > 1:
+        tasks["table/actions"] = _kinds(table, "table/actions", _WHOLE)
+        tasks["table/beginnings"] = _kinds(table, "table/beginnings", _FROM_ONSET, beginnings=True)
+        for milliseconds in FIRST_MS:
+            name = f"table/first {milliseconds} ms"
+            tasks[name] = _kinds(table, name, _first(milliseconds))
+    return tasks
+
+
+def raster_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
+    """All tasks on the synthetic demonstrator, by name."""
+    tasks: dict[str, list[Fold]] = {f"raster/{action}": [] for action in (*RASTER_ACTIONS, "actions", "beginnings")}
+    for seed in seeds:
+        train = {action: _raster(action, 3, 3, 10, [seed, 0]) for action in RASTER_ACTIONS}
+        test = {action: _raster(action, 7, 5, 4, [seed, 1]) for action in RASTER_ACTIONS}
+        for action, other in zip(RASTER_ACTIONS, RASTER_ACTIONS[::-1], strict=True):
+            others = test[other].sequences
+            tasks[f"raster/{action}"].append(
+                Fold(f"raster/{action}", str(seed), train[action], test[action], others, "raster", 5)
+            )
+        both, asked = _joined(train.values()), _joined(test.values())
+        tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, asked, [], "raster", 5))
+        tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, asked, [], "raster", 5, True))
+    return tasks
+
+
+def _directions(pointing: Recordings) -> list[Fold]:
+    folds = []
+    for subject in pointing.subjects:
+        own = pointing.of(subject=subject)
+        for target in sorted({one.target_id for one in own}):
+            train = [one for one in own if one.target_id != target]
+            test = [one for one in own if one.target_id == target]
+            if train:
+                folds.append(_pointing_fold("pointing/direction", f"{subject}/{target}", pointing, train, test))
+    return folds
+
+
+def _corners(pointing: Recordings) -> list[Fold]:
+    folds = []
+    for subject in pointing.subjects:
+        own = pointing.of(subject=subject)
+        corners = corner_targets({one.target_id: one.target for one in own})
+        train = [one for one in own if one.target_id in corners]
+        test = [one for one in own if one.target_id not in corners]
+        if train and test:
+            folds.append(_pointing_fold("pointing/corners", str(subject), pointing, train, test))
+    return folds
+
+
+def corner_targets(places: dict[int, Floats]) -> set[int]:
+    """Targets at the outermost left or right and, at the same time, the lowest or highest; of every depth."""
+    numbers = list(places)
+    positions = np.array([places[number] for number in numbers])
+    outermost = np.ones(len(numbers), dtype=bool)
+    for axis in (1, 2):
+        values = positions[:, axis]
+        tolerance = 0.1 * np.ptp(values)
+        outermost &= (values < values.min() + tolerance) | (values > values.max() - tolerance)
+    return {number for number, corner in zip(numbers, outermost, strict=True) if corner}
+
+
+def _pointing_fold(
+    task: str, name: str, recordings: Recordings, train: list[RecordedMovement], test: list[RecordedMovement]
+) -> Fold:
+    def examples(movements: list[RecordedMovement]) -> Examples:
+        return Examples(
+            [one.movement for one in movements],
+            np.array([one.direction for one in movements]),
+            [one.action for one in movements],
+            np.array([one.target_id for one in movements]),
+            RATE_HZ,
+        )
+
+    tip = recordings.fingertip
+    return Fold(task, name, examples(train), examples(test), [], "direction", tip)
+
+
+def _persons(table: Recordings, action: str) -> list[Fold]:
+    folds = []
+    own = table.of(action=action)
+    for subject in table.subjects:
+        others = [one.to_grasp for one in table.of(subject=subject) if one.action != action]
+        train = _table_examples([one for one in own if one.subject != subject], table.fingertip, _TO_GRASP)
+        test = _table_examples([one for one in own if one.subject == subject], table.fingertip, _TO_GRASP)
+        if len(train) and len(test):
+            folds.append(Fold(f"table/{action}", str(subject), train, test, others, "place", table.fingertip))
+    return folds
+
+
+def _kinds(table: Recordings, name: str, part: Part, *, beginnings: bool = False) -> list[Fold]:
+    folds = []
+    for subject in table.subjects:
+        rest = [one for one in table.movements if one.subject != subject]
+        if not rest:  # a single person cannot be left out
+            continue
+        train = _table_examples(rest, table.fingertip, part)
+        test = _table_examples(list(table.of(subject=subject)), table.fingertip, part)
+        folds.append(Fold(name, str(subject), train, test, [], "place", table.fingertip, beginnings))
+    return folds
+
+
+Part = Callable[[RecordedMovement], Floats]
+_WHOLE = attrgetter("movement")
+_TO_GRASP = attrgetter("to_grasp")
+_FROM_ONSET = attrgetter("from_onset")
+
+
+def _first(milliseconds: int) -> Part:
+    return lambda one: first_frames(one.from_onset, round(milliseconds / 1000.0 * RATE_HZ))
+
+
+def _table_examples(movements: list[RecordedMovement], tip: int, part: Part) -> Examples:
+    """Theta is the target; a movement without one gets the place where its fingertip starts."""
+    sequences = [part(one) for one in movements]
+    starts = np.array([x[0, 3 * tip : 3 * tip + 3] for x in sequences]).reshape(-1, 3)
+    theta = np.array([one.target for one in movements]).reshape(-1, 3)
+    theta = np.where(np.isfinite(theta), theta, starts)
+    return Examples(
+        sequences, theta, [one.action for one in movements], np.array([one.subject for one in movements]), RATE_HZ
+    )
+
+
+def _targets(movements: Sequence[RecordedMovement]) -> Floats:
+    return np.array([one.target for one in movements])
+
+
+def _raster(action: str, columns: int, rows: int, repetitions: int, seed: Sequence[int]) -> Examples:
+    targets, coordinates = table_targets(columns, rows)
+    rng = np.random.default_rng([*seed, RASTER_ACTIONS.index(action)])
+    shown = demonstrations_at(targets, rng, action=action, repetitions=repetitions)  # type: ignore[arg-type]
+    theta = np.repeat(coordinates, repetitions, axis=0)
+    cells = np.repeat(np.arange(len(targets)), repetitions)
+    return Examples(shown.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ)
+
+
+def _joined(parts: Iterable[Examples]) -> Examples:
+    several = list(parts)
+    return Examples(
+        [x for part in several for x in part.sequences],
+        np.concatenate([part.theta for part in several]),
+        [label for part in several for label in part.labels],
+        np.concatenate([part.groups for part in several]),
+        several[0].rate_hz,
+    )

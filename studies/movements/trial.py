@@ -1,0 +1,86 @@
+"""One method on one fold: everything it can do, measured."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from studies.movements.disturbed import aborted, stopped
+from studies.movements.measures import covered, synthesis_errors, theta_error
+from studies.movements.method import BEGINNINGS, CLASSES, FRAMES, SYNTHESIS, THETA, TYPICALITY, Method
+from studies.movements.tasks import Fold
+
+SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of a movement, from its onset, after which its kind is asked."""
+
+Numbers = dict[str, list[float]]
+
+
+def able(method: Method, fold: Fold) -> bool:
+    """Whether a method can do anything of what a fold asks."""
+    if not fold.several_actions:
+        return bool(method.can & {SYNTHESIS, THETA, TYPICALITY})
+    return (BEGINNINGS if fold.beginnings else CLASSES) in method.can
+
+
+def measure(method: Method, fold: Fold) -> dict[str, Any]:
+    """Fit and test. Per measure one value per test movement, and seconds: `fit`, and per question on average."""
+    began = time.perf_counter()
+    method.fit(fold.train)
+    seconds = {"fit": time.perf_counter() - began}
+    values: Numbers = {}
+    if fold.several_actions:
+        _classification(method, fold, values, seconds)
+    else:
+        _single_action(method, fold, values, seconds)
+    return {"task": fold.task, "fold": fold.name, "values": values, "seconds": seconds}
+
+
+def _single_action(method: Method, fold: Fold, values: Numbers, seconds: dict[str, float]) -> None:
+    if SYNTHESIS in method.can:
+        began = time.perf_counter()
+        made = {tuple(theta): method.synthesize(theta, FRAMES) for theta in fold.test.theta}
+        seconds["synthesize"] = (time.perf_counter() - began) / len(made)
+        for x, theta in zip(fold.test.sequences, fold.test.theta, strict=True):
+            _add(values, synthesis_errors(made[tuple(theta)], x, fold.tip))
+    if THETA in method.can:
+        began = time.perf_counter()
+        estimates = [method.estimate(x) for x in fold.test.sequences]
+        seconds["estimate"] = (time.perf_counter() - began) / len(estimates)
+        for estimate, theta in zip(estimates, fold.test.theta, strict=True):
+            _add(values, {"theta": theta_error(estimate.theta, theta, fold.kind)})
+            inside = covered(estimate, theta)
+            if inside is not None:
+                _add(values, {"covered": inside})
+    if TYPICALITY in method.can:
+        rng = np.random.default_rng(0)
+        tests = fold.test.sequences
+        for name, movements in (
+            ("score_genuine", tests),
+            ("score_aborted", [aborted(x) for x in tests]),
+            ("score_stopped", [stopped(x, rng) for x in tests]),
+            ("score_others", fold.others),
+        ):
+            values[name] = [float(method.score(x)) for x in movements]
+
+
+def _classification(method: Method, fold: Fold, values: Numbers, seconds: dict[str, float]) -> None:
+    began = time.perf_counter()
+    if not fold.beginnings:
+        answers = [method.classify(x, True) for x in fold.test.sequences]
+        values["correct"] = [float(a == b) for a, b in zip(answers, fold.test.labels, strict=True)]
+        seconds["classify"] = (time.perf_counter() - began) / len(answers)
+        return
+    for share in SHARES:
+        parts = [x[: max(2, round(share * len(x)))] for x in fold.test.sequences]
+        answers = [method.classify(x, False) for x in parts]
+        right = [float(a == b) for a, b in zip(answers, fold.test.labels, strict=True)]
+        values[f"correct_{round(100 * share)}"] = right
+    seconds["classify_beginning"] = (time.perf_counter() - began) / (len(SHARES) * len(fold.test))
+
+
+def _add(values: Numbers, found: dict[str, float]) -> None:
+    for name, value in found.items():
+        values.setdefault(name, []).append(float(value))

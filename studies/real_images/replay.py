@@ -1,0 +1,128 @@
+"""The recording played through the parts of the nodes: camera source, image messages, tracker, and what it says.
+
+Nothing here knows where the hand truly is. What is kept comes out of the messages that would be on the bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
+from numpy.typing import NDArray
+
+from paramove.action_space.grammar import Grammar
+from paramove.action_space.messages import arm_pose_message, estimate_message, outline_message
+from paramove.action_space.particle_filter import FilterOptions
+from paramove.action_space.propagation import PropagationOptions
+from paramove.action_space.tracker import ActionTracker, TrackerOptions
+from paramove.action_space.video_tracker import VideoTracker
+from paramove.action_space.vocabulary import Vocabulary
+from paramove.input_error import InputError
+from paramove.msgs.action_estimate_pb2 import ActionEstimate
+from paramove.msgs.arm_pose_pb2 import ArmPose
+from paramove.observation.arm_observer import ArmObserver
+from paramove.observation.cameras import CalibratedCamera
+from paramove.vision.frame_sources import open_source
+from paramove.vision.frames import EndOfFrames, FrameChecks, decode, encode
+from studies.real_images import seated_person
+from studies.real_images.pointing_model import NAME, pointing_action
+
+Floats = NDArray[np.float64]
+
+IMAGES = "color"
+RATE_HZ = 10.0
+"""Assumed, since the recording does not tell: every third frame of a camera at 30 Hz."""
+PARTICLES = 1000
+RETARGETED = 0.2
+CAMERA = "camera_1"
+
+
+@dataclass(frozen=True)
+class Said:
+    """What the tracker says about one frame.
+
+    Attributes:
+        frame: number of the picture. pose: shoulder, elbow, tip of the index finger (9,), m, in the world.
+        outline: of the arm, (N, 2), px. progress: mean of tau. direction: mean of theta (u, v), (2,).
+        lost: whether the tracker calls the arm lost, or sees nothing.
+    """
+
+    frame: int
+    pose: Floats
+    outline: Floats
+    progress: float
+    direction: Floats
+    lost: bool
+
+
+def replayed(
+    folder: Path, *, rate_hz: float = RATE_HZ, retargeted: float = RETARGETED, seed: int = 0, models: Path | None = None
+) -> list[Said]:
+    """All frames of the recording of a folder. Raises InputError where something of it is missing.
+
+    Args:
+        rate_hz: assumed pictures a second. retargeted: see `PropagationOptions`. seed: of the filter.
+        models: where the trained model is kept; by default the user's cache.
+    """
+    camera = seated_person.camera(folder)
+    tracker = video_tracker(camera, rate_hz, retargeted, seed, models)
+    said = []
+    for index, image in camera_messages(folder / IMAGES, camera, rate_hz):
+        for moment in tracker.see(CAMERA, image.timestamp.ToNanoseconds(), decode(image)):
+            estimate = estimate_message(moment, tracker.parameter_names, PARTICLES).SerializeToString()
+            pose = arm_pose_message(moment).SerializeToString()
+            outline = outline_message(moment).SerializeToString()
+            said.append(_heard(index, estimate, pose, outline))
+    return said
+
+
+def video_tracker(
+    camera: CalibratedCamera, rate_hz: float, retargeted: float, seed: int, models: Path | None
+) -> VideoTracker:
+    """The tracker as the node makes one: seated pointing in a loop, and directions that may slide on."""
+    placement = seated_person.placement(camera)
+    action = pointing_action(seated_person.SIZES, seated_person.resting_pose(camera), placement, models)
+    options = TrackerOptions(
+        filter=FilterOptions(n_particles=PARTICLES), propagation=PropagationOptions(retargeted=retargeted)
+    )
+    tracker = ActionTracker(Vocabulary([action]), Grammar.loop(NAME), placement, options, seed)
+    return VideoTracker(tracker, ArmObserver(seated_person.SIZES, [camera]), [camera], 1.0 / rate_hz)
+
+
+def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) -> Iterator[tuple[int, CompressedImage]]:
+    """Number and message of each picture, as the camera node says them. Raises InputError for pictures of no use."""
+    source = open_source(f"folder:{pictures}@{rate_hz:g}", camera.width_px, camera.height_px)
+    checks = FrameChecks(camera.width_px, camera.height_px)
+    tick = 0
+    try:
+        while True:
+            frame = source.frame(round(tick * 1e9 / rate_hz))
+            tick += 1
+            if frame is not None:
+                yield frame.index, encode(checks.passed(frame))
+    except EndOfFrames:
+        return
+    except RuntimeError as error:
+        raise InputError(f"{pictures}: {error}") from error
+    finally:
+        source.close()
+
+
+def _heard(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> Said:
+    """The three messages, read as a listener reads them."""
+    estimate, pose = ActionEstimate.FromString(estimate_data), ArmPose.FromString(pose_data)
+    outline = ImageAnnotations.FromString(outline_data).points[0].points
+    progress = np.array(estimate.progress)
+    middles = (np.arange(len(progress)) + 0.5) / len(progress)
+    return Said(
+        frame=frame,
+        pose=np.array([value for point in pose.points for value in (point.x, point.y, point.z)]),
+        outline=np.array([(point.x, point.y) for point in outline]).reshape(-1, 2),
+        progress=float(progress @ middles / progress.sum()),
+        direction=np.array([parameter.mean for parameter in estimate.actions[0].parameters]),
+        lost=estimate.lost or estimate.degraded,
+    )

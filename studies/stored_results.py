@@ -1,0 +1,39 @@
+"""Pieces of work whose results are kept, so that a study that was interrupted goes on where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from paramove.cli.evaluation_io import PROGRESS
+from paramove.supervision import exit_codes
+from studies.movements.sweep import ClusterMissingError, run_stored
+
+
+def stored_results(
+    work: Sequence[Any], cache: Path, title: str, console: Console, *, jobs: int, scheduler: str | None = None
+) -> list[dict[str, Any]]:
+    """Results of all pieces of work, with a progress bar; what is finished is kept in `cache`.
+
+    Each piece has a `key()`. The command ends with exit code 66 without the cluster of `scheduler`, 130 on Ctrl-C.
+    """
+    with Progress(*PROGRESS, console=console) as progress:
+        shown = progress.add_task(title, total=None)
+
+        def finished(done: int, total: int, last: str) -> None:
+            progress.update(shown, completed=done, total=total, description=last[:60] or title)
+
+        try:
+            keys = [one.key() for one in work]
+            return run_stored(work, keys, cache, workers=jobs, scheduler=scheduler, finished=finished)
+        except ClusterMissingError as error:
+            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+            raise typer.Exit(exit_codes.INPUT_MISSING) from error
+        except KeyboardInterrupt:
+            console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
+            raise typer.Exit(130) from None

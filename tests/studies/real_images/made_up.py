@@ -1,0 +1,50 @@
+"""A recording as the real one lies on disk, of an arm drawn as a bright shape."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from paramove.observation.arm_observer import ArmObserver
+from paramove.observation.cameras import CalibratedCamera
+from studies.real_images import pointing_model, seated_person
+from studies.real_images.scores import middle_of_hand
+
+LENS = [600.0, 0.0, 0.0, 0.0, 600.0, 0.0, 320.0, 240.0, 1.0]
+
+
+def write_lens(folder: Path) -> CalibratedCamera:
+    """The file of the lens, and the camera that it makes."""
+    told = {"width": 640, "height": 480, "intrinsic_matrix": LENS}
+    (folder / seated_person.INTRINSICS).write_text(json.dumps(told), encoding="utf-8")
+    return seated_person.camera(folder)
+
+
+def true_poses(camera: CalibratedCamera, theta: tuple[float, float] = (0.8, 0.5)) -> np.ndarray:
+    """At 10 Hz: half a second on the knee, then to a direction, and held. (T, 9), m, in the world."""
+    placement = seated_person.placement(camera)
+    rest = placement.in_model(seated_person.resting_pose(camera))
+    arm = seated_person.SIZES.scaled(1.0 / placement.scale)
+    shown = pointing_model.movement(np.array(theta), arm, rest, np.random.default_rng(5))
+    return placement.in_world(np.concatenate([np.repeat(shown[:1], 5, axis=0), shown[: 2 * 60 : 6]]))
+
+
+def write_recording(folder: Path) -> np.ndarray:
+    """Pictures, lens and reference of 25 frames; the true poses."""
+    camera = write_lens(folder)
+    poses = true_poses(camera)
+    (folder / "color").mkdir()
+    room = np.full((480, 640, 3), 60, np.uint8)
+    for x in range(20, 640, 60):  # a room without edges would be taken for darkness
+        cv2.rectangle(room, (x, 300), (x + 30, 470), (30 + x // 5, 120, 150 - x // 5), -1)
+    observer, noise = ArmObserver(seated_person.SIZES, [camera], threads=1), np.random.default_rng(3)
+    for number, pose in enumerate(poses):
+        image = room.copy()
+        cv2.fillPoly(image, [observer.outline(pose, 0).round().astype(np.int32)], (190, 200, 210))
+        image = cv2.add(image, noise.integers(0, 6, image.shape, dtype=np.uint8))
+        cv2.imwrite(str(folder / "color" / f"{number:05d}.jpg"), image)
+    np.savez(folder / "hand_reference.npz", uv=camera.project(middle_of_hand(poses)))
+    return poses

@@ -1,0 +1,60 @@
+"""`python -m studies real-images`: what it prints, and its exit codes."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from studies.__main__ import app
+from studies.real_images import experiment, report, scores
+from studies.real_images.replay import Said
+from studies.real_images.seated_person import camera
+from tests.studies.real_images.made_up import true_poses, write_recording
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["real-images", *arguments], env={"COLUMNS": "200"})
+
+
+@pytest.fixture
+def data(tmp_path):
+    (tmp_path / "data" / "rgbd_pointing").mkdir(parents=True)
+    return tmp_path / "data"
+
+
+def test_missing_recordings_end_with_66(tmp_path):
+    answer = run("--data", str(tmp_path / "nowhere"))
+    assert answer.exit_code == 66
+    assert "no folder with recordings" in answer.stderr
+    (tmp_path / "data").mkdir()
+    answer = run("--data", str(tmp_path / "data"))
+    assert answer.exit_code == 66
+    assert "rgbd_pointing" in answer.stderr
+
+
+def test_a_missing_part_is_named(data):
+    answer = run("--data", str(data))
+    assert answer.exit_code == 66
+    assert "cam_params_realsense.json" in answer.stderr
+
+
+@pytest.mark.parametrize(("off_m", "exit_code"), [(0.0, 0), (0.5, 3)])
+def test_the_verdict_is_the_exit_code(data, tmp_path, monkeypatch, off_m, exit_code):
+    folder = data / "rgbd_pointing"
+    write_recording(folder)
+    poses = true_poses(camera(folder))
+    poses[:, [2, 5, 8]] += off_m
+
+    def replayed(folder, **options):
+        return [Said(number, pose, pose[:2][None], 0.5, pose[:2], False) for number, pose in enumerate(poses)]
+
+    monkeypatch.setattr(experiment, "replayed", replayed)
+    for module in (scores, report):
+        monkeypatch.setattr(module, "RANGES", {"frames 6-9": (6, 9)})
+    answer = run("--data", str(data), "--out", str(tmp_path / "out"), "--json", str(tmp_path / "numbers.json"))
+    assert answer.exit_code == exit_code, answer.output
+    numbers = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))
+    assert numbers["met"] == (exit_code == 0)
+    assert numbers == json.loads((tmp_path / "out" / "real_images.json").read_text(encoding="utf-8"))
+    assert f"goal {'met' if numbers['met'] else 'missed'}" in answer.output
+    assert (tmp_path / "out" / "report.html").is_file()
