@@ -1,6 +1,5 @@
 """The report on thesis chapter 2: one HTML file that needs no other, its plots as PNG, its numbers as JSON."""
 
-import base64
 import json
 from functools import partial
 from html import escape
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.evaluation.report import STYLE
+from paramove.documents.report_page import image, report_page
 from studies.chapter2.drawing import (
     draw_convergence,
     draw_model,
@@ -103,13 +102,8 @@ def _distances(experiment: Experiment) -> dict[str, Any]:
 
 def _page(experiment: Experiment, findings: dict[str, Finding], pictures: dict[str, bytes]) -> str:
     by_verdict = {verdict: [n for n, one in findings.items() if one.verdict == verdict] for verdict in MARKS}
-    agreeing = len(by_verdict["yes"])
     tail = "".join(f" {MARKS[one].capitalize()}: {', '.join(by_verdict[one])}." for one in ("in part", "no"))
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>HMMs of a synthetic movement</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}{OWN_STYLE}</style>",
-        f"<header><div><h1>HMMs of a synthetic movement: {agreeing} of {len(findings)} figures as in the thesis</h1>",
-        f"<p>Thesis 2.3 with our own training sequences, seed {experiment.seed}.{tail}</p></div></header><main>",
         _movement(pictures),
         *(_figure(experiment, figure, findings[figure.number], pictures) for figure in FIGURES),
         _picture(
@@ -127,9 +121,15 @@ def _page(experiment: Experiment, findings: dict[str, Finding], pictures: dict[s
             "synthesis",
             pictures,
         ),
-        "</main></html>",
     ]
-    return "\n".join(parts)
+    title = "HMMs of a synthetic movement"
+    return report_page(
+        title,
+        f"{title}: {len(by_verdict['yes'])} of {len(findings)} figures as in the thesis",
+        f"Thesis 2.3 with our own training sequences, seed {experiment.seed}.{tail}",
+        parts,
+        style=OWN_STYLE,
+    )
 
 
 def _movement(pictures: dict[str, bytes]) -> str:
@@ -192,5 +192,4 @@ def _picture(heading: str, words: str, name: str, pictures: dict[str, bytes]) ->
 
 
 def _image(name: str, pictures: dict[str, bytes]) -> str:
-    data = base64.b64encode(pictures[name]).decode("ascii")
-    return f"<img alt='{escape(name.replace('_', ' '), quote=True)}' src='data:image/png;base64,{data}'>"
+    return image(pictures[name], name.replace("_", " "))

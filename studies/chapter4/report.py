@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.evaluation.report import STYLE, section
+from paramove.documents.report_page import report_page, section
 from studies.chapter4 import drawing
 from studies.chapter4.experiments import LINE, MODELS, SURFACES
 from studies.chapter4.findings import findings_of
@@ -57,20 +57,23 @@ def write_results(results: Results, folder: Path) -> tuple[dict[str, Any], list[
     text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     (folder / "chapter4.json").write_text(text, encoding="utf-8")
     met = sum(target.met for target in targets)
-    bad = "" if met == len(targets) else " class=bad"
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Parametric HMMs of arm movements</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        f"<header{bad}><div><h1>Parametric HMMs of arm movements: {met} of {len(targets)} goals met</h1>",
-        f"<p>Chapter 4 of the thesis, repeated with {_seeds(results)}.</p></div></header><main>",
         section("Goals", "The worst model and number of states counts.", targets_table(targets)),
         section("Beside the thesis", DATA, findings_table(found)),
         *_pictures(results, summary),
         *_questions(results, summary, likeliest),
         section("Natural variation", "Pointing, cm.", variation_table(summary["variation"])),
-        f"<section class=why>{escape(NOT_SHOWN)}</section></main></html>",
+        f"<section class=why>{escape(NOT_SHOWN)}</section>",
     ]
-    (folder / "report.html").write_text("\n".join(parts), encoding="utf-8")
+    title = "Parametric HMMs of arm movements"
+    text = report_page(
+        title,
+        f"{title}: {met} of {len(targets)} goals met",
+        f"Chapter 4 of the thesis, repeated with {_seeds(results)}.",
+        parts,
+        good=met == len(targets),
+    )
+    (folder / "report.html").write_text(text, encoding="utf-8")
     return numbers, targets
 
 

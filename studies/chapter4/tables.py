@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
 
+from paramove.documents.report_page import table
 from studies.chapter4.findings import THESIS_CLASSIFICATION, THESIS_VARIATION, Finding
 from studies.chapter4.summary import UNTYPICAL, Interval
 from studies.chapter4.targets import Target
@@ -22,13 +23,13 @@ MARKS = {
 def targets_table(targets: Sequence[Target]) -> str:
     """Goals: wanted, measured, met."""
     rows = [(*map(escape, target[:4]), MARKS["yes" if target.met else "no"]) for target in targets]
-    return _table(("goal", "wanted", "measured", "of", "met"), rows)
+    return table(("goal", "wanted", "measured", "of", "met"), rows)
 
 
 def findings_table(findings: Sequence[Finding]) -> str:
     """What the thesis saw, and what is seen here."""
     rows = [(*map(escape, finding[:3]), MARKS[finding.verdict]) for finding in findings]
-    return _table(("where", "the thesis", "here", "the same"), rows)
+    return table(("where", "the thesis", "here", "the same"), rows)
 
 
 def models_table(summary: Mapping[str, Any]) -> str:
@@ -56,7 +57,7 @@ def models_table(summary: Mapping[str, Any]) -> str:
         *("states", "model", "synthesis, cm", "with straight lines, as the thesis", "synthesis, reaching"),
         *("θ, pointing, cm", "θ, reaching, cm", "right of 280", "thesis, table 4.1", "learn, s", "classify, ms"),
     )
-    return _table(heads, rows, numbers=(0, *range(2, 11)))
+    return table(heads, rows, numbers=(0, *range(2, 11)))
 
 
 NAMES = {"hmmlearn": "hmmlearn, diagonal covariances, no θ", "plain HMM": "HMM, full covariances, no θ"}
@@ -74,7 +75,7 @@ def rejection_table(summary: Mapping[str, Any]) -> str:
         for row in summary["models"]
     ]
     heads = ("states", "model", "95 % region covers, %", "AUROC, the other action", *UNTYPICAL[1:])
-    return _table(heads, rows, numbers=(0, *range(2, 7)))
+    return table(heads, rows, numbers=(0, *range(2, 7)))
 
 
 def learning_table(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -90,7 +91,7 @@ def learning_table(rows: Sequence[Mapping[str, Any]]) -> str:
         )
         for row in sorted(rows, key=lambda row: (row["name"], row["side"], row["repetitions"]))
     ]
-    return _table(
+    return table(
         ("model", "places", "repetitions", "demonstrations", "synthesis, cm", "θ, cm"), cells, numbers=range(1, 6)
     )
 
@@ -101,7 +102,7 @@ def variation_table(found: Mapping[str, Any]) -> str:
         (escape(name), interval(one), f"{THESIS_VARIATION[name]:g}" if name in THESIS_VARIATION else "–")
         for name, one in found.items()
     ]
-    return _table(("", "here", "thesis"), rows, numbers=(1, 2))
+    return table(("", "here", "thesis"), rows, numbers=(1, 2))
 
 
 def redirect_table(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -122,7 +123,7 @@ def redirect_table(rows: Sequence[Mapping[str, Any]]) -> str:
         *("learned from", "model", "error (4.3), cm", "misses the first place, cm", "the second, cm"),
         *("jerk ratio", "greatest"),
     )
-    return _table(heads, cells, numbers=range(2, 7))
+    return table(heads, cells, numbers=range(2, 7))
 
 
 def interval(found: Interval | None, digits: int = 2) -> str:
@@ -140,14 +141,3 @@ def _percent(found: Interval) -> Interval:
 
 def _rate(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
-    """Cells are HTML already."""
-    right = set(numbers)
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=n' if i in right else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', [escape(head) for head in heads])}</tr>{body}</table>"

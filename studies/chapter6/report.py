@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.evaluation.report import STYLE, section
+from paramove.documents.report_page import report_page, section
 from sim.persons.clips import Clip, clips_code
 from studies.chapter4.drawing import drawn
 from studies.chapter6 import drawing
@@ -94,9 +94,9 @@ def write_results(
     }
     text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
     (folder / "chapter6.json").write_text(text, encoding="utf-8")
-    parts = [*_beginning(tracks, goals), *_numbers(summary, goals, goals_there, findings)]
-    parts += [*_single_views(tracks, summary, clips), *_kinds(tracks, clips), "</main></html>"]
-    (folder / "report.html").write_text("\n".join(parts), encoding="utf-8")
+    parts = _numbers(summary, goals, goals_there, findings)
+    parts += [*_single_views(tracks, summary, clips), *_kinds(tracks, clips)]
+    (folder / "report.html").write_text(_page(tracks, goals, parts), encoding="utf-8")
     return numbers, goals
 
 
@@ -109,19 +109,19 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
-def _beginning(tracks: Sequence[Track], goals: Sequence[Goal]) -> list[str]:
+def _page(tracks: Sequence[Track], goals: Sequence[Goal], parts: Sequence[str]) -> str:
     judged = [goal for goal in goals if goal.met is not None]
     good = sum(bool(goal.met) for goal in judged)
-    bad = "" if judged and good == len(judged) else " class=bad"
     acts = sum(len(track.acts) for track in tracks)
-    names = {track.clip for track in tracks}
-    return [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Tracking in action space</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        f"<header{bad}><div><h1>Tracking in action space: {good} of {len(judged)} goals met</h1>",
-        f"<p>Chapter 6 of the thesis, repeated: {len(tracks)} tracks of {len(names)} clips, {acts} tracked "
-        "performances.</p></div></header><main>",
-    ]
+    clips = len({track.clip for track in tracks})
+    title = "Tracking in action space"
+    return report_page(
+        title,
+        f"{title}: {good} of {len(judged)} goals met",
+        f"Chapter 6 of the thesis, repeated: {len(tracks)} tracks of {clips} clips, {acts} tracked performances.",
+        parts,
+        good=0 < len(judged) == good,
+    )
 
 
 def _numbers(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from paramove.documents.report_page import table
 from studies.chapter6.findings import TABLE_6_1, Finding
 from studies.chapter6.goals import Goal
 from studies.chapter6.vocabularies import BY_OTHERS
@@ -159,14 +160,3 @@ def lost_table(tracks: Sequence[Mapping[str, Any]]) -> str:
 def number(value: float) -> str:
     """A length, or that it is not known or without end."""
     return "–" if value != value else "∞" if value == float("inf") else f"{value:.2f}"
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Iterable[int] = ()) -> str:
-    """A table whose cells are HTML already."""
-    right = set(numbers)
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=n' if i in right else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', [escape(head) for head in heads])}</tr>{body}</table>"

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from paramove.evaluation.report import STYLE
+from paramove.documents.report_page import image, report_page
 from studies.imitation.experiment import Experiment, numbers_of
 from studies.imitation.plots import PLOTS, png_of
 from studies.imitation.reasons import LimitUse, limit_uses, why
@@ -67,23 +66,21 @@ def write_results(experiment: Experiment, folder: Path) -> dict[str, Any]:
 
 def _page(experiment: Experiment, numbers: dict[str, Any], rows: list[Compared], pictures: dict[str, bytes]) -> str:
     missed = [one for one in rows if one.met is False]
-    good = not missed
     goals = sum(one.met is not None for one in rows)
     title = f"{goals - len(missed)} of {goals} goals met"
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Imitation of reaching</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}img{{width:100%}}</style>",
-        f"<header{'' if good else ' class=bad'}><div><h1>Imitation of reaching: {title}</h1>",
-        f"<p>Thesis 5.2.7 with {len(numbers['seeds'])} synthetic demonstrators; each reference averages "
-        f"{numbers['repetitions']} demonstrations of its target.</p></div></header><main>",
         _comparison(rows),
         _why(numbers["why"]),
         _limits(limit_uses(experiment)),
         *(_picture(name, picture) for name, picture in pictures.items()),
         _alignment(numbers),
-        "</main></html>",
     ]
-    return "\n".join(parts)
+    about = (
+        f"Thesis 5.2.7 with {len(numbers['seeds'])} synthetic demonstrators; each reference averages "
+        f"{numbers['repetitions']} demonstrations of its target."
+    )
+    headline = f"Imitation of reaching: {title}"
+    return report_page("Imitation of reaching", headline, about, parts, good=not missed, style="img{width:100%}")
 
 
 def _comparison(rows: list[Compared]) -> str:
@@ -129,11 +126,8 @@ def _limits(uses: list[LimitUse]) -> str:
 
 def _picture(name: str, picture: bytes) -> str:
     heading, words = TEXTS[name]
-    data = base64.b64encode(picture).decode("ascii")
-    return (
-        f"<section><h2>{escape(heading)}</h2><p class=why>{escape(words)}</p>"
-        f"<img alt='{escape(heading, quote=True)}' src='data:image/png;base64,{data}'></section>"
-    )
+    shown = image(picture, heading)
+    return f"<section><h2>{escape(heading)}</h2><p class=why>{escape(words)}</p>{shown}</section>"
 
 
 def _alignment(numbers: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from paramove.evaluation.report import STYLE
+from paramove.documents.report_page import report_page
 from studies.movements import plots
 from studies.movements.summary import QUANTITIES, SECONDS, Measured, Quantity
 from studies.movements.tasks import FIRST_MS
@@ -71,16 +71,11 @@ def write_report(
     text = json.dumps(plain(summary), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     (folder / "movements.json").write_text(text, encoding="utf-8")
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{escape(title)}</title>",
-        "<meta name=viewport content='width=device-width,initial-scale=1'>",
-        f"<style>{STYLE}main{{max-width:1500px}}</style>",
-        f"<header><div><h1>{escape(title)}</h1><p>{escape(NOTE)}</p></div></header><main>",
         *(f"<section class=why>{escape(note)}</section>" for note in notes),
         *(_section(task, rows, ours) for task, rows in summary.items()),
-        "</main></html>",
     ]
     page = folder / "report.html"
-    page.write_text("\n".join(parts), encoding="utf-8")
+    page.write_text(report_page(title, title, NOTE, parts, style="main{max-width:1500px}"), encoding="utf-8")
     return page
 
 

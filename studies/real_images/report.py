@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paramove.evaluation.report import STYLE, section
+from paramove.documents.report_page import report_page, section
 from paramove.observation.cameras import CalibratedCamera
 from studies.chapter4.drawing import drawn
 from studies.real_images.experiment import JUDGED, Replay
@@ -45,20 +45,17 @@ def write_report(
     judged = [replay for replay in replays if replay.case == JUDGED]
     verdict = "goal met" if numbers["met"] else "goal missed"
     parts = [
-        "<!doctype html><html lang=en><meta charset=utf-8><title>Tracking on real images</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        f"<header{'' if numbers['met'] else ' class=bad'}><div><h1>Tracking on real images: {verdict}</h1>",
-        f"<p>Wanted: the median at most {GOAL_PX:g} px in both ranges of frames, with every seed.</p></div></header>",
-        "<main>",
         section("Distances, px", WHAT, _table(numbers["cases"])),
         section("Frame by frame", "Each line is a seed; grey: the judged frames.",
                 drawn(partial(_over_frames, replays=replays), (11.0, 7.2))),
         section("What was believed", OUTLINES,
                 drawn(partial(_outlines, replay=judged[0], reference=reference, camera=camera), (11.0, 4.6))),
-        "</main></html>",
     ]  # fmt: skip
+    title = "Tracking on real images"
+    wanted = f"Wanted: the median at most {GOAL_PX:g} px in both ranges of frames, with every seed."
     page = folder / "report.html"
-    page.write_text("\n".join(parts), encoding="utf-8")
+    text = report_page(title, f"{title}: {verdict}", wanted, parts, good=numbers["met"])
+    page.write_text(text, encoding="utf-8")
     return page
 
 

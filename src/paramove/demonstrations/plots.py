@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import io
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from matplotlib.figure import Figure
 
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.documents.report_page import image, report_page
 from paramove.supervision.names import nearest
 
 DPI = 110
@@ -69,14 +68,9 @@ def write_plot(figure: Figure, path: Path, about: str = "") -> None:
     if path.suffix.lower() in (".html", ".htm"):
         picture = io.BytesIO()
         figure.savefig(picture, format="png", dpi=DPI)
-        data = base64.b64encode(picture.getvalue()).decode("ascii")
-        text = (
-            "<!doctype html><html lang=en><meta charset=utf-8>"
-            f"<title>{html.escape(about)}</title><style>body{{font:15px sans-serif;margin:2em;max-width:1400px}}"
-            "img{max-width:100%}</style>"
-            f"<h1>{html.escape(about)}</h1><img alt='paths and coordinates' src='data:image/png;base64,{data}'>\n"
-        )
-        path.write_text(text, encoding="utf-8")
+        shown = image(picture.getvalue(), "paths and coordinates")
+        style = "main{max-width:1400px}img{max-width:100%}"
+        path.write_text(report_page(about, about, "", [shown], style=style), encoding="utf-8")
     elif path.suffix.lower() in (".png", ".svg", ".pdf"):
         figure.savefig(path, dpi=DPI)
     else:

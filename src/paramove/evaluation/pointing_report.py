@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from paramove.demonstrations.reaching import table_place
+from paramove.documents.report_page import film, report_page, section
 from paramove.evaluation import plots
 from paramove.evaluation.pointing_run import PointingRun
-from paramove.evaluation.report import STYLE, section
 
 TRUE, BELIEVED = "#1d2530", "#2f9e57"
 
@@ -25,10 +23,7 @@ def write_pointing_report(run: PointingRun, summary: dict[str, Any], video: Path
     title = "Pointing" if summary["success"] is None else "Pointing: found" if good else "Pointing: not found"
     told = summary["reason"] or f"{summary['gestures']} gestures in {summary['seconds']:.0f} s"
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{title}</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        f"<header{'' if good else ' class=bad'}><div><h1>{title}</h1><p>{escape(told)}</p></div></header><main>",
-        video_part(video),
+        film(video),
         section(
             "The table from above", "Rings: where the person pointed. Dots: what was answered.",
             plots.svg_of(plan, run, (7, 4.6)),
@@ -38,10 +33,9 @@ def write_pointing_report(run: PointingRun, summary: dict[str, Any], video: Path
             plots.svg_of(hand, run, (11, 5)),
         ),
         _how_sure(run),
-        "</main></html>",
     ]  # fmt: skip
     path = run.folder / "report.html"
-    path.write_text("\n".join(parts), encoding="utf-8")
+    path.write_text(report_page(title, title, told, parts, good=good), encoding="utf-8")
     return path
 
 
@@ -94,11 +88,3 @@ def certainty(run: PointingRun, figure: Figure) -> None:
     right.set_ylabel("effective particles")
     for begin in run.time_s[run.unsure]:
         left.axvline(begin, color="#b3372b", alpha=0.2)
-
-
-def video_part(video: Path | None) -> str:
-    """A part of a page that holds the video itself; nothing without one."""
-    if video is None:
-        return ""
-    data = base64.b64encode(video.read_bytes()).decode()
-    return f"<section><video controls loop muted src='data:video/mp4;base64,{data}'></video></section>"

@@ -12,12 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
+from paramove.documents.report_page import film, report_page, section
 from paramove.evaluation import plots
-from paramove.evaluation.pointing_report import video_part
 from paramove.evaluation.pointing_video import drawn
 from paramove.evaluation.recorded_run import RecordedRun, recording_in
 from paramove.evaluation.relocate_by_pointing_run import GOAL, SCALE, PointedRelocation
-from paramove.evaluation.report import STYLE, section
 from paramove.vision.frames import Frame, decode, encode
 from paramove.vision.pointing_events import ball_colour
 
@@ -40,20 +39,16 @@ def write_relocation_report(
     )
     pictures = _pictures(run, relocations)
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{title}</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        f"<header{'' if good else ' class=bad'}><div><h1>{title}</h1><p>{escape(told)}</p></div></header><main>",
-        video_part(video),
+        film(video),
         section("Numbers", f"Lengths at the robot's scale; the person is {SCALE} times a grown one.", _table(summary)),
         section("The working area from above", legend, plots.svg_of(plan, relocations, (7, 4.2))),
         *(
             section(f"Place {one.number}", _words(one), _two(pictures.get(one.number), one))
             for one in relocations
         ),
-        "</main></html>",
     ]  # fmt: skip
     path = run.folder / "report.html"
-    path.write_text("\n".join(parts), encoding="utf-8")
+    path.write_text(report_page(title, title, told, parts, good=good), encoding="utf-8")
     return path
 
 

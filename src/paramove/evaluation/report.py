@@ -3,43 +3,16 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
+from paramove.documents.report_page import folded, report_page, section, table
 from paramove.evaluation import plots
 from paramove.evaluation.plots import svg_of
 from paramove.evaluation.run_summary import RunEvaluation
 from paramove.evaluation.verdict_table import percent, rows_of
-
-STYLE = """
-:root{--ink:#1d2530;--soft:#5b6470;--line:#e3e7ec;--good:#1f7a45;--bad:#b3372b;--warn:#a86a00;--card:#fff}
-*{box-sizing:border-box}
-body{margin:0;background:#f4f6f8;color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
-main{max-width:1120px;margin:0 auto;padding:0 20px 60px}
-header{color:#fff;background:var(--good);padding:28px 0 26px;margin-bottom:24px}
-header.bad{background:var(--bad)}
-header>div{max-width:1120px;margin:0 auto;padding:0 20px}
-h1{margin:0;font-size:28px;letter-spacing:-.01em} header p{margin:6px 0 0;opacity:.92}
-h2{font-size:18px;margin:0 0 4px} .why{color:var(--soft);margin:0 0 12px;font-size:14px}
-section{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:18px 20px;margin:0 0 18px}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:12px;margin-bottom:18px}
-.tile{background:var(--card);border:1px solid var(--line);border-left:4px solid var(--good);border-radius:8px;
-padding:10px 14px}
-.tile.off{border-left-color:var(--warn)} .tile b{display:block;font-size:18px;font-weight:650}
-.tile span{color:var(--soft);font-size:12.5px;display:block;line-height:1.35}
-table{border-collapse:collapse;width:100%;font-size:13.5px} th{text-align:left;color:var(--soft);font-weight:600}
-th,td{padding:5px 10px 5px 0;border-bottom:1px solid var(--line);vertical-align:top}
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums} td.n,td:has(.dot){white-space:nowrap}
-tr:last-child td{border-bottom:0}
-.two{display:grid;grid-template-columns:1fr 1fr;gap:18px} .two section{margin:0}
-.yes{color:var(--good);font-weight:600}.no{color:var(--bad);font-weight:600}.soft{color:var(--soft)}
-.dot{display:inline-block;width:10px;height:10px;border-radius:50%;margin-right:7px}
-video{width:100%;border-radius:8px;background:#000;display:block} svg{width:100%;height:auto;display:block}
-.scroll{overflow-x:auto} summary{cursor:pointer;font-weight:600} pre{font-size:12.5px;overflow-x:auto}
-@media(max-width:860px){.two{grid-template-columns:1fr}}
-"""
 
 
 def write_report(evaluation: RunEvaluation, video: Path | None) -> Path:
@@ -52,12 +25,7 @@ def write_report(evaluation: RunEvaluation, video: Path | None) -> Path:
 def page(evaluation: RunEvaluation, video: Path | None) -> str:
     """The report as text."""
     summary = evaluation.summary
-    seed = summary["seed"]
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>Rule learning, seed {seed}</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}</style>",
-        _header(summary),
-        "<main>",
         _tiles(summary),
         _video(video),
         _plot(
@@ -89,20 +57,15 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         _topics(summary),
         _speech(summary),
         _origin(summary),
-        "</main></html>",
     ]
-    return "\n".join(part for part in parts if part)
-
-
-def _header(summary: dict[str, Any]) -> str:
-    good = summary["success"]
-    number = len(summary["rules"])
-    title = "Success" if good else "Failure"
+    found = f"{summary['objects_placed']} of {len(summary['rules'])} objects rest in their own opening"
     world = f"Rule learning, world {summary['seed']}, {summary['simulated_s']:.0f} s simulated"
-    return (
-        f"<header{'' if good else ' class=bad'}><div><h1>{title}: {summary['objects_placed']} of {number} objects rest "
-        f"in their own opening</h1><p>{world}: {escape(summary['reason'])}. "
-        f"Judged by the recorded truth.</p></div></header>"
+    return report_page(
+        f"Rule learning, seed {summary['seed']}",
+        f"{'Success' if summary['success'] else 'Failure'}: {found}",
+        f"{world}: {summary['reason']}. Judged by the recorded truth.",
+        parts,
+        good=summary["success"],
     )
 
 
@@ -148,7 +111,7 @@ def _rules(summary: dict[str, Any]) -> str:
     return section(
         "What the robot believes, beside the truth",
         "The robot saw the instructor carry each object into an opening; nobody told it where the openings are.",
-        _table(heads, rows, numbers=(2, 3, 4)),
+        table(heads, rows, numbers=(2, 3, 4)),
     )
 
 
@@ -178,7 +141,7 @@ def _pointings(summary: dict[str, Any]) -> str:
         "Where the person pointed",
         "Believed: the target of the arm tracked in action space, in the robot's frame. True: the object's middle. "
         "The error is small enough while it is less than half of the distance to the next object.",
-        _table(heads, rows, numbers=(0, 2, 3, 5, 6, 7, 8)),
+        table(heads, rows, numbers=(0, 2, 3, 5, 6, 7, 8)),
     )
 
 
@@ -210,7 +173,7 @@ def _grasps(summary: dict[str, Any]) -> str:
         "Every grasp",
         "Off: how far the object truly stood from where the robot believed it. Elbow: turned because of a joint limit. "
         "Target: commanded gripper from its target. World: gripper from the commanded one.",
-        (_table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)) if rows else "There was none.")
+        (table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)) if rows else "There was none.")
         + _refused(summary["refused_goals"]),
     )
 
@@ -222,8 +185,8 @@ def _refused(goals: Sequence[dict[str, Any]]) -> str:
     ]
     if not rows:
         return ""
-    table = _table(("s", "goal", "object", "why"), rows, numbers=(0,))
-    return f"<details><summary>{len(rows)} goals were refused before the arm moved</summary>{table}</details>"
+    shown = table(("s", "goal", "object", "why"), rows, numbers=(0,))
+    return f"<details><summary>{len(rows)} goals were refused before the arm moved</summary>{shown}</details>"
 
 
 def _contacts(evaluation: RunEvaluation) -> str:
@@ -232,11 +195,11 @@ def _contacts(evaluation: RunEvaluation) -> str:
         (f"{item['time_s']:.2f}", str(item["count"]), escape(", ".join(item["in_contact"]) or "over already"))
         for item in found
     ]
-    table = _table(("s", "new", "in contact then"), rows, numbers=(0, 1)) if rows else ""
+    shown = table(("s", "new", "in contact then"), rows, numbers=(0, 1)) if rows else ""
     return section(
         "What the robot touched",
         "It may touch the object that it handles, and nothing else. Deeper than 0.7 mm would be no physical grasp.",
-        svg_of(plots.contacts, evaluation, (11, 2.2)) + table,
+        svg_of(plots.contacts, evaluation, (11, 2.2)) + shown,
     )
 
 
@@ -258,7 +221,7 @@ def _topics(summary: dict[str, Any]) -> str:
     return section(
         "What was said on the bus",
         "Rates in simulated time. Lost: gaps in the sequence numbers of the recording." + _gaps(summary),
-        _table(heads, rows, numbers=(2, 3, 4, 5, 6)),
+        table(heads, rows, numbers=(2, 3, 4, 5, 6)),
     )
 
 
@@ -270,33 +233,14 @@ def _gaps(summary: dict[str, Any]) -> str:
 
 def _speech(summary: dict[str, Any]) -> str:
     rows = [(f"{said['time_s']:.1f}", f"“{escape(said['sentence'])}”") for said in summary["speech"]]
-    return _folded("All that the robot said", _table(("s", ""), rows, numbers=(0,)))
+    return folded("All that the robot said", table(("s", ""), rows, numbers=(0,)))
 
 
 def _origin(summary: dict[str, Any]) -> str:
     wall = summary["wall"]
     rows = [(escape(name), escape(version or "–")) for name, version in sorted(summary["versions"].items())]
     rows += [(escape(name), escape(str(wall[name]))) for name in ("begun", "run_folder", "realtime_factor")]
-    return _folded("Versions and origin", _table(("", ""), rows))
-
-
-def _folded(title: str, content: str) -> str:
-    return f"<section><details><summary>{escape(title)}</summary>{content}</details></section>"
-
-
-def section(title: str, why: str, content: str) -> str:
-    """A part of a page; `content` is HTML already."""
-    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p><div class=scroll>{content}</div></section>"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Cells are HTML already."""
-
-    def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
-
-    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
-    return f"<table><tr>{cells('th', [escape(head) for head in heads])}</tr>{body}</table>"
+    return folded("Versions and origin", table(("", ""), rows))
 
 
 def _dot(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Sequence
 from html import escape
@@ -13,11 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from paramove.documents.report_page import image, report_page
 from paramove.evaluation.models.drawing import ACTION_COLOURS, INK, WARN, bounds, new_figure, with_unit
 from paramove.evaluation.models.leaving_out import LeaveOutResult, worst
 from paramove.evaluation.models.pictures import plot_model
 from paramove.evaluation.models.training import Trained
-from paramove.evaluation.report import STYLE
 
 DPI = 90
 WORST = 8
@@ -28,14 +27,10 @@ def write_training_report(trained: Sequence[Trained], path: Path, remarks: Seque
     title = "Trained: " + ", ".join(one.action for one in trained)
     about = f"{sum(len(one.examples) for one in trained)} movements of {trained[0].examples.source or 'a set'}"
     parts = [
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{escape(title)}</title>",
-        f"<meta name=viewport content='width=device-width,initial-scale=1'><style>{STYLE}img{{max-width:100%}}</style>",
-        f"<header><div><h1>{escape(title)}</h1><p>{escape(about)}</p></div></header><main>",
         *(f"<section class=why>{escape(remark)}</section>" for remark in remarks),
         *(_section(one) for one in trained),
-        "</main></html>",
     ]
-    path.write_text("\n".join(parts), encoding="utf-8")
+    path.write_text(report_page(title, title, about, parts, style="img{max-width:100%}"), encoding="utf-8")
 
 
 def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
@@ -102,11 +97,8 @@ def _section(trained: Trained) -> str:
 def _picture(title: str, why: str, figure: Figure) -> str:
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=DPI)
-    data = base64.b64encode(file.getvalue()).decode("ascii")
-    return (
-        f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>"
-        f"<img alt='{escape(title)}' src='data:image/png;base64,{data}'></section>"
-    )
+    shown = image(file.getvalue(), title)
+    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{shown}</section>"
 
 
 def _curve(trained: Trained) -> Figure:
