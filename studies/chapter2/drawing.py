@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paramove.evaluation.plots import STYLE
+from paramove.runs.plots import STYLE
 from studies.chapter2.movement import PARAMETER_SHARES, performance, prototype
 from studies.chapter2.training import Moment
 

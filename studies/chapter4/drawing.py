@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paramove.evaluation.plots import STYLE
+from paramove.runs.plots import STYLE
 from studies.chapter2.drawing import BLUE, GREY, RED, ellipse
 from studies.chapter2.movement import prototype
 from studies.chapter4.line_movement import SHOWN

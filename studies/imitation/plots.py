@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from paramove.evaluation.plots import STYLE
+from paramove.runs.plots import STYLE
 from studies.imitation.errors import SIGNIFICANT, Errors
 from studies.imitation.experiment import (
     CENTRE,

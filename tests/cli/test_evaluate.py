@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.evaluate import app
-from paramove.evaluation.batch import result_file
 from paramove.robots.description import RobotDescription
-from tests.evaluation.synthetic_run import SyntheticRun
+from paramove.runs.batch import result_file
+from tests.runs.synthetic_run import SyntheticRun
 
 ROOT = Path(__file__).parents[2]
 

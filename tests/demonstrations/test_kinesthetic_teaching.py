@@ -10,9 +10,6 @@ from typer.testing import CliRunner
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.kinesthetic_teaching import PARAMETERS, KinestheticTeacher, moved_part
-from paramove.evaluation.models.examples import examples_of
-from paramove.evaluation.models.kinds import untrained
-from paramove.evaluation.models.training import train_and_write
 from paramove.imitation.reaching_file import load_reaching_model
 from paramove.imitation.servo_arm_reaching import ServoArmReaching
 from paramove.imitation.timing import minimum_jerk
@@ -23,6 +20,9 @@ from paramove.robots.dynamixel.limp_arm import LimpArm
 from paramove.robots.dynamixel.servo_chain import ServoChain
 from paramove.robots.dynamixel.servo_models import model_named
 from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.training.examples import examples_of
+from paramove.training.kinds import untrained
+from paramove.training.training import train_and_write
 from tests.robots.dynamixel.koch_arm import KOCH
 
 ROBOT = RobotDescription.load(KOCH.parent / "open_manipulator_x")

@@ -65,8 +65,8 @@ def _is_model(file: Path) -> bool:
 
 
 def _row(file: Path, model: ParametricHMM) -> dict[str, Any]:
-    from paramove.evaluation.models.drawing import parameter_names
-    from paramove.evaluation.models.kinds import kind_of
+    from paramove.training.drawing import parameter_names
+    from paramove.training.kinds import kind_of
 
     about = model.description
     return {
@@ -96,11 +96,11 @@ def show(file: ModelArgument, as_json: JsonOption = False) -> None:
 
 
 def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
-    from paramove.evaluation.models.drawing import bounds, dimension, parameter_names
-    from paramove.evaluation.models.kinds import kind_of
-    from paramove.evaluation.models.pictures import state_seconds
-    from paramove.evaluation.models.training import checksum, told_of
     from paramove.phmm import MovementDescription
+    from paramove.training.drawing import bounds, dimension, parameter_names
+    from paramove.training.kinds import kind_of
+    from paramove.training.pictures import state_seconds
+    from paramove.training.training import checksum, told_of
 
     about = model.description or MovementDescription()
     low_high = bounds(model)
@@ -141,8 +141,8 @@ def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
 
 
 def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    from paramove.evaluation.models.drawing import with_unit
-    from paramove.evaluation.models.report import left_out_sentences
+    from paramove.training.drawing import with_unit
+    from paramove.training.report import left_out_sentences
 
     low_high = [f"{with_unit(name)}: {low:.4g} to {high:.4g}" for name, (low, high) in facts["parameters"].items()]
     least, most = facts["frames_per_state"]
@@ -186,7 +186,7 @@ def plot(
     Exit codes: 0; 66 there is no such file; 78 it is damaged, or has no such point.
     """
     from paramove.demonstrations.plots import write_plot
-    from paramove.evaluation.models.pictures import plot_model, title_of
+    from paramove.training.pictures import plot_model, title_of
 
     with one_sentence():
         model = loaded(file)
@@ -207,7 +207,7 @@ def compare(
     Exit codes: 0; 2 fewer than two; 66 a file is missing; 78 one is damaged, or they have other points or parameters.
     """
     from paramove.demonstrations.demonstration_set import DemonstrationSet
-    from paramove.evaluation.models.comparing import on_set, table_of_distances
+    from paramove.training.comparing import on_set, table_of_distances
 
     if len(files) < 2:
         raise typer.BadParameter("give at least two files", param_hint="FILE FILE...")

@@ -17,7 +17,7 @@ from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, cl
 from paramove.supervision.processes import printable
 
 if TYPE_CHECKING:
-    from paramove.evaluation.models.examining import Recognition
+    from paramove.training.examining import Recognition
 
 app = typer.Typer(add_completion=False)
 
@@ -50,7 +50,7 @@ def recognize(
     Exit codes: 0, also where nothing known was seen; 66 a file is missing; 78 a file or the movement cannot be used.
     """
     from paramove.cli.movement_files import movements_of
-    from paramove.evaluation.models.examining import Examiner
+    from paramove.training.examining import Examiner
 
     if unit not in (None, "m", "cm", "mm"):
         raise typer.BadParameter(f"expected m, cm or mm, found {unit!r}", param_hint="--unit")
@@ -69,7 +69,7 @@ def recognize(
             raise ended("interrupted", INTERRUPTED) from None
         if plot is not None:
             from paramove.demonstrations.plots import write_plot
-            from paramove.evaluation.models.recognition_pictures import plot_recognition
+            from paramove.training.recognition_pictures import plot_recognition
 
             write_plot(plot_recognition(examiner.models, found), plot, f"{source.name}: {len(found)} movements")
     _tell(found, as_json)
@@ -78,7 +78,7 @@ def recognize(
 
 
 def _tell(found: list[Recognition], as_json: bool) -> None:
-    from paramove.evaluation.models.examining import confusion
+    from paramove.training.examining import confusion
 
     facts = [one.facts() for one in found]
     table = confusion(found)
@@ -94,8 +94,8 @@ def _tell(found: list[Recognition], as_json: bool) -> None:
 
 def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
     """One movement, in words."""
-    from paramove.evaluation.models.drawing import with_unit
-    from paramove.evaluation.models.examining import percent
+    from paramove.training.drawing import with_unit
+    from paramove.training.examining import percent
 
     others = sorted(facts["posterior"].items(), key=lambda item: -item[1])
     rows = [("movement", f"{facts['movement']} ({facts['seconds']:.3g} s)")]
@@ -124,7 +124,7 @@ def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
 
 def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
     """One of many movements, as a line of the table."""
-    from paramove.evaluation.models.examining import percent
+    from paramove.training.examining import percent
 
     row: dict[str, Any] = {"": number, "action": facts["action"] or "none"}
     if len(facts["posterior"]) > 1:

@@ -46,8 +46,8 @@ def synthesize(
     import numpy as np
 
     from paramove.demonstrations.plots import write_plot
-    from paramove.evaluation.models.movement_writing import ENDINGS, Made, as_csv, write_movement
-    from paramove.evaluation.models.pictures import plot_synthesis
+    from paramove.training.movement_writing import ENDINGS, Made, as_csv, write_movement
+    from paramove.training.pictures import plot_synthesis
 
     if out is not None and out.suffix not in ENDINGS:
         raise typer.BadParameter(f"files of movements end in {', '.join(ENDINGS)}", param_hint="--out")
@@ -74,8 +74,8 @@ def _check(model: ParametricHMM, theta: object) -> None:
     """Ends the command for a wrong number of components; warns of values outside the training's bounds."""
     import numpy as np
 
-    from paramove.evaluation.models.drawing import bounds, parameter_names, with_unit
     from paramove.input_error import InputError
+    from paramove.training.drawing import bounds, parameter_names, with_unit
 
     names, values = parameter_names(model), np.asarray(theta)
     low, high = bounds(model)

@@ -21,8 +21,8 @@ from paramove.input_error import InputError
 from paramove.supervision.processes import printable
 
 if TYPE_CHECKING:
-    from paramove.evaluation.models.examples import Examples
-    from paramove.evaluation.models.training import Make, Trained
+    from paramove.training.examples import Examples
+    from paramove.training.training import Make, Trained
 
 app = typer.Typer(add_completion=False)
 
@@ -63,8 +63,8 @@ def train(
     Exit codes: 0; 2 wrong arguments; 66 there is no set; 78 nothing can be learned from it; 130 interrupted.
     """
     from paramove.demonstrations.demonstration_set import DemonstrationSet
-    from paramove.evaluation.models.examples import examples_of
-    from paramove.evaluation.models.kinds import untrained
+    from paramove.training.examples import examples_of
+    from paramove.training.kinds import untrained
 
     console = Console(stderr=True, highlight=False, emoji=False, markup=False)
     with one_sentence():
@@ -84,7 +84,7 @@ def train(
         }  # fmt: skip
         trained = _trained(examples, make, goal, leave_out, console)
         if report is not None:
-            from paramove.evaluation.models.report import write_training_report
+            from paramove.training.report import write_training_report
 
             report.parent.mkdir(parents=True, exist_ok=True)
             write_training_report(trained, report, examples.remarks)
@@ -111,7 +111,7 @@ def _trained(
     examples: Examples, make: dict[str, Make], goal: Path, leave_out: LeaveOut, console: Console
 ) -> list[Trained]:
     """Trains, writes, and then checks, so that an interrupted check leaves a model."""
-    from paramove.evaluation.models.training import train_and_write, with_check
+    from paramove.training.training import train_and_write, with_check
 
     written = "nothing was written"
     try:
@@ -149,7 +149,7 @@ def _with_points(sentence: str, names: tuple[str, ...]) -> str:
 
 
 def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:
-    from paramove.evaluation.models.report import sentences
+    from paramove.training.report import sentences
 
     facts = [one.facts() for one in trained]
     if as_json:

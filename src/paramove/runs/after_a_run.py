@@ -1,0 +1,58 @@
+"""The command that evaluates a run: the launcher calls it when the run has ended, or people by hand."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from paramove.documents.atomic_writing import replacing
+from paramove.runs.recorded_run import RunFolderError, gaps_in
+from paramove.supervision import exit_codes
+from paramove.supervision.queued_output import QueuedOutput
+
+Evaluate = Callable[[argparse.Namespace, Console], bool | None]
+
+
+def evaluated(
+    module: str, described: str | None, flags: Mapping[str, str], evaluate: Evaluate, arguments: Sequence[str] | None
+) -> int:
+    """Reads the command's arguments and evaluates; returns the exit code. Never waits for the terminal.
+
+    Args:
+        module: whose command it is. described: its help.
+        flags: options without a value beside `--no-video`, with their help.
+        evaluate: what is to be done with `run_folder`, an absolute path, and the flags; returns whether the run did
+            what it should, None if nobody knows. Raises RunFolderError for a folder that holds no such run.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m {module}", description=described)
+    parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
+    for flag, told in {"--no-video": "write no video", **flags}.items():
+        parser.add_argument(flag, action="store_true", help=told)
+    options = parser.parse_args(arguments)
+    with QueuedOutput():
+        errors = Console(stderr=True, highlight=False, markup=False)
+        try:
+            success = evaluate(options, Console(highlight=False, emoji=False))
+        except RunFolderError as error:
+            errors.print(str(error), soft_wrap=True)
+            return exit_codes.INPUT_MISSING
+        except OSError as error:
+            again = f"when that is fixed, run python -m {module} {options.run_folder}"
+            errors.print(f"{error.filename or options.run_folder}: {error.strerror or error}; {again}", soft_wrap=True)
+            return exit_codes.FAILURE
+    return exit_codes.JUDGED_A_FAILURE if success is False else exit_codes.OK
+
+
+def write_run_json(folder: Path, summary: dict[str, Any]) -> Path:
+    """Writes `run.json` into a run's folder: the numbers of the run, and the gaps of its recordings."""
+    path = folder / "run.json"
+    content = summary | {"gaps": [asdict(gap) for gap in gaps_in(folder)]}
+    with replacing(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    return path

@@ -1,0 +1,152 @@
+"""The runs of a batch as a table and as medians and totals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import median
+from typing import Any
+
+from rich.table import Table
+
+from paramove.runs.verdict_table import below
+
+COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("placed", ("objects_placed",), "total"),
+    ("grasps", ("grasps",), "total"),
+    ("first\ntry", ("grasps_first_try",), "total"),
+    ("calib.\ngrasps", ("calibration_grasps",), "total"),
+    ("first\ntry ", ("calibration_grasps_first_try",), "total"),
+    ("unw.\ncont.", ("unwanted_contacts",), "total"),
+    ("penetr.\nmm", ("deepest_penetration_mm",), "max"),
+    ("homogr.\nmm", ("homography_error_mm", "median"), "median"),
+    ("max\nmm", ("homography_error_mm", "max"), "max"),
+    ("comm.\nmm", ("gripper_error_commanded_mm", "both", "max"), "max"),
+    ("phys.\nmm", ("gripper_error_physical_mm", "both", "max"), "max"),
+    ("lost", ("loss", "total"), "total"),
+    ("sim.\ns", ("simulated_s",), "median"),
+    ("× real\ntime", ("wall", "realtime_factor"), "median"),
+)
+"""Heading, keys in run.json, and how the column is summed up."""
+
+POINTING_COLUMNS: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("pointed", ("pointings",), "total"),
+    ("right", ("pointings_right",), "total"),
+    ("error\nmm", ("pointing_error_mm", "median"), "median"),
+    ("max\nmm ", ("pointing_error_mm", "max"), "max"),
+    ("max of\nspacing", ("pointing_error_of_spacing", "max"), "max"),
+)
+"""The same for runs in which pointing is tracked in action space."""
+
+HULL_COLUMNS: tuple[tuple[str, str], ...] = (("inside\nhull", "inside"), ("outside\nhull", "outside"))
+"""Heading, and which fetches: "succeeded/tried", by where they fetch."""
+
+LEGEND = (
+    "unw. cont.: contacts with anything but the handled object; penetr.: deepest penetration; homogr., max: the "
+    "robot's own calibration; comm.: commanded gripper to its target; phys.: gripper to the commanded one, both the "
+    "largest while grasping and placing; inside, outside hull: relocations that succeeded of those tried, by whether "
+    "the object is fetched within the convex hull of the targets that the movement model was trained with; pointed, "
+    "right: pointings that were tracked, and those whose object was told rightly, with the error of the place, also "
+    "as a share of the distance to the next object; yellow: not within its goal"
+)
+NEEDED_SHARE = 0.9
+TABLE_WIDTH = 140
+"""On a narrower terminal the rows are broken by the terminal."""
+
+
+def value_of(result: dict[str, Any], keys: Sequence[str]) -> float | None:
+    """A number of a result; None where it is not known."""
+    found: Any = result
+    for key in keys:
+        found = found.get(key) if isinstance(found, dict) else None
+    return found if isinstance(found, int | float) else None
+
+
+def totals_of(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Counts, and for each column its total, median or largest value, under the path of its keys."""
+    succeeded = sum(bool(result.get("success")) for result in results)
+    found: dict[str, Any] = {"runs": len(results), "succeeded": succeeded, "needed_share": NEEDED_SHARE}
+    for _, keys, way in columns_of(results):
+        values = [value for result in results if (value := value_of(result, keys)) is not None]
+        found[f"{'.'.join(keys)} ({way})"] = _summed_up(values, way) if values else None
+    return found | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
+
+
+def columns_of(results: Sequence[dict[str, Any]]) -> tuple[tuple[str, tuple[str, ...], str], ...]:
+    """The columns that these results fill."""
+    tracked = any("pointings" in result for result in results)
+    return (*COLUMNS, *POINTING_COLUMNS) if tracked else COLUMNS
+
+
+def _hull_total(results: Sequence[dict[str, Any]], where: str) -> dict[str, int]:
+    """Of all runs, and of runs with such relocations: in how many there were any, and in how many all succeeded."""
+    counts = [found for result in results if (found := hull_counts(result, where)) is not None]
+    some = [found for found in counts if found["tried"] + found["refused"] > 0]
+    total = {key: sum(found[key] for found in counts) for key in ("tried", "succeeded", "refused")}
+    whole = sum(found["succeeded"] == found["tried"] > 0 for found in some)
+    return total | {"runs": len(some), "runs_all_succeeded": whole}
+
+
+def hull_counts(result: dict[str, Any], where: str) -> dict[str, int] | None:
+    """Counts of the relocations that fetch there; None in results of earlier releases."""
+    found = result.get("training_hull", {}).get("from", {}).get(where)
+    return found if isinstance(found, dict) else None
+
+
+def _share(counts: dict[str, int] | None) -> str:
+    return "–" if counts is None else f"{counts['succeeded']}/{counts['tried']}"
+
+
+def _summed_up(values: Sequence[float], way: str) -> float:
+    if way == "total":
+        return sum(values)
+    return median(values) if way == "median" else max(values)
+
+
+def enough(results: Sequence[dict[str, Any]]) -> bool:
+    """Whether 9 of 10 runs succeeded."""
+    return sum(bool(result.get("success")) for result in results) >= NEEDED_SHARE * len(results) > 0
+
+
+def table_of(results: Sequence[dict[str, Any]]) -> Table:
+    """One row per seed, and a last one that sums up."""
+    table = Table(show_edge=False, pad_edge=False, show_footer=True)
+    totals = totals_of(results)
+    table.add_column("seed", justify="right", footer="all")
+    table.add_column("success", footer=f"{totals['succeeded']}/{totals['runs']}")
+    for heading, where in HULL_COLUMNS:
+        table.add_column(heading, justify="right", footer=_share(totals["training_hull.from"][where]))
+    columns = columns_of(results)
+    for heading, keys, way in columns:
+        foot = totals[f"{'.'.join(keys)} ({way})"]
+        footer = f"{shown(foot)}\n{way}" if foot is not None else "–"
+        table.add_column(heading, justify="right", footer=footer)
+    for result in sorted(results, key=lambda item: int(item["seed"])):
+        verdict = "[green]yes[/]" if result.get("success") else "[red]no[/]"
+        cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in columns]
+        hulls = [_share(hull_counts(result, where)) for _, where in HULL_COLUMNS]
+        table.add_row(str(result["seed"]), verdict, *hulls, *cells)
+    return table
+
+
+def shown(value: float | None) -> str:
+    """A number as short as it may be."""
+    if value is None:
+        return "–"
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:.0f}" if value >= 100 else f"{value:.2f}"
+
+
+_LIMITS = {
+    "unw.\ncont.": 0.0,
+    "penetr.\nmm": 0.7,
+    "homogr.\nmm": 3.0,
+    "comm.\nmm": 0.5,
+    "phys.\nmm": 2.0,
+    "lost": 0.0,
+}
+
+
+def _cell(heading: str, value: float | None) -> str:
+    limit = _LIMITS.get(heading)
+    return shown(value) if limit is None or below(value, limit) else f"[yellow]{shown(value)}[/]"

@@ -1,0 +1,84 @@
+"""The demo video of a run: VP9 in mp4, which browsers play."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
+from paramove.documents.pictures import decoded
+from paramove.runs.recorded_run import recording_in
+from paramove.runs.run_summary import RunEvaluation
+from paramove.runs.story import Story
+from paramove.runs.video_frame import SIZE, VideoFrame
+from paramove.runs.video_writer import VideoError, VideoWriter
+from paramove.input_error import InputError
+
+Picture = NDArray[np.uint8]
+
+FRAMES_PER_S = 10.0
+CAMERA_HZ = 15.0
+LONG_RUN_S = 400.0
+"""A longer run is shown four times as fast as it was, others twice."""
+LINGER_FRAMES = 20  # the last picture stays so long
+
+
+def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
+    """Write `demo.mp4` into the run's folder, with a progress bar; None if the view was not recorded (headless).
+
+    Raises:
+        VideoError: There is no VP9 encoder.
+    """
+    run = evaluation.run
+    number = sum(time_s <= run.end_s for time_s in view_times(run.folder))
+    if number == 0:
+        return None
+    story = Story(run, evaluation.relocations)
+    factor = 2 if run.end_s <= LONG_RUN_S else 4
+    every = round(factor * CAMERA_HZ / FRAMES_PER_S)
+    frame = VideoFrame(f"rule learning, seed {run.truth.layout.seed}", factor)
+    path = run.folder / "demo.mp4"
+    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
+        shown = range(0, number, every)
+        pictures = paired_images(run.folder, every)
+        picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        for _, (time_s, camera, view) in zip(
+            track(shown, "video", console=console, transient=True), pictures, strict=False
+        ):
+            picture = frame.draw(camera, view, story.at(time_s), time_s, run.end_s)
+            writer.write(picture)
+        for _ in range(LINGER_FRAMES):
+            writer.write(picture)
+    return path
+
+
+def view_times(folder: Path) -> Iterator[float]:
+    """Times of the recorded views, s."""
+    for recorded in recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name}):
+        yield recorded.log_ns * 1e-9
+
+
+def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Picture, Picture]]:
+    """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the newest one by then."""
+    cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
+    newest, following = None, next(cameras, None)
+    for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+        while following is not None and following.log_ns <= view.log_ns:
+            newest, following = following, next(cameras, None)
+        if place % every == 0 and newest is not None:
+            yield view.log_ns * 1e-9, _decoded(newest.message.data), _decoded(view.message.data)
+
+
+def _decoded(data: bytes) -> Picture:
+    try:
+        image = decoded(data)
+    except InputError as error:
+        raise VideoError(f"an image of {len(data)} bytes in the recording {error}") from error
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)

@@ -1,0 +1,111 @@
+"""How true the gripper is when it grasps and when it places (thesis 5.2.7: within 2 mm of the target).
+
+Commanded: the target against forward kinematics of the commanded integer joint units. Physical: the gripper in the
+world against the commanded one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.bus import topics
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.relocations import Motion, Relocation
+from paramove.imitation.motion import RelocationOptions
+from paramove.robots.description import RobotDescription
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class GripperMoment:
+    """The gripper at rest, closing or opening the hand.
+
+    Attributes:
+        goal_id, object, stage: Of the goal.
+        kind: "grasp" or "place".
+        time_s: In the run's time.
+        target, commanded, gripper: Where the gripper should be, was sent to, and was, each [3], m, shoulder frame.
+    """
+
+    goal_id: str
+    object: str
+    stage: str
+    kind: str
+    time_s: float
+    target: FloatArray
+    commanded: FloatArray
+    gripper: FloatArray
+
+    @property
+    def commanded_error_mm(self) -> float:
+        """Distance of the commanded gripper from its target."""
+        return 1e3 * float(np.linalg.norm(self.commanded - self.target))
+
+    @property
+    def physical_error_mm(self) -> float:
+        """Distance of the gripper from the commanded one."""
+        return 1e3 * float(np.linalg.norm(self.gripper - self.commanded))
+
+
+class CommandedGripper:
+    """The gripper of the commanded joint units over the run.
+
+    Args:
+        run: With `wire/hoap3/state`.
+        robot: Whose units and kinematics.
+    """
+
+    def __init__(self, run: RecordedRun, robot: RobotDescription, side: str = "right") -> None:
+        arm = robot.arm(side)
+        states = [r for r in run.heard(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
+        self.time_s = np.array([r.message.captured.ToNanoseconds() for r in states]) * 1e-9
+        counts = np.array([list(r.message.target_counts) for r in states]).reshape(-1, robot.n_joints)
+        self.angles = robot.units.to_radians(counts)[:, arm.indices]
+        points = arm.kinematics.forward(self.angles)
+        self.gripper, self.elbow = points.gripper, points.elbow
+
+    def at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+        """Gripper and elbow [3] nearest to a time."""
+        place = int(np.abs(self.time_s - time_s).argmin())
+        return self.gripper[place], self.elbow[place]
+
+
+def gripper_moments(
+    run: RecordedRun, relocations: list[Relocation], motions: list[Motion], commanded: CommandedGripper
+) -> list[GripperMoment]:
+    """Every grasp and every placing that the arm got to."""
+    by_id = {relocation.goal.id: relocation for relocation in relocations}
+    found = []
+    for motion in motions:
+        relocation = by_id.get(motion.goal_id)
+        if relocation is None or not commanded.time_s.size:
+            continue
+        phases = {"grasp": "grasp"} | ({"release": "place"} if "place" in motion.phases else {})
+        for phase, kind in phases.items():
+            middle = motion.middle_of(phase)
+            if middle is None:
+                continue
+            time_s = motion.begun_s + middle
+            gripper, elbow = commanded.at(time_s)
+            target = place_target(relocation) if kind == "place" else grasp_target(relocation.source, gripper, elbow)
+            moment = run.truth.gripper[run.truth.at(time_s)]
+            goal = relocation.goal
+            found.append(GripperMoment(goal.id, goal.object, relocation.stage, kind, time_s, target, gripper, moment))
+    return found
+
+
+def grasp_target(source: FloatArray, gripper: FloatArray, elbow: FloatArray) -> FloatArray:
+    """Where the gripper closes: beside the object's place, to the right of the forearm (thesis 5.2.5)."""
+    forward = (gripper - elbow) * [1.0, 1.0, 0.0]
+    forward /= np.linalg.norm(forward)
+    right = np.array([forward[1], -forward[0], 0.0])
+    return np.asarray(source + RelocationOptions().grasp_aside * right)
+
+
+def place_target(relocation: Relocation) -> FloatArray:
+    """Where the gripper opens: a little above the target."""
+    return np.asarray(relocation.target + np.array([0.0, 0.0, RelocationOptions().release_height]))

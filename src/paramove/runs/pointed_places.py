@@ -1,0 +1,174 @@
+"""Where the person pointed and where the tracker believed it, in a run with tracking in action space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from paramove.bus import topics
+from paramove.runs.recorded_run import RecordedRun, Truth
+from paramove.runs.relocations import Relocation, stages_of
+from paramove.runs.spread import spread
+from paramove.msgs.gesture_pb2 import Gesture
+
+POINTS_AT = "points at "
+"""What the instructor does then, before the object's name, in the recorded truth."""
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PointedPlace:
+    """One pointing, or a gesture while the arm did something else: where it puts an object down, it rests too.
+
+    Attributes:
+        time_s: When the place was said; when the person began, if it never was.
+        meant: Object that the person pointed at; "" if nobody pointed.
+        true: Its middle (x, y), m, right shoulder's frame; None if nobody pointed.
+        believed: What was said; None if nothing was.
+        nearest: Object on the surface that is truly nearest to the believed place; "" if there is none.
+        spacing_mm: Distance from the object that is meant to the next one on the surface; None if it stands alone.
+        confidence: As it was said, 0 to 1; None if nothing was.
+    """
+
+    time_s: float
+    meant: str
+    true: Place | None
+    believed: Place | None
+    nearest: str
+    spacing_mm: float | None
+    confidence: float | None
+
+    @property
+    def error_mm(self) -> float | None:
+        """Distance of the believed place from the middle of the object, seen from above."""
+        if self.true is None or self.believed is None:
+            return None
+        return 1e3 * float(np.hypot(self.believed[0] - self.true[0], self.believed[1] - self.true[1]))
+
+    @property
+    def error_of_spacing(self) -> float | None:
+        """The error as a share of the spacing; the wrong object is the nearest from 0.5 on, at worst."""
+        if self.error_mm is None or not self.spacing_mm:
+            return None
+        return self.error_mm / self.spacing_mm
+
+    @property
+    def right(self) -> bool:
+        """Whether the object that is meant is the nearest."""
+        return bool(self.meant) and self.nearest == self.meant
+
+
+def pointed_places(run: RecordedRun) -> list[PointedPlace]:
+    """Every pointing in order, with what was said of it last; then what else was said in the stage apply.
+
+    Without tracking in action space there is nothing.
+    """
+    if not run.heard(topics.ACTION_ESTIMATE):
+        return []
+    said = [
+        recorded.message
+        for recorded in run.heard(topics.GESTURES)
+        if recorded.message.kind == Gesture.KIND_POINTED_AT and recorded.message.located and not recorded.message.object
+    ]
+    found = []
+    for begin_s, end_s, name in _performances(run.truth):
+        within = [gesture for gesture in said if begin_s <= _time_s(gesture) <= end_s]
+        found.append(_place(run.truth, name, begin_s, within[-1] if within else None))
+        said = [gesture for gesture in said if gesture not in within[-1:]]
+    applied = [gesture for gesture in said if _in_apply(run, _time_s(gesture))]
+    return found + [_place(run.truth, "", _time_s(gesture), gesture) for gesture in applied]
+
+
+def unasked_fetches(run: RecordedRun, relocations: Sequence[Relocation]) -> list[Relocation]:
+    """Fetches in the stage apply of an object that was not what the person had pointed at last."""
+    performances = _performances(run.truth)
+    found = []
+    for goal in relocations:
+        if goal.fetches and goal.stage == "apply" and goal.goal.attempt <= 1:
+            last = [name for begin_s, _, name in performances if begin_s < goal.begun_s]
+            if not last or last[-1] != goal.goal.object:
+                found.append(goal)
+    return found
+
+
+def pointing_summary(places: list[PointedPlace], unasked: Sequence[Relocation]) -> dict[str, Any]:
+    """Counts, errors and each pointing, ready for JSON."""
+    pointings = [place for place in places if place.meant]
+    return {
+        "pointings": len(pointings),
+        "pointings_told": sum(place.believed is not None for place in pointings),
+        "pointings_right": sum(place.right for place in pointings),
+        "pointings_by_nobody": len(places) - len(pointings),
+        "unasked_fetches": [{"time_s": goal.begun_s, "object": goal.goal.object} for goal in unasked],
+        "pointing_error_mm": spread(place.error_mm for place in pointings if place.error_mm is not None),
+        "pointing_error_of_spacing": spread(
+            place.error_of_spacing for place in pointings if place.error_of_spacing is not None
+        ),
+        "pointing_list": [
+            {
+                "time_s": place.time_s,
+                "meant": place.meant,
+                "true": None if place.true is None else list(place.true),
+                "believed": None if place.believed is None else list(place.believed),
+                "nearest": place.nearest,
+                "right": place.right,
+                "error_mm": place.error_mm,
+                "spacing_mm": place.spacing_mm,
+                "error_of_spacing": place.error_of_spacing,
+                "confidence": place.confidence,
+            }
+            for place in places
+        ],
+    }
+
+
+def _performances(truth: Truth) -> list[tuple[float, float, str]]:
+    """When the person began and ended to point, and at what."""
+    found = []
+    numbered = enumerate(truth.instructor)
+    for doing, states in groupby(numbered, key=lambda item: item[1]):
+        numbers = [number for number, _ in states]
+        if doing.startswith(POINTS_AT):
+            begin_s, end_s = float(truth.time_s[numbers[0]]), float(truth.time_s[numbers[-1]])
+            found.append((begin_s, end_s, doing.removeprefix(POINTS_AT)))
+    return found
+
+
+def _place(truth: Truth, meant: str, begin_s: float, gesture: Any | None) -> PointedPlace:
+    time_s = begin_s if gesture is None else _time_s(gesture)
+    standing = _standing(truth, time_s)
+    true = standing.get(meant)
+    believed = None if gesture is None else (float(gesture.x), float(gesture.y))
+    near = "" if believed is None else min(standing, key=lambda name: _apart_mm(standing[name], believed), default="")
+    others = [_apart_mm(true, place) for name, place in standing.items() if true is not None and name != meant]
+    confidence = None if gesture is None else float(gesture.confidence)
+    return PointedPlace(time_s, meant, true, believed, near, min(others, default=None), confidence)
+
+
+def _standing(truth: Truth, time_s: float) -> dict[str, Place]:
+    """The objects whose middle is above the working plane, with their places."""
+    state = truth.at(time_s)
+    found = {}
+    for name, centres in truth.objects.items():
+        x, y, z = centres[state]
+        if z > truth.surface_z:
+            found[name] = (float(x), float(y))
+    return found
+
+
+def _in_apply(run: RecordedRun, time_s: float) -> bool:
+    return any(one["stage"] == "apply" and one["begin_s"] <= time_s <= one["end_s"] for one in stages_of(run))
+
+
+def _time_s(gesture: Any) -> float:
+    return float(gesture.captured.ToNanoseconds() * 1e-9)
+
+
+def _apart_mm(a: Place | None, b: Place | None) -> float:
+    assert a is not None
+    assert b is not None
+    return 1e3 * float(np.hypot(a[0] - b[0], a[1] - b[1]))

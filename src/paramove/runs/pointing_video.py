@@ -1,0 +1,111 @@
+"""The video of a pointing run: the first camera's images with the believed arm and the ball where it points.
+
+The action tracker draws the ball into its outline. Where a body tracker's poses point is told in the world; it is drawn
+where the calibration beside the run has it in the image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
+from paramove.runs.recorded_run import recording_in
+from paramove.runs.video_writer import VideoWriter
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.observation.cameras import CalibratedCamera, read_cameras
+from paramove.vision.frames import decode
+
+Picture = NDArray[np.uint8]
+
+WIDTH_PX = 960
+RATE_HZ = 15.0
+BALL_PX = 9.0
+SHOWN_S = 1.5
+"""A gesture is told so long."""
+CAMERA = topics.CAMERA_IMAGES[0].name
+
+
+def write_pointing_video(folder: Path, console: Console) -> Path | None:
+    """Write `pointing.mp4` into the run's folder; None if no image was recorded. Raises VideoError."""
+    moments = list(_moments(folder))
+    if not moments:
+        return None
+    path = folder / "pointing.mp4"
+    height, width = decode(moments[0][0]).shape[:2]
+    size = (WIDTH_PX, round(WIDTH_PX * height / width) // 2 * 2)
+    with replacing(path) as unfinished, VideoWriter(unfinished, size, RATE_HZ) as writer:
+        for image, outline, told in track(moments, "video", console=console, transient=True):
+            writer.write(drawn(decode(image), outline, told, size))
+    return path
+
+
+def drawn(image_bgr: Picture, outline: Any | None, told: str, size_px: tuple[int, int]) -> Picture:
+    """The picture RGB of an image with `foxglove.ImageAnnotations` in its pixels, enlarged."""
+    scale = size_px[0] / image_bgr.shape[1]
+    picture = cv2.cvtColor(cv2.resize(image_bgr, size_px, interpolation=cv2.INTER_CUBIC), cv2.COLOR_BGR2RGB)
+    for line in outline.points if outline is not None else ():
+        points = scale * (np.array([(point.x, point.y) for point in line.points]).reshape(-1, 1, 2) + 0.5) - 0.5
+        colour = _rgb(line.outline_color)
+        cv2.polylines(picture, [(8 * points).round().astype(np.int32)], True, colour, 2, cv2.LINE_AA, shift=3)
+    for circle in outline.circles if outline is not None else ():
+        centre = (round(scale * circle.position.x), round(scale * circle.position.y))
+        cv2.circle(picture, centre, round(scale * circle.diameter / 2), _rgb(circle.fill_color), -1, cv2.LINE_AA)
+        cv2.circle(picture, centre, round(scale * circle.diameter / 2), (0, 0, 0), 1, cv2.LINE_AA)
+    if told:
+        place, font = (16, size_px[1] - 20), cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(picture, told, place, font, 0.8, (0, 0, 0), 5, cv2.LINE_AA)
+        cv2.putText(picture, told, place, font, 0.8, (255, 255, 255), 2, cv2.LINE_AA)
+    return np.asarray(picture, dtype=np.uint8)
+
+
+def _rgb(colour: Any) -> tuple[int, int, int]:
+    return round(255 * colour.r), round(255 * colour.g), round(255 * colour.b)
+
+
+def _moments(folder: Path) -> Iterator[tuple[Any, Any | None, str]]:
+    """Image, annotations of the same capture time, and the words of the last gesture."""
+    waiting: dict[int, Any] = {}
+    outlines: dict[int, Any] = {}
+    told: list[tuple[int, str]] = []
+    camera = _camera(folder)
+    wanted = {CAMERA, topics.ACTION_OUTLINE.name, topics.GESTURES.name, topics.GESTURES_SCENE.name}
+    for recorded in recording_in(folder, "recording.mcap").read(wanted):
+        if recorded.topic == CAMERA:
+            waiting[recorded.log_ns] = recorded.message
+        elif recorded.topic == topics.ACTION_OUTLINE.name:
+            outlines[recorded.log_ns] = recorded.message
+        elif recorded.topic == topics.GESTURES_SCENE.name:
+            if camera is not None and recorded.log_ns in outlines:
+                _add_ball(outlines[recorded.log_ns], recorded.message, camera)
+        elif recorded.message.kind == Gesture.KIND_POINTED_AT:
+            at = recorded.message
+            told.append((recorded.log_ns, f"points at ({100 * at.x:.0f}, {100 * at.y:.0f}) cm"))
+    for time_ns, image in waiting.items():
+        recent = [words for at, words in told if 0 <= time_ns - at <= SHOWN_S * 1e9]
+        yield image, outlines.get(time_ns), recent[-1] if recent else ""
+
+
+def _camera(folder: Path) -> CalibratedCamera | None:
+    """The first of the cameras, if their calibration lies in the run's folder."""
+    path = folder / "cameras.yaml"
+    return read_cameras(path)[0] if path.is_file() else None
+
+
+def _add_ball(outline: Any, scene: Any, camera: CalibratedCamera) -> None:
+    """Adds the balls of a `foxglove.SceneUpdate` to annotations of the camera's image."""
+    for ball in (ball for entity in scene.entities for ball in entity.spheres):
+        place = ball.pose.position
+        x, y = camera.project(np.array([place.x, place.y, place.z]))
+        if np.isfinite((x, y)).all():
+            circle = outline.circles.add(diameter=BALL_PX)
+            circle.position.x, circle.position.y = x, y
+            circle.fill_color.CopyFrom(ball.color)

@@ -1,0 +1,261 @@
+"""A finished run read from its folder: what was said on the bus and what really happened.
+
+Everything is cut at the moment at which the application said that it was done: how much is recorded after that depends
+on how fast the processes were stopped, and so on the wall clock.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.bus import topics
+from paramove.documents.positions import read_document
+from paramove.runs.traffic import Traffic
+from paramove.input_error import InputError
+from paramove.msgs.rule_pb2 import ApplicationStage
+from paramove.recording.parts import PartedRecording
+from paramove.recording.reader import Recorded
+
+FloatArray = NDArray[np.float64]
+
+HEAVY = frozenset(
+    topic.name
+    for topic in (
+        *(topics.CAMERA_IMAGE, *topics.CAMERA_IMAGES, topics.WIRE_HOAP3_STREAM),
+        *(topics.ACTION_OUTLINE, topics.ACTION_SCENE),
+    )
+)
+"""Topics of which only the traffic is kept."""
+SAID_AT_THE_END = frozenset({topics.APPLICATION_STAGE.name, topics.SPEECH.name})
+
+
+class RunFolderError(InputError):
+    """A folder that holds no run that can be evaluated; the message says what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What really happened, in the right shoulder's frame, m. N states.
+
+    Attributes:
+        layout: The world's constants (`TruthLayout`, world frame).
+        time_s: [N].
+        gripper, commanded: Gripper site in the world, and of the commanded joints by forward kinematics, each [N, 3].
+        objects: Name -> centres, [N, 3].
+        upright: Name -> cosine of the tilt, [N].
+        held_by_instructor: Name -> [N].
+        unwanted_contacts, penetration_mm: Since the start, [N].
+        contacts: Pairs in contact, per state.
+        instructor: What the instructor does, per state.
+    """
+
+    layout: Any
+    time_s: FloatArray
+    gripper: FloatArray
+    commanded: FloatArray
+    objects: dict[str, FloatArray]
+    upright: dict[str, FloatArray]
+    held_by_instructor: dict[str, NDArray[np.bool_]]
+    unwanted_contacts: NDArray[np.int_]
+    penetration_mm: FloatArray
+    contacts: tuple[tuple[str, ...], ...]
+    instructor: tuple[str, ...]
+
+    @property
+    def shoulder(self) -> FloatArray:
+        """Origin of the shoulder's frame in the world, [3], m."""
+        return np.array(self.layout.world_from_shoulder)
+
+    @property
+    def surface_z(self) -> float:
+        """Height of the working plane, m."""
+        return float(self.layout.surface_z - self.shoulder[2])
+
+    @property
+    def openings(self) -> dict[str, FloatArray]:
+        """Name -> centre (x, y), m."""
+        return {o.name: np.array([o.x, o.y]) - self.shoulder[:2] for o in self.layout.openings}
+
+    @property
+    def opening_of(self) -> dict[str, str]:
+        """Object -> name of the opening that it belongs to."""
+        return {rule.object: rule.opening for rule in self.layout.rules}
+
+    def at(self, time_s: float) -> int:
+        """Place of the state nearest to a time."""
+        return int(np.abs(self.time_s - time_s).argmin())
+
+
+@dataclass(frozen=True)
+class RecordingGap:
+    """Nothing was recorded between two times, s, in `recording` (what was said) or `truth`."""
+
+    recording: str
+    begin_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """All that is needed to evaluate a run.
+
+    Attributes:
+        folder: Of the run.
+        said: Topic name -> messages in order; without those of `HEAVY`.
+        traffic: Counts of every recorded topic.
+        truth: What really happened.
+        verdict: Of `truth.json`.
+        facts: Of `run.yaml`.
+        end_s: When the application was done, else when the recording ended.
+        done: Whether the application said that it was done.
+        gaps: Times at which nothing was recorded: the recorder or the judge was being started again, or the disk full.
+    """
+
+    folder: Path
+    said: dict[str, list[Recorded]]
+    traffic: Traffic
+    truth: Truth
+    verdict: dict[str, Any]
+    facts: dict[str, Any] = field(default_factory=dict)
+    end_s: float = 0.0
+    done: bool = False
+    gaps: tuple[RecordingGap, ...] = ()
+
+    def heard(self, topic: topics.Topic) -> list[Recorded]:
+        """Messages of a topic, in order."""
+        return self.said.get(topic.name, [])
+
+
+def load_run(folder: Path) -> RecordedRun:
+    """Read a run's folder.
+
+    Raises:
+        RunFolderError: There is no recording or no truth in it, or they are empty.
+    """
+    recording, truth_file = recording_in(folder, "recording.mcap"), recording_in(folder, "truth.mcap")
+    said, traffic = _read_recording(recording)
+    end_ns, done = _end_of(said, traffic)
+    kept = {
+        name: [m for m in messages if m.publish_ns < end_ns or (m.publish_ns == end_ns and name in SAID_AT_THE_END)]
+        for name, messages in said.items()
+    }
+    traffic.cut(end_ns)
+    truth = _read_truth(truth_file, end_ns)
+    return RecordedRun(
+        folder=folder,
+        said=kept,
+        traffic=traffic,
+        truth=truth,
+        verdict=_read_json(folder / "truth.json"),
+        facts=_read_yaml(folder / "run.yaml"),
+        end_s=end_ns * 1e-9,
+        done=done,
+        gaps=_gaps({"recording": recording, "truth": truth_file}, end_ns),
+    )
+
+
+def gaps_in(folder: Path) -> tuple[RecordingGap, ...]:
+    """The gaps of all recordings of a run, which has them only where there are further parts."""
+    found = {name: PartedRecording(folder / f"{name}.mcap") for name in ("recording", "truth")}
+    for recording in found.values():
+        if len(recording.parts) > 1:
+            for _ in recording.read():
+                pass  # the recording learns of its gaps
+    return _gaps(found)
+
+
+def _gaps(recordings: Mapping[str, PartedRecording], end_ns: float = float("inf")) -> tuple[RecordingGap, ...]:
+    return tuple(
+        RecordingGap(name, gap.begin_ns * 1e-9, min(gap.end_ns, end_ns) * 1e-9)
+        for name, parts in recordings.items()
+        for gap in parts.gaps
+        if gap.begin_ns < end_ns
+    )
+
+
+def recording_in(folder: Path, name: str) -> PartedRecording:
+    """The recording of that name, finished or not, with all its parts; raises RunFolderError."""
+    recording = PartedRecording(folder / name)
+    if recording.parts:
+        return recording
+    found = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
+    raise RunFolderError(f"{folder} holds no {name} ({found}); a folder below runs/ of a simulated run is needed")
+
+
+def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded]], Traffic]:
+    said: dict[str, list[Recorded]] = defaultdict(list)
+    traffic = Traffic()
+    for recorded in recording.read():
+        traffic.take(recorded)
+        if recorded.topic not in HEAVY:
+            said[recorded.topic].append(recorded)
+    if not said:
+        raise RunFolderError(f"{_names(recording)} holds no message")
+    return dict(said), traffic
+
+
+def _end_of(said: dict[str, list[Recorded]], traffic: Traffic) -> tuple[int, bool]:
+    for recorded in said.get(topics.APPLICATION_STAGE.name, []):
+        if recorded.message.stage == ApplicationStage.STAGE_DONE:
+            return recorded.publish_ns, True
+    return traffic.last_ns, False
+
+
+def _names(recording: PartedRecording) -> str:
+    return ", ".join(map(str, recording.parts))
+
+
+def _read_truth(recording: PartedRecording, end_ns: int) -> Truth:
+    layout: Any = None
+    states: list[Any] = []
+    for recorded in recording.read({topics.TRUTH_LAYOUT.name, topics.TRUTH_STATE.name}):
+        if recorded.topic == topics.TRUTH_LAYOUT.name:
+            layout = recorded.message
+        elif recorded.message.time_ns <= end_ns:
+            states.append(recorded.message)
+    if layout is None or not states:
+        raise RunFolderError(f"{_names(recording)} holds no {'state' if layout is not None else 'layout'} of the world")
+    shoulder = np.array(layout.world_from_shoulder)
+    objects: dict[str, list[Any]] = defaultdict(list)
+    for state in states:
+        for body in state.objects:
+            objects[body.name].append(body)
+    return Truth(
+        layout=layout,
+        time_s=np.array([state.time_ns for state in states]) * 1e-9,
+        gripper=np.array([state.gripper for state in states]) - shoulder,
+        commanded=np.array([state.gripper_commanded for state in states]) - shoulder,
+        objects={name: np.array([(b.x, b.y, b.z) for b in bodies]) - shoulder for name, bodies in objects.items()},
+        upright={name: np.array([_upright(b) for b in bodies]) for name, bodies in objects.items()},
+        held_by_instructor={name: np.array([b.held_by_instructor for b in bodies]) for name, bodies in objects.items()},
+        unwanted_contacts=np.array([state.unwanted_contacts for state in states]),
+        penetration_mm=np.array([state.deepest_penetration_mm for state in states]),
+        contacts=tuple(tuple(state.contacts) for state in states),
+        instructor=tuple(state.instructor for state in states),
+    )
+
+
+def _upright(body: Any) -> float:
+    x, y, _, _ = body.quaternion_xyzw
+    return float(1 - 2 * (x * x + y * y))
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {"success": False, "reason": f"the judge wrote no {path.name}"}
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        return {}
+    return read_document(path, "file of a run", RunFolderError).data

@@ -1,0 +1,109 @@
+"""The video of relocation by pointing: what camera 1 sees and the ball, the world beside it, what the robot says."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
+
+from paramove.bus import topics
+from paramove.documents.atomic_writing import replacing
+from paramove.runs.pointing_video import drawn
+from paramove.runs.recorded_run import RecordedRun, recording_in
+from paramove.runs.video_frame import (
+    ACCENT,
+    BACK,
+    BOTTOM_PX,
+    FAINT,
+    PANEL,
+    SIZE,
+    TEXT,
+    TOP_PX,
+    label,
+    paste,
+)
+from paramove.runs.video_writer import VideoWriter
+from paramove.vision.frames import decode
+
+Picture = NDArray[np.uint8]
+
+FRAMES_PER_S = 10.0
+EVERY = 3
+"""So many-th image; at 15 Hz the video is twice as fast as the run."""
+LINGER_FRAMES = 20
+MOST_LETTERS = 104
+CAMERA = topics.CAMERA_IMAGES[0].name
+
+
+def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
+    """Write `relocations.mp4` into the run's folder; None if no view was recorded (headless). Raises VideoError."""
+    views = sum(1 for _ in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_VIEW.name}))
+    if not views:
+        return None
+    words = [(r.publish_ns, r.message.sentence) for r in run.heard(topics.SPEECH)]
+    states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.heard(topics.APPLICATION_STAGE)]
+    path = run.folder / "relocations.mp4"
+    title = f"relocation by pointing, seed {run.truth.layout.seed}"
+    with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
+        picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        moments = track(_moments(run.folder), "video", views // EVERY, console=console, transient=True)
+        for time_ns, camera, outline, view in moments:
+            picture = composed(camera, outline, view)
+            paste(picture, label(title, 15, TEXT, bold=True), 12, 9)
+            paste(picture, label(f"{_newest(states, time_ns)}", 15, ACCENT), 420, 9)
+            clock = label(f"{time_ns * 1e-9:6.1f} s   2× speed", 14, FAINT)
+            paste(picture, clock, SIZE[0] - clock.shape[1] - 12, 10)
+            said = label(_shown(_newest(words, time_ns)), 16, TEXT, bold=True)
+            paste(picture, said, 14, TOP_PX + PANEL[1] + 14)
+            writer.write(picture)
+        for _ in range(LINGER_FRAMES):
+            writer.write(picture)
+    return path
+
+
+def composed(camera_bgr: Picture, outline: Any | None, view: Picture) -> Picture:
+    """Both images side by side, RGB, with room above and below."""
+    frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    frame[:] = BACK
+    body = frame[TOP_PX : SIZE[1] - BOTTOM_PX]
+    body[:, : PANEL[0]] = drawn(camera_bgr, outline, "", PANEL)
+    body[:, PANEL[0] :] = cv2.resize(view, PANEL)
+    paste(body, label("camera 1, the tracked arm, and the ball where it points", 12, TEXT), 8, PANEL[1] - 22, True)
+    paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, True)
+    return frame
+
+
+def _moments(folder: Path) -> Iterator[tuple[int, Picture, Any | None, Picture]]:
+    """Time, image BGR and its annotations, and the view RGB, of every so-many-th view."""
+    wanted = {CAMERA, topics.ACTION_OUTLINE.name}
+    outlines: dict[int, Any] = {}
+    recorded_images = recording_in(folder, "recording.mcap").read(wanted)
+    image, following = None, next(recorded_images, None)
+    for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+        while following is not None and following.publish_ns <= view.publish_ns:
+            if following.topic == CAMERA:
+                image = following
+            else:
+                outlines = {following.log_ns: following.message}
+            following = next(recorded_images, None)
+        if place % EVERY == 0 and image is not None:
+            newest = next(iter(outlines.values()), None)
+            yield view.log_ns, decode(image.message), newest, decode(view.message)[:, :, ::-1]
+
+
+def _newest(said: list[tuple[int, str]], time_ns: int) -> str:
+    at = bisect_right(said, time_ns, key=lambda one: one[0])
+    return said[at - 1][1] if at else ""
+
+
+def _shown(sentence: str) -> str:
+    if not sentence:
+        return ""
+    return f"“{sentence if len(sentence) <= MOST_LETTERS else sentence[: MOST_LETTERS - 1] + '…'}”"

@@ -1,0 +1,186 @@
+"""The goals that the rule learner set, each with how it went and when."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.bus import topics
+from paramove.runs.recorded_run import RecordedRun
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage
+
+FloatArray = NDArray[np.float64]
+
+_LAST = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
+_HULLS: dict[int, str] = {RelocationStatus.HULL_INSIDE: "inside", RelocationStatus.HULL_OUTSIDE: "outside"}
+
+
+@dataclass(frozen=True, eq=False)
+class Relocation:
+    """One goal.
+
+    Attributes:
+        goal: As it was said first.
+        stage: Name of the application's stage: calibrate, learn, apply.
+        begun_s, ended_s: From the goal to its last status (or the end of the run).
+        result: "succeeded", "failed", "refused", or "unfinished".
+        reason: What the synthesizer said of it.
+        held: Whether the object was felt in the hand when it was to be carried.
+        elbow_turn_rad: Largest turn of the elbow.
+        from_hull, to_hull: Whether the goal's places lie "inside" or "outside" the convex hull of the targets that the
+            movement model was trained with; None where there is no such place or it is not known.
+    """
+
+    goal: Any
+    stage: str
+    begun_s: float
+    ended_s: float
+    result: str
+    reason: str
+    held: bool
+    elbow_turn_rad: float
+    from_hull: str | None = None
+    to_hull: str | None = None
+
+    @property
+    def fetches(self) -> bool:
+        """Whether an object was to be grasped from the table."""
+        return bool(self.goal.kind == RelocationGoal.KIND_RELOCATE)
+
+    @property
+    def kind(self) -> str:
+        """Kind of goal in words."""
+        return str(RelocationGoal.Kind.Name(self.goal.kind)).removeprefix("KIND_").lower()
+
+    @property
+    def source(self) -> FloatArray:
+        """Where it was to be fetched, [3], m."""
+        position = getattr(self.goal, "from")
+        return np.array([position.x, position.y, position.z])
+
+    @property
+    def target(self) -> FloatArray:
+        """Where it was to be put, [3], m."""
+        return np.array([self.goal.to.x, self.goal.to.y, self.goal.to.z])
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A trajectory that the arm executed.
+
+    Attributes:
+        goal_id: Of the goal that it belongs to.
+        begun_s: When its time was 0, in the run's time.
+        reached_s: How far it got, along the trajectory.
+        times: [K], s.
+        angles: [K, J], rad; `joints` their names.
+        phases: Name -> start, s.
+    """
+
+    goal_id: str
+    begun_s: float
+    reached_s: float
+    times: FloatArray
+    angles: FloatArray
+    joints: tuple[str, ...]
+    phases: dict[str, float]
+
+    def angles_at(self, time_s: float) -> FloatArray:
+        """Planned angles [J] at a time along the trajectory."""
+        return np.array([np.interp(time_s, self.times, column) for column in self.angles.T])
+
+    def middle_of(self, phase: str) -> float | None:
+        """Middle of a phase along the trajectory, s; None if it has none or did not get there."""
+        if phase not in self.phases:
+            return None
+        start = self.phases[phase]
+        end = min((other for other in self.phases.values() if other > start), default=float(self.times[-1]))
+        middle = (start + end) / 2
+        return middle if middle <= self.reached_s else None
+
+
+def stages_of(run: RecordedRun) -> list[dict[str, Any]]:
+    """Stages in order: name, begin_s, end_s."""
+    found: list[dict[str, Any]] = []
+    for recorded in run.heard(topics.APPLICATION_STAGE):
+        name = ApplicationStage.Stage.Name(recorded.message.stage).removeprefix("STAGE_").lower()
+        if not found or found[-1]["stage"] != name:
+            if found:
+                found[-1]["end_s"] = recorded.publish_ns * 1e-9
+            found.append({"stage": name, "begin_s": recorded.publish_ns * 1e-9, "end_s": run.end_s})
+    return [stage for stage in found if stage["stage"] != "done"]
+
+
+def relocations_of(run: RecordedRun) -> list[Relocation]:
+    """Every goal in order; one that was sent again counts once."""
+    stages = stages_of(run)
+    begins = [stage["begin_s"] for stage in stages]
+    statuses: dict[str, list[Any]] = {}
+    for recorded in run.heard(topics.RELOCATION_STATUS):
+        statuses.setdefault(recorded.message.goal_id, []).append(recorded)
+    found: dict[str, Relocation] = {}
+    for recorded in run.heard(topics.RELOCATION_GOAL):
+        goal, begun_s = recorded.message, recorded.publish_ns * 1e-9
+        if goal.id not in found:
+            # A goal said with a stage's last breath belongs to that stage: a stage never begins with a fetch.
+            place = max(bisect_right(begins, begun_s) - 1, 0)
+            stage = stages[place]["stage"] if stages else ""
+            found[goal.id] = _relocation(goal, stage, begun_s, statuses.get(goal.id, []), run.end_s)
+    return list(found.values())
+
+
+def _relocation(goal: Any, stage: str, begun_s: float, statuses: list[Any], end_s: float) -> Relocation:
+    last = next((r for r in statuses if r.message.state in _LAST), None)
+    executing = [r.message for r in statuses if r.message.state == RelocationStatus.STATE_EXECUTING]
+    return Relocation(
+        goal=goal,
+        stage=stage,
+        begun_s=begun_s,
+        ended_s=last.publish_ns * 1e-9 if last is not None else end_s,
+        result=RelocationStatus.State.Name(last.message.state).removeprefix("STATE_").lower() if last else "unfinished",
+        reason=last.message.reason if last is not None else "",
+        held=any(status.phase == "carry" and status.holding for status in executing),
+        elbow_turn_rad=max((r.message.elbow_turn_rad for r in statuses), default=0.0),
+        from_hull=_hull_of(statuses, "from_hull"),
+        to_hull=_hull_of(statuses, "to_hull"),
+    )
+
+
+def _hull_of(statuses: list[Any], name: str) -> str | None:
+    found = [_HULLS[value] for r in statuses if (value := getattr(r.message, name)) in _HULLS]
+    return found[-1] if found else None
+
+
+def motions_of(run: RecordedRun) -> list[Motion]:
+    """Every trajectory that was begun, in order."""
+    progress: dict[str, list[tuple[float, float]]] = {}
+    for recorded in run.heard(topics.ARM_TRAJECTORY_STATUS):
+        status = recorded.message
+        if status.state == TrajectoryStatus.STATE_EXECUTING and status.time_s > 0:
+            at_s = status.captured.ToNanoseconds() * 1e-9
+            progress.setdefault(status.trajectory_id, []).append((at_s, status.time_s))
+        elif status.state == TrajectoryStatus.STATE_SUCCEEDED and status.trajectory_id in progress:
+            begun_s = progress[status.trajectory_id][0][0] - progress[status.trajectory_id][0][1]
+            progress[status.trajectory_id].append((begun_s + status.duration_s, status.duration_s))
+    found: dict[str, Motion] = {}
+    for recorded in run.heard(topics.ARM_TRAJECTORY):
+        message = recorded.message
+        if message.id in found or message.id not in progress:
+            continue
+        known = progress[message.id]
+        found[message.id] = Motion(
+            goal_id=message.id.rpartition("/")[0],
+            begun_s=float(np.median([at_s - time_s for at_s, time_s in known])),
+            reached_s=max(time_s for _, time_s in known),
+            times=np.array([point.time_s for point in message.points]),
+            angles=np.array([point.position_rad for point in message.points]),
+            joints=tuple(message.joints),
+            phases={phase.name: phase.start_s for phase in message.phases},
+        )
+    return list(found.values())

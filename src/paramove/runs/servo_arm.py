@@ -1,0 +1,163 @@
+"""Evaluates a run of a servo arm's tasks: `run.json` and `tasks.png` in its folder.
+
+Called by the launcher after the run, or by hand: `python -m paramove.runs.servo_arm RUN_FOLDER`. Exit codes: 0
+the arm reached every place and put every object where it belongs, by the recorded truth; 3 it did not; 66 no such run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from paramove.bus import topics
+from paramove.documents.positions import read_document
+from paramove.runs.after_a_run import evaluated, write_run_json
+from paramove.runs.recorded_run import RunFolderError
+from paramove.input_error import InputError
+from paramove.msgs.truth_pb2 import TruthState
+from paramove.recording.parts import PartedRecording
+
+Floats = NDArray[np.float64]
+
+REACHED_M, PLACED_M = 0.015, 0.010
+"""The hand hangs below where it is commanded: a servo holds a load by the error of its position."""
+
+
+@dataclass(frozen=True)
+class TaskResult:
+    """One task; places in the arm's base frame, m.
+
+    Attributes:
+        task: "reach" or "place".
+        wanted: The place.
+        found: Where the end effector came nearest to it, or where the object ended.
+        thing: Name of the object; "" of a reach.
+        error: Between the two, m.
+    """
+
+    task: str
+    wanted: tuple[float, ...]
+    found: tuple[float, ...]
+    thing: str
+    error: float
+
+    @property
+    def good(self) -> bool:
+        """Whether it is near enough."""
+        return self.error <= (REACHED_M if self.task == "reach" else PLACED_M)
+
+
+def results_of(tasks: Sequence[dict[str, Any]], states: Sequence[TruthState]) -> list[TaskResult]:
+    """What became of each task. Of an object that several tasks move, the last one counts."""
+    gripper = np.array([state.gripper for state in states])
+    begin, end = (_places(states[at]) for at in (0, -1))
+    found: dict[Any, TaskResult] = {}
+    for number, task in enumerate(tasks):
+        if task.get("reach") is not None:
+            wanted = np.array(task["reach"])
+            nearest = gripper[np.argmin(np.linalg.norm(gripper - wanted, axis=1))]
+            found[number] = _result("reach", wanted, nearest, "")
+        else:
+            wanted = np.array(task["place"])
+            thing = min(begin, key=lambda name: float(np.linalg.norm(begin[name] - task["pick"])))
+            begin[thing] = wanted
+            found[thing] = _result("place", wanted, end[thing], thing)
+    return list(found.values())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    return evaluated("paramove.runs.servo_arm", __doc__, {}, _evaluate, arguments)
+
+
+def _evaluate(options: argparse.Namespace, console: Console) -> bool:
+    folder = options.run_folder
+    states = _truth_in(folder)
+    results = results_of(_tasks_in(folder), states)
+    good = sum(one.good for one in results)
+    success = good == len(results) > 0
+    content = {"success": success, "good": good, "tasks": [{**asdict(one), "good": one.good} for one in results]}
+    numbers = write_run_json(folder, content)
+    word = "[bold green]SUCCESS[/]" if success else "[bold red]FAILURE[/]"
+    console.print(f"\n{word}: {good} of {len(results)} tasks done")
+    for one in results:
+        what = f"{one.thing or 'hand'} to {_metres(one.wanted)}"
+        mark = "" if one.good else "  <- too far"
+        console.print(f"  {one.task:6} {what:40} {1e3 * one.error:5.1f} mm away{mark}")
+    picture = _draw(folder / "tasks.png", results, states)
+    for path in (picture, numbers):
+        console.print(f"{path.name:16s} {path}", markup=False, soft_wrap=True)
+    return success
+
+
+def _truth_in(folder: Path) -> list[TruthState]:
+    recording = PartedRecording(folder / "truth.mcap")
+    read = recording.read((topics.TRUTH_STATE.name,))
+    states = [one.message for one in read if len(one.message.gripper) == 3]
+    if states:
+        return states
+    if not folder.is_dir():
+        raise RunFolderError(f"no run folder {folder}")
+    if not (folder / "nodes" / "judge.yaml").is_file():
+        raise RunFolderError(f"no truth.mcap in {folder}: only emulated runs, which have a node judge, write one")
+    raise RunFolderError(f"nothing to judge in {folder}: the run ended before anything was known of the emulated arm")
+
+
+def _tasks_in(folder: Path) -> list[dict[str, Any]]:
+    path = folder / "nodes" / "reacher.yaml"
+    try:
+        return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
+    except (InputError, KeyError, TypeError) as error:
+        raise RunFolderError(f"{path} does not tell the tasks of the run ({error!r})") from error
+
+
+def _places(state: TruthState) -> dict[str, Floats]:
+    return {body.name: np.array([body.x, body.y, body.z]) for body in state.objects}
+
+
+def _result(task: str, wanted: Floats, found: Floats, thing: str) -> TaskResult:
+    error = float(np.linalg.norm(found - wanted))
+    return TaskResult(task, tuple(wanted.tolist()), tuple(found.tolist()), thing, error)
+
+
+def _metres(place: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{value:.3f}" for value in place) + ") m"
+
+
+def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState]) -> Path:
+    """From above and from the side: the way of the hand, those of the objects, and the places."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    gripper = np.array([state.gripper for state in states])
+    ways = {name: np.array([_places(state)[name] for state in states]) for name in _places(states[0])}
+    for ax, (across, up), title in zip(axes, ((1, 0), (0, 2)), ("from above", "from the side"), strict=True):
+        ax.plot(gripper[:, across], gripper[:, up], color="0.6", linewidth=1, label="hand")
+        for name, way in ways.items():
+            colour = name.split("_")[0]
+            ax.plot(way[:, across], way[:, up], linewidth=2, color=colour, label=name.replace("_", " "))
+            ax.plot(way[-1, across], way[-1, up], "s", color=colour, markersize=5)  # what did not move has no way
+        for one in results:
+            ax.plot(one.wanted[across], one.wanted[up], "x", color="black", markersize=9)
+        ax.set_xlabel(f"{'xyz'[across]}, m")
+        ax.set_ylabel(f"{'xyz'[up]}, m")
+        ax.set_title(title)
+        ax.set_aspect("equal")
+        ax.locator_params(nbins=5)
+    axes[0].invert_xaxis()  # y grows to the left
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
+    figure.savefig(path, dpi=110)
+    return path
+
+
+if __name__ == "__main__":
+    sys.exit(main())

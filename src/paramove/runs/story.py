@@ -1,0 +1,122 @@
+"""What the robot saw, believed, said and did at any moment of a run, for captions."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any
+
+from paramove.bus import topics
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.relocations import Relocation
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.rule_pb2 import ApplicationStage
+from paramove.recording.reader import Recorded
+from paramove.vision.homography import PlaneHomography
+
+GESTURE_SHOWN_S = 1.5
+_IN_WORDS = {
+    Gesture.KIND_APPEARED: "appeared",
+    Gesture.KIND_MOVED: "moves",
+    Gesture.KIND_RESTED: "rests",
+    Gesture.KIND_VANISHED: "vanished",
+    Gesture.KIND_POINTED_AT: "pointed at",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The robot's mind at one time.
+
+    Attributes:
+        stage: "calibrate", "learn", "apply", "done" or "".
+        sentence: What it said last.
+        rules: Object -> believed place (x, y), m.
+        goal: The goal under way, else None; `phase` of its motion.
+        gesture: The newest gesture if it is fresh, else None.
+        tracked: The newest `TrackedObjects`, else None.
+        homography: The robot's calibration, once it has one.
+    """
+
+    stage: str
+    sentence: str
+    rules: dict[str, tuple[float, float]]
+    goal: Relocation | None
+    phase: str
+    gesture: Any
+    tracked: Any
+    homography: PlaneHomography | None
+
+    @property
+    def doing(self) -> str:
+        """The goal in words."""
+        if self.goal is None:
+            return ""
+        name = f" {self.goal.goal.object}" if self.goal.goal.object else ""
+        attempt = f", attempt {self.goal.goal.attempt}" if self.goal.goal.attempt > 1 else ""
+        return f"{self.goal.kind.replace('_', ' ')}{name}{attempt}{': ' + self.phase if self.phase else ''}"
+
+    @property
+    def seeing(self) -> str:
+        """The gesture in words."""
+        if self.gesture is None or self.gesture.kind not in _IN_WORDS:
+            return ""
+        return f"{self.gesture.object or 'hand'} {_IN_WORDS[self.gesture.kind]}"
+
+
+class Story:
+    """Looks up the newest of everything.
+
+    Args:
+        run: The run.
+        relocations: Its goals.
+    """
+
+    def __init__(self, run: RecordedRun, relocations: list[Relocation]) -> None:
+        self._said = {
+            topic: _Newest(run.heard(topic))
+            for topic in (
+                topics.APPLICATION_STAGE,
+                topics.SPEECH,
+                topics.RULES,
+                topics.GESTURES,
+                topics.RELOCATION_STATUS,
+                topics.CALIBRATION_PLANE,
+            )
+        }
+        # What is drawn onto an image belongs to the time at which the image was taken.
+        tracked = run.heard(topics.OBJECTS_TRACKED)
+        self._said[topics.OBJECTS_TRACKED] = _Newest(tracked, [recorded.log_ns for recorded in tracked])
+        self._relocations = relocations
+
+    def at(self, time_s: float) -> Moment:
+        """The robot's mind at a time, s."""
+        newest = {topic: found.at(time_s) for topic, found in self._said.items()}
+        stage, speech, rules = (newest[topic] for topic in (topics.APPLICATION_STAGE, topics.SPEECH, topics.RULES))
+        gesture, tracked, status = (
+            newest[topic] for topic in (topics.GESTURES, topics.OBJECTS_TRACKED, topics.RELOCATION_STATUS)
+        )
+        plane = newest[topics.CALIBRATION_PLANE]
+        goal = next((g for g in self._relocations if g.begun_s <= time_s < g.ended_s and g.result != "refused"), None)
+        of_goal = goal is not None and status is not None and status.message.goal_id == goal.goal.id
+        fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_SHOWN_S
+        return Moment(
+            stage=ApplicationStage.Stage.Name(stage.message.stage).removeprefix("STAGE_").lower() if stage else "",
+            sentence=speech.message.sentence if speech is not None else "",
+            rules={rule.object: (rule.x, rule.y) for rule in rules.message.rules} if rules is not None else {},
+            goal=goal,
+            phase=status.message.phase if of_goal and status is not None else "",
+            gesture=gesture.message if fresh and gesture is not None else None,
+            tracked=tracked.message if tracked is not None else None,
+            homography=PlaneHomography.from_message(plane.message) if plane is not None else None,
+        )
+
+
+class _Newest:
+    def __init__(self, messages: list[Recorded], times_ns: list[int] | None = None) -> None:
+        self._messages = messages
+        self._times = [1e-9 * t for t in times_ns or [recorded.publish_ns for recorded in messages]]
+
+    def at(self, time_s: float) -> Recorded | None:
+        place = bisect_right(self._times, time_s) - 1
+        return self._messages[place] if place >= 0 else None

@@ -1,0 +1,190 @@
+"""One picture of the demo video: the camera with what the robot makes of it, the world beside it, captions around."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import cv2
+import numpy as np
+from matplotlib import font_manager
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from paramove.runs.story import Moment
+from paramove.msgs.tracked_objects_pb2 import TrackedObject
+
+Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+PANEL = (480, 360)
+TOP_PX, BOTTOM_PX = 36, 108
+SIZE = (2 * PANEL[0], TOP_PX + PANEL[1] + BOTTOM_PX)
+
+BACK: Colour = (24, 27, 33)
+FAINT: Colour = (130, 138, 150)
+TEXT: Colour = (236, 239, 244)
+ACCENT: Colour = (98, 190, 255)
+COLOURS: dict[str, Colour] = {"yellow": (255, 205, 40), "green": (70, 205, 95), "blue": (95, 140, 255)}
+HAND: Colour = (255, 80, 190)
+STAGES = ("calibrate", "learn", "apply")
+
+
+class VideoFrame:
+    """Composes pictures, RGB [H, W, 3] of `SIZE`.
+
+    Args:
+        title: Stands at the top left.
+        factor: By which the video is faster than the run.
+    """
+
+    def __init__(self, title: str, factor: float) -> None:
+        self._title, self._factor = title, factor
+        self._steady = SteadyImage()
+
+    def draw(self, camera: Picture, view: Picture, moment: Moment, time_s: float, end_s: float) -> Picture:
+        """A picture from the two images, RGB, and the robot's mind."""
+        frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        frame[:] = BACK
+        body = frame[TOP_PX : TOP_PX + PANEL[1]]
+        seen = self._steady.update(np.asarray(cv2.resize(camera, PANEL), dtype=np.uint8))
+        draw_mind(seen, moment)
+        body[:, : PANEL[0]] = seen
+        body[:, PANEL[0] :] = cv2.resize(view, PANEL)
+        paste(body, label("camera: what the robot sees", 12, TEXT), 8, PANEL[1] - 22, shade=True)
+        paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, shade=True)
+        self._top(frame[:TOP_PX], moment, time_s)
+        _captions(frame[TOP_PX + PANEL[1] :], moment)
+        done = round(SIZE[0] * min(1.0, time_s / end_s)) if end_s > 0 else 0
+        frame[-3:, :done] = ACCENT
+        return frame
+
+    def _top(self, bar: Picture, moment: Moment, time_s: float) -> None:
+        paste(bar, label(self._title, 15, TEXT, bold=True), 12, 9)
+        reached = (
+            len(STAGES) if moment.stage == "done" else STAGES.index(moment.stage) if moment.stage in STAGES else -1
+        )
+        x = 400
+        for place, stage in enumerate(STAGES):
+            now = place == reached
+            colour = ACCENT if now else TEXT if place < reached else FAINT
+            text = f"{'✓' if place < reached else place + 1} {stage}"
+            sprite = label(text, 15, colour, bold=now)
+            paste(bar, sprite, x, 9)
+            x += sprite.shape[1] + 26
+        clock = label(f"{time_s:6.1f} s   {self._factor:g}× speed", 14, FAINT)
+        paste(bar, clock, SIZE[0] - clock.shape[1] - 12, 10)
+
+
+class SteadyImage:
+    """Holds what does not change, so that the sensor's noise does not fill the video file."""
+
+    CHANGE = 9  # of 255, in any colour, after smoothing
+
+    def __init__(self) -> None:
+        self._held: Picture | None = None
+        self._seed = np.ones((3, 3), dtype=np.uint8)
+        self._around = np.ones((9, 9), dtype=np.uint8)
+
+    def update(self, image: Picture) -> Picture:
+        """The image with new content only where it differs from what is held."""
+        smooth = np.asarray(cv2.GaussianBlur(image, (5, 5), 0), dtype=np.uint8)
+        if self._held is None:
+            self._held = smooth
+        red, green, blue = cv2.split(cv2.absdiff(smooth, self._held))
+        _, changed = cv2.threshold(cv2.max(cv2.max(red, green), blue), self.CHANGE, 255, cv2.THRESH_BINARY)
+        changed = cv2.dilate(cv2.morphologyEx(changed, cv2.MORPH_OPEN, self._seed), self._around)
+        cv2.copyTo(smooth, changed, self._held)
+        return self._held.copy()
+
+
+def draw_mind(image: Picture, moment: Moment) -> None:
+    """Tracked objects, the hand, the goal, the believed openings, in place onto the camera's image."""
+    if moment.homography is not None:
+        for name, place in moment.rules.items():
+            at = _pixel(moment.homography, place)
+            cv2.circle(image, at, 13, COLOURS.get(name, TEXT), 1, cv2.LINE_AA)
+            cv2.drawMarker(image, at, COLOURS.get(name, TEXT), cv2.MARKER_CROSS, 8, 1, cv2.LINE_AA)
+        if moment.goal is not None and moment.goal.fetches:
+            start = _pixel(moment.homography, tuple(moment.goal.source[:2]))
+            end = _pixel(moment.homography, tuple(moment.goal.target[:2]))
+            cv2.arrowedLine(image, start, end, ACCENT, 2, cv2.LINE_AA, tipLength=0.08)
+    for item in moment.tracked.objects if moment.tracked is not None else ():
+        if item.kind == TrackedObject.KIND_HAND:
+            _draw_hand(image, item)
+        else:
+            _draw_object(image, item, moment)
+
+
+def _draw_hand(image: Picture, item: Any) -> None:
+    corners = np.array([(p.u_px, p.v_px) for p in item.outline]).round().astype(np.int32).reshape(-1, 1, 2)
+    if len(corners):
+        cv2.polylines(image, [corners], True, HAND, 1, cv2.LINE_AA)
+    cv2.circle(image, (round(item.u_px), round(item.v_px)), 3, HAND, -1, cv2.LINE_AA)
+
+
+def _draw_object(image: Picture, item: Any, moment: Moment) -> None:
+    colour = COLOURS.get(item.name, TEXT)
+    left, top = round(item.left_px) - 2, round(item.top_px) - 2
+    right, bottom = left + round(item.width_px) + 4, top + round(item.height_px) + 4
+    cv2.rectangle(image, (left, top), (right, bottom), colour, 1, cv2.LINE_AA)
+    gesture = moment.gesture
+    fresh = gesture is not None and gesture.object == item.name
+    text = moment.seeing if fresh else item.name
+    sprite = label(text, 12, colour, bold=fresh)
+    paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
+
+
+def _captions(panel: Picture, moment: Moment) -> None:
+    if moment.sentence:
+        paste(panel, label(f"“{_shortened(moment.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
+    paste(panel, label("believes", 13, FAINT), 14, 46)
+    x = 84
+    for name, (u, v) in moment.rules.items():
+        sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 14, COLOURS.get(name, TEXT))
+        paste(panel, sprite, x, 45)
+        x += sprite.shape[1] + 26
+    if not moment.rules:
+        paste(panel, label("nothing yet", 14, FAINT), x, 45)
+    paste(panel, label("does", 13, FAINT), 14, 74)
+    paste(panel, label(moment.doing or "waits", 14, ACCENT if moment.doing else FAINT), 84, 73)
+    paste(panel, label("notices", 13, FAINT), 494, 74)
+    paste(panel, label(moment.seeing or "–", 14, TEXT if moment.seeing else FAINT), 560, 73)
+
+
+def _shortened(text: str, length: int) -> str:
+    return text if len(text) <= length else text[: length - 1] + "…"
+
+
+def _pixel(homography: Any, place: tuple[float, float]) -> tuple[int, int]:
+    u, v = homography.image_from_plane(*place)
+    return round(float(np.clip(u, -999, 9999))), round(float(np.clip(v, -999, 9999)))
+
+
+@lru_cache(maxsize=8)
+def _font(size: int, bold: bool) -> ImageFont.FreeTypeFont:
+    weight = "bold" if bold else "normal"
+    return ImageFont.truetype(font_manager.findfont(f"DejaVu Sans:{weight}"), size)
+
+
+@lru_cache(maxsize=1024)
+def label(text: str, size: int, colour: Colour, bold: bool = False) -> Picture:
+    """A text as RGBA [h, w, 4]."""
+    font = _font(size, bold)
+    left, _, right, _ = font.getbbox(text)
+    ascent, descent = font.getmetrics()
+    image = Image.new("RGBA", (max(1, round(right - left) + 2), ascent + descent), (*colour, 0))
+    ImageDraw.Draw(image).text((1 - left, 0), text, font=font, fill=(*colour, 255))
+    return np.asarray(image)
+
+
+def paste(image: Picture, sprite: Picture, x: int, y: int, shade: bool = False) -> None:
+    """Blend a sprite in at (x, y), in place, cut at the borders; with `shade` onto a darkened ground."""
+    left, top = max(0, x), max(0, y)
+    part = image[top : max(0, y + sprite.shape[0]), left : max(0, x + sprite.shape[1])]
+    if part.size == 0:
+        return
+    cut = sprite[top - y : top - y + part.shape[0], left - x : left - x + part.shape[1]]
+    alpha = cut[..., 3:].astype(np.float32) / 255
+    ground = part * 0.45 if shade else part
+    part[:] = (ground * (1 - alpha) + cut[..., :3] * alpha).astype(np.uint8)

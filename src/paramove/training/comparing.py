@@ -1,0 +1,83 @@
+"""Models side by side: what they were told, how far apart their movements are, which explains a set better."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.demonstrations import DemonstrationError, DemonstrationSet
+from paramove.input_error import InputError
+from paramove.phmm import MovementClassifier, ParametricHMM
+from paramove.training.drawing import bounds, dimension, parameter_names, point_names, raster
+from paramove.training.examining import Examiner
+from paramove.training.leaving_out import covers, synthesis_error
+
+Floats = NDArray[np.float64]
+
+FRAMES = 100
+
+
+def distance_between(first: ParametricHMM, second: ParametricHMM) -> dict[str, float]:
+    """How far apart the movements of two models are: over a raster of the theta that both were trained for.
+
+    Root mean square over body points, frames and theta, and the greatest distance of a body point, m.
+
+    Raises InputError if they have other points or parameters, or no theta in common.
+    """
+    if point_names(first) != point_names(second) or parameter_names(first) != parameter_names(second):
+        raise InputError(
+            "movements of models with other points or parameters cannot be compared: "
+            f"{', '.join(point_names(first))} ({', '.join(parameter_names(first))}) and "
+            f"{', '.join(point_names(second))} ({', '.join(parameter_names(second))})"
+        )
+    shared = np.stack([
+        np.maximum(bounds(first)[0], bounds(second)[0]), np.minimum(bounds(first)[1], bounds(second)[1])
+    ])  # fmt: skip
+    if (shared[0] > shared[1]).any():
+        raise InputError("the models were trained for other parameters: their bounds have nothing in common")
+    distances = []
+    for theta in raster(shared):
+        difference = first.synthesize(theta, FRAMES) - second.synthesize(theta, FRAMES)
+        distances.append(np.linalg.norm(difference.reshape(FRAMES, -1, 3), axis=2))
+    values = np.array(distances)
+    return {"rms_m": float(np.sqrt((values**2).mean())), "greatest_m": float(values.max())}
+
+
+def on_set(model: ParametricHMM, shown: DemonstrationSet) -> dict[str, Any]:
+    """How well a model explains the movements of its action in a set.
+
+    Raises DemonstrationError if the set has no movement of the action, or other parameters.
+    """
+    action = model.description.action if model.description else shown.actions[0]
+    examiner = Examiner(MovementClassifier.from_models({action: model}))
+    names = parameter_names(model)
+    errors, inside, likelihoods, synthesis = [], [], [], []
+    for movement in shown.select(action):
+        found = examiner.examine(movement)
+        if found.labelled is None:
+            raise DemonstrationError(
+                f"{movement.source}: the model has the parameters {', '.join(names)}, the set has "
+                f"{', '.join(shown.parameter_names) or 'none'}"
+            )
+        frames = found.movement.frames
+        errors.append(found.estimate.theta - found.labelled)
+        inside.append(covers(found.estimate.theta, found.estimate.covariance, found.labelled))
+        count = model.resampled_frames or len(frames)
+        likelihoods.append(model.log_likelihood(frames, found.labelled) / count)
+        synthesis.append(synthesis_error(model, found.labelled, frames, dimension(model) // 3))
+    rms = np.sqrt((np.array(errors) ** 2).mean(axis=0))
+    return {
+        "movements": len(errors),
+        "log_likelihood_per_frame": float(np.mean(likelihoods)),
+        "theta_rms": dict(zip(names, rms.tolist(), strict=True)),
+        "theta_covered": float(np.mean(inside)),
+        "synthesis_median_m": float(np.median(synthesis)),
+    }
+
+
+def table_of_distances(models: Sequence[ParametricHMM]) -> list[list[dict[str, float]]]:
+    """Distances of every model from every other. Raises InputError as `distance_between` does."""
+    return [[distance_between(one, other) for other in models] for one in models]

@@ -1,0 +1,125 @@
+"""Parts of the pictures of models: axes, paths in space, ellipses, rasters of theta."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from paramove.demonstrations.plots import POINTS_FIRST
+from paramove.input_error import InputError
+from paramove.phmm import ParametricHMM
+from paramove.supervision.names import nearest
+from paramove.training.examples import is_place
+
+Floats = NDArray[np.float64]
+
+COLOURS = "viridis"
+INK, FAINT, WARN = "#1d2530", "#aab3bd", "#b3372b"
+ACTION_COLOURS = ("#3367d6", "#2f9e57", "#d9722b", "#8a4fbf", "#c2375b", "#6b7480", "#a08a00", "#1f9aa8")
+LINES = {1: 9, 2: 5, 3: 3}
+"""How many values of each parameter a raster has, by the number of parameters."""
+
+
+class Shown(NamedTuple):
+    """The body point of a model that is drawn.
+
+    Attributes:
+        name: of the point.
+        columns: of its x, y, z in a frame.
+    """
+
+    name: str
+    columns: slice
+
+
+def shown_point(model: ParametricHMM, name: str | None = None) -> Shown:
+    """The named point, else the fingertip where there is one, else the last.
+
+    Raises InputError for a name that the model does not have, or a model whose frames are not places of points.
+    """
+    names = point_names(model)
+    if name is not None and name not in names:
+        raise InputError(f"there is no point '{name}' in the model; {nearest(name, names)}")
+    chosen = name or next((one for one in POINTS_FIRST if one in names), names[-1])
+    first = 3 * names.index(chosen)
+    return Shown(chosen, slice(first, first + 3))
+
+
+def point_names(model: ParametricHMM) -> tuple[str, ...]:
+    """Names of the body points, as described or else numbered. Raises InputError if frames are not places."""
+    described = model.description.point_names if model.description else ()
+    dim = dimension(model)
+    if described and 3 * len(described) == dim:
+        return described
+    if dim % 3:
+        raise InputError(f"the frames of this model have {dim} components, which are no places of points: no picture")
+    return tuple(f"point_{number}" for number in range(1, dim // 3 + 1))
+
+
+def dimension(model: ParametricHMM) -> int:
+    """D, the number of components of a frame."""
+    return int(model.state_means(bounds(model).mean(axis=0)).shape[-1])
+
+
+def bounds(model: ParametricHMM) -> Floats:
+    """Least and greatest theta of the training. Shape (2, P). Raises InputError for a model without."""
+    if model.parameter_bounds_ is None:
+        raise InputError("this model is not trained yet")
+    return model.parameter_bounds_
+
+
+def parameter_names(model: ParametricHMM) -> tuple[str, ...]:
+    """Names of the components of theta, as described or else numbered."""
+    count = bounds(model).shape[1]
+    described = model.description.parameter_names if model.description else ()
+    return described if len(described) == count else tuple(f"parameter_{n}" for n in range(1, count + 1))
+
+
+def with_unit(name: str) -> str:
+    """A parameter's name for an axis: a place is in metres."""
+    return f"{name}, m" if is_place(name) else name
+
+
+def raster(low_high: Floats) -> Floats:
+    """Theta of a raster between bounds (2, P). Shape (M, P)."""
+    count = LINES.get(low_high.shape[1], 2)
+    lines = [np.unique(np.linspace(low, high, count)) for low, high in low_high.T]
+    return np.array(list(itertools.product(*lines)))
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that needs no display."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def space_axes(figure: Figure, place: Any, paths: Sequence[Floats], title: str) -> Any:
+    """Axes in 3D with equal scales that hold the paths (T, 3)."""
+    axes: Any = figure.add_subplot(place, projection="3d")
+    low = np.min([path.min(axis=0) for path in paths], axis=0)
+    high = np.max([path.max(axis=0) for path in paths], axis=0)
+    middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
+    for number, axis in enumerate("xyz"):
+        getattr(axes, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
+        getattr(axes, f"set_{axis}label")(f"{axis}, m")
+    axes.set_box_aspect((1.0, 1.0, 1.0))
+    axes.set_title(title, fontsize=10)
+    return axes
+
+
+def add_ellipse(axes: Axes, centre: Floats, covariance: Floats, colour: Any, share: float = 0.95, **look: Any) -> None:
+    """The region of a normal distribution in the plane that holds a share of it."""
+    values, vectors = np.linalg.eigh(covariance)
+    lengths = 2.0 * np.sqrt(np.maximum(values, 0.0) * chi2.ppf(share, 2))
+    angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
+    axes.add_patch(Ellipse((centre[0], centre[1]), lengths[1], lengths[0], angle=angle, color=colour, **look))

@@ -1,0 +1,212 @@
+"""Movements shown to trained models: which action, which parameters and how surely, and whether any of the known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from paramove.demonstrations import DemonstrationError, Movement
+from paramove.demonstrations.body_frame import BODY, in_body_frame, mirrored
+from paramove.demonstrations.timing import resampled
+from paramove.input_error import InputError
+from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
+from paramove.training.drawing import bounds, parameter_names
+from paramove.training.kinds import kind_of
+from paramove.training.leaving_out import REGION, covers
+
+Floats = NDArray[np.float64]
+
+LEAST_TYPICALITY = 0.01
+"""A movement less typical than this is taken for none of the known ones."""
+UNKNOWN_FRAMES = ("", "laboratory", "unspecified")
+"""Names of frames that files of motion capture get, which say nothing."""
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What one movement was taken for.
+
+    Attributes:
+        movement: as it was asked, in the frame and at the rate of the models.
+        action: the most probable one.
+        known: whether the movement is typical enough to be any of the known actions.
+        posterior: probability of each action.
+        estimate: of the action's parameters.
+        parameter_names: of the components of theta.
+        typicality: probability that a genuine movement is so strange or stranger; None if the model cannot tell.
+        outside: names of the parameters that are estimated outside the bounds of the training.
+        labelled: theta of the label, as far as the model has its parameters; None without a label.
+    """
+
+    movement: Movement
+    action: str
+    known: bool
+    posterior: dict[str, float]
+    estimate: ParameterEstimate
+    parameter_names: tuple[str, ...]
+    typicality: float | None
+    outside: tuple[str, ...]
+    labelled: Floats | None
+
+    @property
+    def half_widths(self) -> Floats:
+        """From theta to the edges of the box around the region that holds it in 95 % of the cases. Shape (P,)."""
+        size = float(np.sqrt(chi2.ppf(REGION, len(self.estimate.theta))))
+        result: Floats = size * np.sqrt(np.diagonal(self.estimate.covariance))
+        return result
+
+    def facts(self) -> dict[str, Any]:
+        """Plain values for people and JSON."""
+        facts: dict[str, Any] = {
+            "movement": self.movement.source,
+            "seconds": self.movement.duration,
+            "action": self.action if self.known else None,
+            "most_probable_action": self.action,
+            "posterior": self.posterior,
+            "theta": dict(zip(self.parameter_names, self.estimate.theta.tolist(), strict=True)),
+            "theta_region_95": dict(zip(self.parameter_names, self.half_widths.tolist(), strict=True)),
+            "theta_covariance": self.estimate.covariance.tolist(),
+            "theta_outside_bounds": list(self.outside),
+            "typicality": self.typicality,
+            "log_likelihood": self.estimate.log_likelihood,
+        }
+        if self.movement.action:
+            facts["labelled_action"] = self.movement.action
+        if self.labelled is not None:
+            facts["labelled_theta"] = self.labelled.tolist()
+            facts["labelled_theta_in_region"] = covers(self.estimate.theta, self.estimate.covariance, self.labelled)
+        return facts
+
+
+class Examiner:
+    """Trained models that are asked about movements.
+
+    Args:
+        classifier: of the actions; of a single model `MovementClassifier.from_models`.
+
+    Raises InputError for models that do not fit together: other points, frames or rates.
+    """
+
+    def __init__(self, classifier: MovementClassifier) -> None:
+        self.classifier = classifier
+        self.models: Mapping[str, ParametricHMM] = classifier.models_
+        self._about = [model.description or MovementDescription() for model in self.models.values()]
+        for about in self._about[1:]:
+            for what in ("point_names", "frame", "rate_hz"):
+                one, other = getattr(self._about[0], what), getattr(about, what)
+                if one != other:
+                    raise InputError(
+                        f"models that compete have the same {what.replace('_', ' ')}: {self._about[0].action} has "
+                        f"{one}, {about.action} has {other}; train them from one set"
+                    )
+        scored = {_scored_by(model) for model in self.models.values()}
+        if len(scored) > 1:
+            raise InputError(
+                "models that compete are of one kind: all with correlated residuals, or all with the same states and "
+                f"frames; found {'; '.join(sorted(kind_of(model) for model in self.models.values()))}"
+            )
+
+    def prepared(self, movement: Movement) -> Movement:
+        """The movement with the points of the models, in their frame and at their rate.
+
+        Raises DemonstrationError if a point is missing or the frame is another one.
+        """
+        about = self._about[0]
+        if about.frame == BODY and movement.frame != BODY:
+            movement = in_body_frame(movement)
+            movement = mirrored(movement) if movement.side == "left" else movement
+        elif about.frame != movement.frame and movement.frame not in UNKNOWN_FRAMES:
+            raise DemonstrationError(
+                f"{movement.source}: its points are in the frame '{movement.frame}', those of the model in "
+                f"'{about.frame}'; train with --body, which asks every movement from the person"
+            )
+        movement = _with_points(movement, about.point_names)
+        return resampled(movement, about.rate_hz) if about.rate_hz else movement
+
+    def examine(self, movement: Movement, *, finished: bool = True) -> Recognition:
+        """What a movement is, or what its beginning will be. Raises InputError with the reason if nobody can tell."""
+        asked = self.prepared(movement)
+        try:
+            found = self._classified(asked, finished)
+        except ValueError as error:
+            raise DemonstrationError(f"{movement.source}: {error}") from error
+        action, posterior, estimate, typicality = found
+        model = self.models[action]
+        names = parameter_names(model)
+        low, high = bounds(model)
+        outside = tuple(
+            name
+            for name, value, least, most in zip(names, estimate.theta, low, high, strict=True)
+            if not least <= value <= most
+        )
+        known = typicality is None or typicality >= LEAST_TYPICALITY
+        return Recognition(
+            asked, action, known, posterior, estimate, names, typicality, outside, _labelled(asked, names)
+        )
+
+    def _classified(
+        self, asked: Movement, finished: bool
+    ) -> tuple[str, dict[str, float], ParameterEstimate, float | None]:
+        knows = {action: tells_typical(model) for action, model in self.models.items()}
+        if len(self.models) == 1 and not finished:  # no other action whose beginning it could be
+            ((action, model),) = self.models.items()
+            if not knows[action]:
+                return action, {action: 1.0}, model.estimate(asked.frames, finished=False), None
+            seen = model.examine(asked.frames, finished=False)  # type: ignore[attr-defined]
+            return action, {action: 1.0}, seen.estimate, seen.typicality
+        found = self.classifier.classify(asked.frames, finished=finished)
+        typicality = found.typicality if knows[found.action] else None
+        return found.action, found.posterior, found.estimates[found.action], typicality
+
+
+def tells_typical(model: ParametricHMM) -> bool:
+    """Whether a model knows how performances vary, and so which movements are untypical."""
+    return getattr(model, "performances_", None) is not None
+
+
+def _scored_by(model: ParametricHMM) -> tuple[object, ...]:
+    """What has to be the same for the scores of two models to be comparable."""
+    return ("typicality",) if tells_typical(model) else (model.n_states, model.resampled_frames)
+
+
+def percent(share: float) -> str:
+    """A probability in words that claim no more than is known: "> 99.9 %" instead of "100 %"."""
+    value = 100.0 * share
+    if value > 99.9:
+        return "> 99.9 %"
+    return f"{value:.1f} %" if value >= 0.1 else "< 0.1 %"
+
+
+def confusion(found: Sequence[Recognition]) -> dict[str, dict[str, int]]:
+    """Labelled action -> what it was taken for -> how often; "none" where it was rejected."""
+    table: dict[str, dict[str, int]] = {}
+    for one in found:
+        if one.movement.action:
+            row = table.setdefault(one.movement.action, {})
+            taken = one.action if one.known else "none"
+            row[taken] = row.get(taken, 0) + 1
+    return table
+
+
+def _with_points(movement: Movement, names: tuple[str, ...]) -> Movement:
+    if not names or names == movement.point_names:
+        return movement
+    missing = [name for name in names if name not in movement.point_names]
+    if missing:
+        raise DemonstrationError(
+            f"{movement.source}: the model knows {', '.join(names)}; missing are {', '.join(missing)}. The file has "
+            f"{', '.join(movement.point_names)}: say which is which with --mapping or --point"
+        )
+    order = [movement.point_names.index(name) for name in names]
+    return replace(movement, positions=movement.positions[:, order], point_names=names)
+
+
+def _labelled(movement: Movement, names: tuple[str, ...]) -> Floats | None:
+    if not names or not set(names) <= set(movement.parameter_names):
+        return None
+    return np.array([movement.theta[movement.parameter_names.index(name)] for name in names])

@@ -1,0 +1,183 @@
+"""How well a kind of model does on movements it has not seen: whole parameters or persons are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+from scipy.stats import chi2
+
+from paramove.alignment import movement_distance
+from paramove.hmm import resample
+from paramove.phmm import InterpolativePHMM, ParametricHMM
+from paramove.phmm.performance import groups_of
+from paramove.training.examples import Examples, is_place
+
+Floats = NDArray[np.float64]
+LeftOutBy = Literal["theta", "subject", "repetition"]
+
+MOST_FOLDS = 10
+HULL_DIMENSIONS = 4
+FRAMES = 100
+"""Movements are compared at so many frames."""
+REGION = 0.95
+"""Share of true parameters that a region promises to hold."""
+
+
+class LeftOut(NamedTuple):
+    """One movement, seen by a model that was trained without its group.
+
+    Attributes:
+        number: of the movement in the examples.
+        theta: as labelled, shape (P,).
+        estimated: from the movement, shape (P,).
+        deviation: standard deviations of the estimate, shape (P,).
+        covered: whether the 95 % region of the estimate holds the label.
+        synthesis: root mean square distance of the synthesised from the recorded body points after time warping, m.
+        outside: whether theta lies outside the training's thetas, so that the model had to extrapolate.
+    """
+
+    number: int
+    theta: Floats
+    estimated: Floats
+    deviation: Floats
+    covered: bool
+    synthesis: float
+    outside: bool
+
+
+@dataclass(frozen=True)
+class LeaveOutResult:
+    """All movements, each seen by a model that does not know its group.
+
+    Attributes:
+        by: what a group is.
+        folds: how many models were trained.
+        movements: in the order of the examples.
+        parameter_names: of theta.
+    """
+
+    by: LeftOutBy
+    folds: int
+    movements: tuple[LeftOut, ...]
+    parameter_names: tuple[str, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """Numbers for people and JSON: errors of theta and synthesis, share of regions that hold the label."""
+        errors = np.stack([one.estimated - one.theta for one in self.movements])
+        by_name = zip(self.parameter_names, np.sqrt((errors**2).mean(axis=0)).tolist(), strict=True)
+        synthesis = np.array([one.synthesis for one in self.movements])
+        result: dict[str, Any] = {
+            "left_out": self.by,
+            "folds": self.folds,
+            "movements": len(self.movements),
+            "outside_the_training": sum(one.outside for one in self.movements),
+            "theta_rms": dict(by_name),
+            "theta_covered": float(np.mean([one.covered for one in self.movements])),
+            "synthesis_median_m": float(np.median(synthesis)),
+            "synthesis_p95_m": float(np.percentile(synthesis, 95)),
+        }
+        if all(is_place(name) for name in self.parameter_names):
+            distances = np.linalg.norm(errors, axis=1)
+            result["theta_median_m"] = float(np.median(distances))
+            result["theta_p95_m"] = float(np.percentile(distances, 95))
+        return result
+
+
+def leave_out(
+    examples: Examples,
+    make: Callable[[], ParametricHMM],
+    by: LeftOutBy = "theta",
+    finished: Callable[[int, int], None] | None = None,
+) -> LeaveOutResult:
+    """Train again without each group of movements, and ask these models about it.
+
+    Args:
+        examples: of one action.
+        make: gives the untrained model.
+        by: what is left out together: all movements of one theta, of one person, or each n-th movement of every theta.
+            An InterpolativePHMM needs every theta: of it repetitions are left out.
+        finished: is told after each fold how many are done, and how many there are.
+
+    Raises ValueError if there is only one group, or if a fold cannot be trained.
+    """
+    if by == "theta" and isinstance(make(), InterpolativePHMM):
+        by = "repetition"
+    folds = _folds(examples, by)
+    if len(folds) < 2:
+        raise ValueError(f"there is only one {by}: nothing can be left out")
+    found: list[LeftOut] = []
+    for number, tested in enumerate(folds):
+        rest = examples.of([one for one in range(len(examples)) if one not in tested])
+        model = make().fit(rest.sequences, rest.theta, rest.groups)
+        found += [_seen(model, examples, one, rest) for one in tested]
+        if finished is not None:
+            finished(number + 1, len(folds))
+    return LeaveOutResult(by, len(folds), tuple(sorted(found, key=lambda one: one.number)), examples.parameter_names)
+
+
+def covers(estimated: Floats, covariance: Floats, theta: Floats) -> bool:
+    """Whether the 95 % region of an estimate holds theta."""
+    difference = theta - estimated
+    squared = float(difference @ np.linalg.solve(covariance, difference))
+    return 0.0 <= squared <= float(chi2.ppf(REGION, len(theta)))
+
+
+def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
+    """Numbers of the movements that are left out together; groups share folds where there are many."""
+    theta = groups_of(None, examples.theta)
+    if by == "repetition":
+        seen: dict[int, int] = {}
+        groups = []
+        for cell in theta.tolist():
+            seen[cell] = seen.get(cell, -1) + 1
+            groups.append(seen[cell])
+    else:
+        names = examples.subjects if by == "subject" else None
+        groups = groups_of(names, examples.theta).tolist()
+    count = min(MOST_FOLDS, len(set(groups)))
+    return [[one for one, group in enumerate(groups) if group % count == fold] for fold in range(count)]
+
+
+def _seen(model: ParametricHMM, examples: Examples, number: int, rest: Examples) -> LeftOut:
+    sequence, theta = examples.sequences[number], examples.theta[number]
+    estimate = model.estimate(sequence)
+    return LeftOut(
+        number,
+        theta,
+        estimate.theta,
+        np.sqrt(np.diagonal(estimate.covariance)),
+        covers(estimate.theta, estimate.covariance, theta),
+        synthesis_error(model, theta, sequence, len(examples.point_names)),
+        is_outside(theta, rest.theta),
+    )
+
+
+def is_outside(theta: Floats, trained: Floats) -> bool:
+    """Whether theta (P,) lies outside the convex hull of trained ones (K, P); of many or flat ones, their bounds."""
+    low, high = trained.min(axis=0), trained.max(axis=0)
+    slack = 1e-6 * np.maximum(high - low, 1e-9)
+    if ((theta < low - slack) | (theta > high + slack)).any():
+        return True
+    if not 2 <= len(theta) <= HULL_DIMENSIONS:
+        return False
+    try:
+        hull = Delaunay((trained - low) / np.maximum(high - low, 1e-9))
+    except QhullError:
+        return False
+    return bool(hull.find_simplex((theta - low) / np.maximum(high - low, 1e-9), tol=1e-6) < 0)
+
+
+def synthesis_error(model: ParametricHMM, theta: Floats, sequence: Floats, n_points: int) -> float:
+    """Root mean square distance of body points between what a model makes for theta and a recording (T, D), warped."""
+    made = model.synthesize(theta, FRAMES)
+    return movement_distance(made, resample(sequence, FRAMES), n_points=n_points, cut=0.0)
+
+
+def worst(result: LeaveOutResult, count: int) -> Sequence[LeftOut]:
+    """The movements whose synthesis is farthest off, worst first."""
+    return sorted(result.movements, key=lambda one: -one.synthesis)[:count]

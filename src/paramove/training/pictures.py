@@ -1,0 +1,200 @@
+"""Pictures of one model: its movements, how they scatter, how long states last, and where theta is visible."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from paramove.hmm.synthesis import expected_durations
+from paramove.phmm import ParametricHMM
+from paramove.training.drawing import (
+    ACTION_COLOURS,
+    COLOURS,
+    FAINT,
+    INK,
+    WARN,
+    Shown,
+    add_ellipse,
+    bounds,
+    new_figure,
+    parameter_names,
+    point_names,
+    raster,
+    shown_point,
+    space_axes,
+    with_unit,
+)
+from paramove.training.kinds import kind_of
+
+Floats = NDArray[np.float64]
+
+STEP = 1e-3
+"""Of the training's range: for derivatives with respect to theta."""
+CHAINS = 7
+"""In so many moments the arm is drawn."""
+
+
+def plot_model(model: ParametricHMM, point: str | None = None) -> Figure:
+    """What a model has learned.
+
+    Above: the state means of one body point over a raster of theta as paths in space, and from above and from the side
+    with the regions that hold 95 % of the frames of each state. Below: how long each state lasts, and by how many
+    standard deviations the pose of a state changes over the range of each parameter.
+
+    Raises InputError for a point that the model does not have.
+    """
+    shown = shown_point(model, point)
+    low_high = bounds(model)
+    thetas = raster(low_high)
+    wide = int(np.ptp(low_high, axis=0).argmax())
+    norm = Normalize(float(low_high[0, wide]), float(max(low_high[1, wide], low_high[0, wide] + 1e-9)))
+    paths = model.state_means(thetas)[..., shown.columns]
+    figure = new_figure(13.5, 8.6)
+    grid = figure.add_gridspec(2, 12, height_ratios=[1.5, 1.0])
+    space = space_axes(figure, grid[0, :4], list(paths), f"states of {shown.name}, frame '{_frame(model)}'")
+    for path, theta in zip(paths, thetas, strict=True):
+        space.plot(*path.T, ".-", color=colormaps[COLOURS](norm(theta[wide])), linewidth=0.8, markersize=2.5)
+    above, side = figure.add_subplot(grid[0, 4:8]), figure.add_subplot(grid[0, 8:])
+    across = int(np.ptp(paths[..., :2].reshape(-1, 2), axis=0).argmax())
+    _regions(above, model, shown, (1, 0), wide, norm)
+    above.invert_xaxis()  # y is to the left
+    _regions(side, model, shown, (across, 2), wide, norm)
+    name = with_unit(parameter_names(model)[wide])
+    figure.colorbar(ScalarMappable(norm, COLOURS), ax=side, label=name, pad=0.01, shrink=0.8)
+    _durations(figure.add_subplot(grid[1, :5]), model)
+    _visibility(figure.add_subplot(grid[1, 5:]), model, thetas)
+    figure.suptitle(title_of(model), fontsize=11)
+    return figure
+
+
+def plot_synthesis(model: ParametricHMM, theta: Floats, time: Floats, frames: Floats, point: str | None = None) -> Any:
+    """A synthesised movement.
+
+    Args:
+        model: which made it.
+        theta: for which, (P,).
+        time: (T,), s. frames: (T, D), m.
+        point: drawn over time; None: the fingertip where there is one.
+
+    Left the path of the point and the arm in some moments, among the movements of the training's range; right the
+    point's coordinates, with the band that holds 95 % of demonstrations of this theta.
+    """
+    shown = shown_point(model, point)
+    path = frames[:, shown.columns]
+    around = model.state_means(raster(bounds(model)))[..., shown.columns]
+    figure = new_figure(13.0, 6.4)
+    grid = figure.add_gridspec(3, 2, width_ratios=[1.1, 1.0])
+    arms = frames.reshape(len(frames), -1, 3)
+    space = space_axes(figure, grid[:, 0], [*around, *arms], f"path of {shown.name}, and the arm in {CHAINS} moments")
+    for other in around:
+        space.plot(*other.T, color=FAINT, linewidth=0.6, alpha=0.6)
+    moments = np.linspace(0, len(frames) - 1, CHAINS).round().astype(int)
+    for number, moment in enumerate(moments.tolist()):
+        space.plot(*arms[moment].T, "o-", color=ACTION_COLOURS[0], alpha=0.25 + 0.1 * number, markersize=2.5, lw=1.2)
+    space.plot(*path.T, color=INK, linewidth=1.8)
+    progress = np.linspace(0.0, 1.0, len(frames))
+    spread = np.stack([
+        np.sqrt(np.diagonal(model.progress_covariance(theta, float(tau)))[shown.columns]) for tau in progress
+    ])  # fmt: skip
+    for axis, letter in enumerate("xyz"):
+        axes = figure.add_subplot(grid[axis, 1])
+        band = path[:, axis] - 1.96 * spread[:, axis], path[:, axis] + 1.96 * spread[:, axis]
+        axes.fill_between(time, *band, color=ACTION_COLOURS[0], alpha=0.18, linewidth=0)
+        axes.plot(time, path[:, axis], color=INK, linewidth=1.4)
+        axes.set_ylabel(f"{shown.name} {letter}, m")
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("time, s")
+    told = ", ".join(f"{name} {value:g}" for name, value in zip(parameter_names(model), theta, strict=True))
+    figure.suptitle(f"{title_of(model)} · {told}", fontsize=11)
+    return figure
+
+
+def title_of(model: ParametricHMM) -> str:
+    """A model in one line."""
+    action = model.description.action if model.description else "movement"
+    return f"{action} · {kind_of(model)} · {model.n_states} states · {len(point_names(model))} points"
+
+
+def visibility(model: ParametricHMM, thetas: Floats) -> Floats:
+    """By how many standard deviations the pose of each state changes over the range of each parameter.
+
+    The range times the square root of the diagonal of J' C^-1 J, where J is the derivative of the state's mean and C
+    its covariance; root mean square over theta (M, P). Shape (N, P).
+    """
+    span = np.ptp(bounds(model), axis=0)
+    squares = np.zeros((model.n_states, len(span)))
+    for theta in thetas:
+        inverse = np.linalg.inv(model.at(theta).covariances_)
+        for number, width in enumerate(span):
+            step = np.zeros(len(span))
+            step[number] = STEP * (width or 1.0)
+            slope = (model.state_means(theta + step) - model.state_means(theta - step)) / (2.0 * step[number])
+            squares[:, number] += np.einsum("nd,nde,ne->n", slope, inverse, slope) * width**2
+    result: Floats = np.sqrt(squares / len(thetas))
+    return result
+
+
+def state_seconds(model: ParametricHMM, theta: Floats) -> tuple[Floats, Floats, str]:
+    """Mean and standard deviation of the time in each state (N,), and their unit: s, or % of the movement."""
+    durations = model.at(theta).durations_
+    frames = expected_durations(durations)
+    square = durations @ np.arange(1, durations.shape[1] + 1) ** 2
+    deviation = np.sqrt(np.maximum(square - frames**2, 0.0))
+    whole = model.description.duration if model.description else 0.0
+    scale = (whole or 100.0) / frames.sum()
+    return frames * scale, deviation * scale, "s" if whole else "% of the movement"
+
+
+def _frame(model: ParametricHMM) -> str:
+    return model.description.frame if model.description else "unspecified"
+
+
+def _regions(
+    axes: Axes, model: ParametricHMM, shown: Shown, plane: tuple[int, int], wide: int, norm: Normalize
+) -> None:
+    """Means and 95 % regions of all states for three values of the widest parameter, the others in the middle."""
+    low_high = bounds(model)
+    columns = [shown.columns.start + one for one in plane]
+    for value in np.linspace(low_high[0, wide], low_high[1, wide], 3).tolist():
+        theta = low_high.mean(axis=0)
+        theta[wide] = value
+        colour = colormaps[COLOURS](norm(value))
+        hmm = model.at(theta)
+        axes.plot(*hmm.means_[:, columns].T, ".-", color=colour, linewidth=1.0, markersize=3)
+        for mean, covariance in zip(hmm.means_, hmm.covariances_, strict=True):
+            add_ellipse(axes, mean[columns], covariance[np.ix_(columns, columns)], colour, alpha=0.18, lw=0)
+    axes.set(aspect="equal", xlabel=f"{'xyz'[plane[0]]}, m", ylabel=f"{'xyz'[plane[1]]}, m")
+    axes.set_title("from above" if plane == (1, 0) else "from the side", fontsize=10)
+    axes.grid(alpha=0.3)
+
+
+def _durations(axes: Axes, model: ParametricHMM) -> None:
+    mean, deviation, unit = state_seconds(model, bounds(model).mean(axis=0))
+    states = np.arange(1, model.n_states + 1)
+    axes.bar(states, mean, yerr=deviation, color=ACTION_COLOURS[0], alpha=0.75, ecolor=INK, error_kw={"lw": 0.8})
+    axes.set(xlabel="state", ylabel=f"time in the state, {unit}", xlim=(0.3, model.n_states + 0.7))
+    axes.set_xticks(states[:: max(1, model.n_states // 20)])
+    axes.set_title("expected duration of the states", fontsize=10)
+    axes.grid(alpha=0.3, axis="y")
+
+
+def _visibility(axes: Axes, model: ParametricHMM, thetas: Floats) -> None:
+    seen = visibility(model, thetas)
+    mean, _, _ = state_seconds(model, bounds(model).mean(axis=0))
+    middle = 100.0 * (np.cumsum(mean) - 0.5 * mean) / mean.sum()
+    for number, name in enumerate(parameter_names(model)):
+        axes.plot(middle, seen[:, number], "o-", color=ACTION_COLOURS[number % 8], markersize=3, lw=1.4, label=name)
+    axes.axhline(2.0, color=WARN, linewidth=0.8, linestyle=":")
+    axes.set(xlabel="progress of the movement, %", ylabel="change over the range,\nstandard deviations", xlim=(0, 100))
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=0.5)
+    axes.set_title("where theta is visible (below the dotted line: hardly)", fontsize=10)
+    axes.legend(fontsize=8, frameon=False)
+    axes.grid(alpha=0.3)

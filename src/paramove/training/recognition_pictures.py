@@ -1,0 +1,160 @@
+"""Pictures of what movements were taken for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from paramove.phmm import ParametricHMM
+from paramove.training.drawing import (
+    ACTION_COLOURS,
+    FAINT,
+    INK,
+    WARN,
+    add_ellipse,
+    bounds,
+    new_figure,
+    raster,
+    shown_point,
+    space_axes,
+    with_unit,
+)
+from paramove.training.examining import LEAST_TYPICALITY, Recognition, confusion, percent
+
+Floats = NDArray[np.float64]
+
+
+def plot_recognition(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:
+    """One movement with what the model makes of it, or all estimates and the confusion of many."""
+    if len(found) == 1:
+        return _plot_one(models, found[0])
+    return _plot_many(models, found)
+
+
+def _plot_one(models: Mapping[str, ParametricHMM], found: Recognition) -> Figure:
+    """Left the recorded path beside the synthesised one, in the middle theta, right the actions."""
+    model = models[found.action]
+    shown = shown_point(model)
+    recorded = found.movement.frames[:, shown.columns]
+    made = model.synthesize(found.estimate.theta, 100)[:, shown.columns]
+    around = model.state_means(raster(bounds(model)))[..., shown.columns]
+    figure = new_figure(13.0, 5.2)
+    grid = figure.add_gridspec(1, 3, width_ratios=[1.2, 1.1, 0.7])
+    space = space_axes(figure, grid[0], [*around, recorded], f"path of {shown.name}")
+    for other in around:
+        space.plot(*other.T, color=FAINT, linewidth=0.6, alpha=0.6)
+    space.plot(*recorded.T, color=INK, linewidth=1.8, label="recorded")
+    space.plot(*made.T, "--", color=ACTION_COLOURS[0], linewidth=1.4, label="the model's, for the estimated theta")
+    space.legend(loc="upper left", fontsize=8, frameon=False)
+    axes = figure.add_subplot(grid[1])
+    _plane(axes, models, [found])
+    axes.set_title("theta, its 95 % region, and the bounds of the training", fontsize=10)
+    _posterior(figure.add_subplot(grid[2]), found)
+    figure.suptitle(f"{found.movement.source}", fontsize=10)
+    return figure
+
+
+def _plot_many(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:
+    """Left all estimates of theta with their labels, right what was taken for what."""
+    table = confusion(found)
+    figure = new_figure(13.0, 5.6)
+    left, right = figure.subplots(1, 2, width_ratios=[1.4, 1.0])
+    _plane(left, models, found)
+    left.set_title("theta with 95 % regions; crosses: labels; red: not typical", fontsize=10)
+    if len(table) > 1:
+        _matrix(right, table, [*models, "none"])
+    else:
+        _counts(right, found)
+    figure.suptitle(f"{len(found)} movements", fontsize=11)
+    return figure
+
+
+def _plane(axes: Axes, models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> None:
+    """Estimates in the plane of the two parameters that vary most; of a single parameter one below the other."""
+    first = models[found[0].action]
+    span = np.ptp(bounds(first), axis=0)
+    chosen = sorted(np.argsort(-span)[:2].tolist())
+    colours = {action: ACTION_COLOURS[number % 8] for number, action in enumerate(models)}
+    for number, one in enumerate(found):
+        colour = colours[one.action] if one.known else WARN
+        if len(chosen) == 2:
+            _place(axes, one, chosen, colour, alpha=min(0.18, 6.0 / len(found)))
+        else:
+            _interval(axes, one, number, colour)
+    names = found[0].parameter_names
+    axes.set_xlabel(with_unit(names[chosen[0]]))
+    axes.set_ylabel(with_unit(names[chosen[1]]) if len(chosen) == 2 else "movement")
+    for action, model in models.items():
+        low, high = bounds(model)[:, chosen]
+        if len(chosen) == 2:
+            width, height = high - low
+            axes.add_patch(Rectangle((low[0], low[1]), width, height, fill=False, ls="--", ec=colours[action], lw=0.9))
+        else:
+            axes.axvspan(low[0], high[0], color=colours[action], alpha=0.08)
+        axes.plot([], [], "o", color=colours[action], label=action)
+    axes.margins(0.08)
+    axes.autoscale_view()
+    axes.legend(fontsize=8, frameon=False, loc="best")
+    axes.grid(alpha=0.3)
+
+
+def _place(axes: Axes, one: Recognition, chosen: list[int], colour: Any, alpha: float) -> None:
+    place = one.estimate.theta[chosen]
+    add_ellipse(axes, place, one.estimate.covariance[np.ix_(chosen, chosen)], colour, alpha=alpha, lw=0)
+    axes.plot(*place, "o", color=colour, markersize=4)
+    if one.labelled is not None:
+        label = one.labelled[chosen]
+        axes.plot(*label, "x", color=INK, markersize=6)
+        axes.plot(*zip(place, label, strict=True), color=colour, linewidth=0.7)
+
+
+def _interval(axes: Axes, one: Recognition, number: int, colour: Any) -> None:
+    axes.errorbar(one.estimate.theta[0], number, xerr=one.half_widths[0], fmt="o", color=colour, markersize=4)
+    if one.labelled is not None:
+        axes.plot(one.labelled[0], number, "x", color=INK, markersize=6)
+
+
+def _posterior(axes: Axes, found: Recognition) -> None:
+    names = list(found.posterior)
+    height = min(0.8, 0.2 * len(names))
+    axes.barh(range(len(names)), [100.0 * found.posterior[name] for name in names], height, color=ACTION_COLOURS[0])
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(-0.6, len(names) - 0.4)
+    axes.set(xlim=(0, 100), xlabel="probability, %")
+    axes.invert_yaxis()
+    if found.typicality is None:
+        told, colour = "this model cannot tell how typical it is", INK
+    else:
+        told = f"typicality {percent(found.typicality)}" + ("" if found.known else ": none of the known")
+        colour = INK if found.typicality >= LEAST_TYPICALITY else WARN
+    axes.set_title(told, fontsize=10, color=colour)
+
+
+def _matrix(axes: Axes, table: dict[str, dict[str, int]], columns: Sequence[str]) -> None:
+    rows = sorted(table)
+    counts = np.array([[table[row].get(column, 0) for column in columns] for row in rows])
+    shares = counts / counts.sum(axis=1, keepdims=True)
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for (row, column), count in np.ndenumerate(counts):
+        axes.text(
+            column, row, str(count), ha="center", va="center", color="white" if shares[row, column] > 0.6 else INK
+        )
+    axes.set_xticks(range(len(columns)), columns)
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set(xlabel="taken for", ylabel="labelled")
+    axes.set_title("confusion", fontsize=10)
+
+
+def _counts(axes: Axes, found: Sequence[Recognition]) -> None:
+    taken = [one.action if one.known else "none" for one in found]
+    names = sorted(set(taken))
+    axes.barh(range(len(names)), [taken.count(name) for name in names], color=ACTION_COLOURS[0], alpha=0.75)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xlabel("movements")
+    axes.set_title("taken for", fontsize=10)

@@ -1,0 +1,139 @@
+"""Models trained from examples, written to files, with what is worth telling about them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from paramove.documents.atomic_writing import replacing
+from paramove.phmm import MovementClassifier, ParametricHMM
+from paramove.training.examples import Examples
+from paramove.training.kinds import kind_of
+from paramove.training.leaving_out import LeaveOutResult, LeftOutBy, leave_out
+
+Make = Callable[[], ParametricHMM]
+FACTS_ENDING = ".training.json"
+"""Of the file beside a model that tells how it was trained and how well such models do on what they have not seen."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A model of one action.
+
+    Attributes:
+        model: trained.
+        examples: what it was trained with.
+        seconds: how long that took.
+        file: where it was written.
+        left_out: how well such models do on what they have not seen; None if that was not asked.
+    """
+
+    model: ParametricHMM
+    examples: Examples
+    seconds: float
+    file: Path
+    left_out: LeaveOutResult | None = None
+
+    @property
+    def action(self) -> str:
+        """Name of the action."""
+        return self.examples.actions[0]
+
+    def facts(self) -> dict[str, Any]:
+        """Numbers for people and JSON."""
+        examples, model = self.examples, self.model
+        low_high = zip(examples.theta.min(axis=0).tolist(), examples.theta.max(axis=0).tolist(), strict=True)
+        facts: dict[str, Any] = {
+            "action": self.action,
+            "model": kind_of(model),
+            "source": examples.source,
+            "sequences": len(examples),
+            "thetas": len({tuple(row) for row in examples.theta.tolist()}),
+            "persons": sorted({name for name in examples.subjects if name}),
+            "frames": sum(map(len, examples.sequences)),
+            "rate_hz": examples.rate_hz,
+            "bounds": {name: list(pair) for name, pair in zip(examples.parameter_names, low_high, strict=True)},
+            "states": model.n_states,
+            "frames_per_state": [model.d_min, model.d_max],
+            "resampled_frames": model.resampled_frames,
+            "seconds": self.seconds,
+        }
+        summary = model.training_
+        if summary is not None:
+            facts |= {
+                "iterations": len(summary.log_likelihoods),
+                "converged": summary.converged,
+                "log_likelihood_per_frame": summary.log_likelihoods[-1] / summary.n_frames,
+            }
+        facts["left_out"] = None if self.left_out is None else self.left_out.summary()
+        facts["file"] = str(self.file)
+        return facts
+
+
+def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) -> list[Trained]:
+    """Train and write: of one action a model file, of several a folder with the classifier of all.
+
+    Args:
+        examples: of all actions.
+        make: gives the untrained model of each.
+        goal: file or folder. Files appear when they are complete.
+
+    Raises ValueError for examples that do not fit, OSError if nothing can be written.
+    """
+    began_s = time.perf_counter()
+    if len(examples.actions) == 1:
+        (one,) = make.values()
+        model = one().fit(examples.sequences, examples.theta, examples.groups)
+        trained = [Trained(model, examples, time.perf_counter() - began_s, goal)]
+        goal.parent.mkdir(parents=True, exist_ok=True)
+        model.save(goal)
+    else:
+        untrained = {action: one() for action, one in make.items()}
+        classifier = MovementClassifier(untrained)
+        classifier.fit(examples.sequences, examples.theta, examples.labels, examples.groups)
+        seconds = time.perf_counter() - began_s
+        classifier.save(goal)
+        files = {action: goal / f"{action}.model.npz" for action in classifier.classes_}
+        trained = [
+            Trained(model, examples.of_action(action), seconds, files[action])
+            for action, model in classifier.models_.items()
+        ]
+    for told in trained:
+        _write_facts(told)
+    return trained
+
+
+def with_check(trained: Trained, make: Make, by: LeftOutBy, finished: Callable[[int, int], None]) -> Trained:
+    """The same, with what models that do not know a group of movements make of it (`leave_out`); also written."""
+    checked = replace(trained, left_out=leave_out(trained.examples, make, by, finished))
+    _write_facts(checked)
+    return checked
+
+
+def told_of(file: Path) -> dict[str, Any] | None:
+    """What was written when the model in a file was trained; None if that is not known, or is of another file."""
+    beside = file.with_suffix(FACTS_ENDING)
+    try:
+        facts = json.loads(beside.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(facts, dict) or facts.get("sha256") != checksum(file):
+        return None
+    return facts
+
+
+def checksum(file: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _write_facts(trained: Trained) -> None:
+    facts = trained.facts() | {"sha256": checksum(trained.file)}
+    beside = trained.file.with_suffix(FACTS_ENDING)
+    with replacing(beside) as unfinished:
+        unfinished.write_text(json.dumps(facts, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,79 @@
+"""Runs of a servo arm's tasks are judged by the recorded truth, and what has none is told why."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from paramove.bus import topics
+from paramove.runs import servo_arm
+from paramove.msgs.truth_pb2 import TruthState
+from paramove.recording.parts import next_part
+from paramove.recording.writer import RecordingWriter
+from tests.recording.small_disk import fill, small_disk
+
+TASKS = "parameters: {tasks: [{reach: [0.2, 0.0, 0.1]}, {pick: [0.1, 0.1, 0.02], place: [0.2, 0.1, 0.02]}]}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "nodes").mkdir()
+    (tmp_path / "nodes" / "reacher.yaml").write_text(TASKS)
+    (tmp_path / "nodes" / "judge.yaml").write_text("parameters: {}\n")
+    return tmp_path
+
+
+def record(folder: Path, gripper: tuple[float, ...], cube_x: float) -> None:
+    state = TruthState(gripper=gripper)
+    state.objects.add(name="red_cube", x=cube_x, y=0.1, z=0.02)
+    with RecordingWriter(next_part(folder / "truth.mcap"), "test") as recording:
+        number = len(list(folder.glob("truth*")))
+        recording.write(topics.TRUTH_STATE.name, state, number, number, number)
+
+
+def test_a_run_is_judged_by_its_truth_even_if_the_judge_was_started_again(folder: Path) -> None:
+    record(folder, (0.2, 0.0, 0.104), 0.1)
+    record(folder, (0.1, 0.0, 0.104), 0.205)
+    assert servo_arm.main([str(folder)]) == 0
+    summary = json.loads((folder / "run.json").read_text())
+    assert [one["error"] for one in summary["tasks"]] == pytest.approx([0.004, 0.005])
+    assert summary["gaps"] == [{"recording": "truth", "begin_s": pytest.approx(1e-9), "end_s": pytest.approx(2e-9)}]
+    assert (folder / "tasks.png").is_file()
+
+
+def test_without_room_for_the_numbers_the_reason_is_told_and_the_run_can_be_judged_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with small_disk(tmp_path / "disk", 2) as disk:
+        (disk / "nodes").mkdir()
+        (disk / "nodes" / "reacher.yaml").write_text(TASKS)
+        record(disk, (0.2, 0.0, 0.104), 0.205)
+        filler = fill(disk)
+        assert servo_arm.main([str(disk)]) == 1
+        said = capsys.readouterr().err
+        assert "No space left on device" in said
+        assert f"python -m paramove.runs.servo_arm {disk}" in said
+        filler.unlink()
+        servo_arm.main([str(disk)])
+        assert (disk / "run.json").is_file()
+
+
+def test_the_truth_of_a_judge_that_was_killed_counts_as_far_as_it_goes(folder: Path) -> None:
+    record(folder, (0.2, 0.0, 0.104), 0.1)
+    (folder / "truth.mcap").rename(folder / "truth.mcap.part")
+    assert servo_arm.main([str(folder)]) == 3
+    assert json.loads((folder / "run.json").read_text())["good"] == 1
+
+
+def test_an_emulated_run_that_failed_at_its_start_is_told_as_such(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert servo_arm.main([str(folder)]) == 66
+    assert "the run ended before anything was known of the emulated arm" in capsys.readouterr().err
+    (folder / "nodes" / "judge.yaml").unlink()
+    assert servo_arm.main([str(folder)]) == 66
+    assert "only emulated runs, which have a node judge, write one" in capsys.readouterr().err
+    assert servo_arm.main([str(folder / "none")]) == 66
+    assert "no run folder" in capsys.readouterr().err
