@@ -16,6 +16,7 @@ from typing import Any
 from studies.faults.fault_page import FaultRow
 from studies.faults.pytest_results import FILE_VARIABLE
 
+ROOT = Path(__file__).parents[2]
 LOOK_S = 0.2
 _ALL_RAN = (0, 1)  # exit codes of pytest; the others: interrupted, internal error, wrong use, no tests
 
@@ -69,7 +70,8 @@ def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int
         file.touch()
         command = [sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=line", "--continue-on-collection-errors"]
         command += ["-p", "no:cacheprovider", "-p", "studies.faults.pytest_results", *wanted]
-        environment = os.environ | {FILE_VARIABLE: str(file)}
+        found_by = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # the plugin too
+        environment = os.environ | {FILE_VARIABLE: str(file), "PYTHONPATH": found_by}
         with (Path(folder) / "output").open("w+", encoding="utf-8") as output:
             process = subprocess.Popen(
                 command, cwd=workspace, env=environment, stdout=output, stderr=output, stdin=subprocess.DEVNULL
