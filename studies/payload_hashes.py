@@ -16,6 +16,7 @@ import argparse
 import hashlib
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -43,7 +44,8 @@ FREE_TEXT = frozenset({"sentence", "reason", "refusal"})
 LEFT_OUT = ("status/", "clock")
 RENAMED: dict[str, str] = {}
 """Topics: name before the change -> name after it."""
-TIMES = ("second", "minute", "time", "_ms", "took", "date", "commit", "version")
+TIMES = re.compile(r"(?<![a-z])(seconds?|minutes?|times?|ms|took|date|commit|versions?)(?![a-z])")
+"""Words in the names of numbers that differ from run to run."""
 
 
 def payload_hashes(recording: Path) -> dict[str, list[Any]]:
@@ -88,7 +90,7 @@ def numbers_in(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Numbers, words and truth values of a JSON document by their paths, without times."""
     if isinstance(value, dict):
         for key, one in value.items():
-            if not any(word in key for word in TIMES):
+            if not TIMES.search(key):
                 yield from numbers_in(one, f"{path}.{key}")
     elif isinstance(value, list):
         for number, one in enumerate(value):

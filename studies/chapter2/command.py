@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, write_numbers
+from studies.terminal import marked
 
 FOLDER = Path("runs/evaluation/chapter2")
-COLOURS = {"yes": "green", "in part": "yellow", "no": "red"}
 
 
 def chapter2(
@@ -38,8 +38,7 @@ def chapter2(
     for heading in ("figure", "as in the thesis", "seen here"):
         table.add_column(heading)
     for row in numbers["figures"]:
-        verdict = row["as_in_the_thesis"]
-        table.add_row(row["figure"], f"[{COLOURS[verdict]}]{verdict}[/]", row["seen"])
+        table.add_row(row["figure"], marked(row["as_in_the_thesis"]), row["seen"])
     console.print(table)
     write_numbers(json_file, numbers, console)
     console.print(f"report: {folder / 'report.html'}", markup=False, soft_wrap=True)

@@ -14,10 +14,9 @@ from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, seeds_in, write_numbers
 from paramove.supervision import exit_codes
-from studies.stored_results import stored_results
+from studies.terminal import marked, stored_results
 
 FOLDER = Path("runs/evaluation/chapter4")
-COLOURS = {"yes": "green", "in part": "yellow", "no": "red"}
 
 
 def chapter4(
@@ -47,7 +46,8 @@ def chapter4(
         console.print("hmmlearn is not installed: its plain HMM is left out (pip install hmmlearn brings it)")
     work = experiments(wanted, QUICK if quick else Scale(), with_hmmlearn=with_hmmlearn)
     cache = user_cache_path("paramove") / "chapter4"
-    results = stored_results(work, cache, "experiments", console, jobs=jobs, scheduler=scheduler)
+    keys = [one.key() for one in work]
+    results = stored_results(work, keys, cache, "experiments", console, jobs=jobs, scheduler=scheduler)
     folder = out.resolve()
     numbers, targets = write_results(results, folder)
     for title, heads, rows in (
@@ -58,7 +58,7 @@ def chapter4(
         for head in heads:
             table.add_column(head)
         for *cells, verdict in rows:
-            table.add_row(*cells, f"[{COLOURS[verdict]}]{verdict}[/]")
+            table.add_row(*cells, marked(verdict))
         console.print(table)
     write_numbers(json_file, plain(numbers), console)
     console.print(f"report: {folder / 'report.html'}", markup=False, soft_wrap=True)

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, write_numbers
 from paramove.supervision import exit_codes
-from studies.stored_results import stored_results
+from studies.terminal import marked, say_error, stored_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from studies.chapter6.goals import Goal
 
 CHAPTER6_FOLDER = Path("runs/evaluation/chapter6")
-COLOURS = {"yes": "green", "in part": "yellow", "no": "red", "–": "bright_black"}
 
 
 class SplitName(StrEnum):
@@ -66,7 +65,7 @@ def chapter6(
     selection = Selection(split.value, names, 1 if quick else first, quick)
     work = _prepared(selection, clips.resolve() if clips is not None else None, data, console)
     cache = user_cache_path("paramove") / "chapter6" / "tracks"
-    results = stored_results(work, cache, "tracks", console, jobs=jobs)
+    results = stored_results(work, [one.key() for one in work], cache, "tracks", console, jobs=jobs)
     _report(work, results, out.resolve(), json_file, console)
 
 
@@ -81,10 +80,10 @@ def _prepared(selection: Selection, clips: Path | None, data: Path | None, conso
         with console.status("learning what the trackers need to know"):
             train(selection, data)
     except InputError as error:
-        _say_error(str(error))
+        say_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING if error.missing else exit_codes.USAGE) from error
     except RecordingsError as error:
-        _say_error(f"{error}; without them, leave kind 'recorded' out: name the others with --kind")
+        say_error(f"{error}; without them, leave kind 'recorded' out: name the others with --kind")
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
     return work
 
@@ -111,7 +110,7 @@ def _print_findings(findings: Sequence[dict[str, str]], console: Console) -> Non
     for head in ("where", "here", "the same"):
         table.add_column(head)
     for one in findings:
-        table.add_row(one["where"], one["seen"], _marked(one["verdict"]))
+        table.add_row(one["where"], one["seen"], marked(one["verdict"]))
     console.print(table)
 
 
@@ -123,16 +122,8 @@ def _print_goals(goals: Sequence[Goal], console: Console) -> None:
         table.add_column(head)
     for goal in goals:
         if goal.met is not None:
-            table.add_row(*goal[:4], _marked(met(goal)))
+            table.add_row(*goal[:4], marked(met(goal)))
     console.print(table)
     unjudged = sum(goal.met is None for goal in goals)
     if unjudged:
         console.print(f"{unjudged} more goals are not judged: of these, the chosen clips are none or too few")
-
-
-def _marked(verdict: str) -> str:
-    return f"[{COLOURS[verdict]}]{verdict}[/]"
-
-
-def _say_error(text: str) -> None:
-    Console(stderr=True, highlight=False, markup=False).print(text, soft_wrap=True)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from platformdirs import user_cache_path
 from rich.console import Console
-from rich.progress import Progress
 from rich.table import Table
 
-from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, workspace_here, write_numbers
+from paramove.cli.evaluation_io import JsonFileOption, workspace_here, write_numbers
 from paramove.supervision import exit_codes
+from studies.terminal import say_error, stored_results
 
 if TYPE_CHECKING:
     from studies.movements.sweep import Row
@@ -98,9 +98,9 @@ def peers(
     left_out = [name for name, names in absent.items() if names]
     notes = [f"not installed: {', '.join(without)}; left out: {', '.join(left_out)}"] if left_out else []
     for note in notes:
-        _say_error(f"{note}. pip install 'paramove[peers]' brings them")
+        say_error(f"{note}. pip install 'paramove[peers]' brings them")
     if len(left_out) == len(theirs):
-        _say_error("no peer is installed: pip install 'paramove[peers]' brings them")
+        say_error("no peer is installed: pip install 'paramove[peers]' brings them")
         raise typer.Exit(exit_codes.INPUT_MISSING)
     rows = _chosen([*our_rows(), *(row for row in theirs if not absent[row.name])], methods)
     folds = _tasks(on, data, tasks)
@@ -125,10 +125,10 @@ def _tasks(on: Scope, data: Path | None, wanted: list[str] | None) -> dict[str, 
         if on is not Scope.REAL:
             folds |= raster_tasks()
     except RecordingsError as error:
-        _say_error(str(error))
+        say_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
     if not folds:
-        _say_error("nothing can be left out of these recordings: they are of one person, or of one target")
+        say_error("nothing can be left out of these recordings: they are of one person, or of one target")
         raise typer.Exit(exit_codes.INPUT_MISSING)
     chosen = {name: found for name, found in folds.items() if not wanted or any(text in name for text in wanted)}
     if not chosen:
@@ -149,25 +149,13 @@ def _compare(
 ) -> None:
     from studies.movements.report import plain, write_report
     from studies.movements.summary import summarised
-    from studies.movements.sweep import ClusterMissingError, jobs_of, run_jobs
+    from studies.movements.sweep import jobs_of, keys_of
 
     console = Console(highlight=False, emoji=False)
     folder = (out or workspace_here() / FOLDER / name).resolve()
     cache = user_cache_path("paramove") / "movements"
-    with Progress(*PROGRESS, console=console) as progress:
-        shown = progress.add_task("folds", total=None)
-
-        def finished(done: int, total: int, last: str) -> None:
-            progress.update(shown, completed=done, total=total, description=last[:60] or "folds")
-
-        try:
-            results = run_jobs(jobs_of(rows, folds), cache, workers=jobs, scheduler=scheduler, finished=finished)
-        except ClusterMissingError as error:
-            _say_error(str(error))
-            raise typer.Exit(exit_codes.INPUT_MISSING) from error
-        except KeyboardInterrupt:
-            console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
-            raise typer.Exit(130) from None
+    work = jobs_of(rows, folds)
+    results = stored_results(work, keys_of(work), cache, "folds", console, jobs=jobs, scheduler=scheduler)
     summary = summarised(results)
     wide = Console(highlight=False, emoji=False, width=max(console.width, 150))
     for task, found in summary.items():
@@ -192,7 +180,3 @@ def _table(task: str, rows: dict[str, dict[str, Any]]) -> Table:
         marked = [f"[bold]{cell}[/]" if name in best[q.name] else cell for cell, q in zip(cells, shown, strict=True)]
         table.add_row(name, *marked, f"{row['seconds']['fit']:.2f}")
     return table
-
-
-def _say_error(text: str) -> None:
-    Console(stderr=True, highlight=False, markup=False).print(text, soft_wrap=True)

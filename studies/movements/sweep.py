@@ -115,9 +115,13 @@ def run_jobs(
     Interrupted, everything that is finished stays in `cache`. With `scheduler` (host:port of a Dask scheduler) the
     cluster computes. Raises ClusterMissingError without one.
     """
+    return run_stored(jobs, keys_of(jobs), cache, workers=workers, scheduler=scheduler, finished=finished)
+
+
+def keys_of(jobs: Sequence[Job]) -> list[str]:
+    """Under which the jobs' results are stored."""
     digests = {id(fold): fold_digest(fold) for fold in {id(job.fold): job.fold for job in jobs}.values()}
-    keys = [job.key(digests[id(job.fold)]) for job in jobs]
-    return run_stored(jobs, keys, cache, workers=workers, scheduler=scheduler, finished=finished)
+    return [job.key(digests[id(job.fold)]) for job in jobs]
 
 
 def run_stored(

@@ -21,7 +21,7 @@ def unknown(words):
 
 def unknown_study(words):
     """The same of `python -m studies`."""
-    return unknown_to(typer.main.get_command(studies), ["studies", *words])
+    return unknown_to(typer.main.get_command(studies), words)
 
 
 def unknown_to(command, words):
@@ -29,7 +29,7 @@ def unknown_to(command, words):
     for number, word in enumerate(words):
         if word in getattr(command, "commands", {}):
             command = command.commands[word]
-        elif hasattr(command, "commands") and re.fullmatch(r"[a-z_-]+", word) and number < 2 and word != words[0]:
+        elif hasattr(command, "commands") and re.fullmatch(r"[a-z_-]+", word) and number < 2:
             return word
     known = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
     options = {word.partition("=")[0].rstrip(".]") for word in words if re.match(r"--?[a-z]", word)}

@@ -1,4 +1,4 @@
-"""What the commands of `paramove evaluate` take in and give out alike: the workspace, seeds, numbers as JSON."""
+"""What `paramove evaluate` and the studies take in and give out alike: the workspace, seeds, numbers as JSON."""
 
 from __future__ import annotations
 

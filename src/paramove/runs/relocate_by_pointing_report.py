@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
-from paramove.documents.report_page import film, report_page, section
+from paramove.documents.report_page import film, image, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing_video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in
@@ -48,7 +47,7 @@ def write_relocation_report(
         ),
     ]  # fmt: skip
     path = run.folder / "report.html"
-    path.write_text(report_page(title, title, told, parts, good=good), encoding="utf-8")
+    path.write_text(report_page(title, title, told, parts, good=good, style="img{width:100%}"), encoding="utf-8")
     return path
 
 
@@ -90,8 +89,8 @@ def _words(one: PointedRelocation) -> str:
     return f"{sure}; {end}; {'good' if one.good else 'not good'}."
 
 
-def _two(picture: str | None, one: PointedRelocation) -> str:
-    seen = "" if picture is None else f"<img alt='' src='data:image/jpeg;base64,{picture}' style='width:100%'>"
+def _two(picture: bytes | None, one: PointedRelocation) -> str:
+    seen = "" if picture is None else image(picture, "", "jpeg")
     return f"<div class=two><div>{seen}</div><div>{plots.svg_of(close_up, one, (4.4, 3.6))}</div></div>"
 
 
@@ -110,8 +109,8 @@ def _table(summary: dict[str, Any]) -> str:
     return f"<table><tr>{shown}</tr>{rows}</table>"
 
 
-def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[int, str]:
-    """Number of a relocation -> what the first camera saw when the place was recognised, with the ball, JPEG base64."""
+def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[int, bytes]:
+    """Number of a relocation -> what the first camera saw when the place was recognised, with the ball, JPEG."""
     outlines = {
         recorded.log_ns: recorded.message
         for recorded in recording_in(run.folder, "recording.mcap").read({topics.ACTION_OUTLINE.name})
@@ -124,6 +123,6 @@ def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[in
     for recorded in recording_in(run.folder, "recording.mcap").read({CAMERA}):
         if recorded.log_ns in wanted:
             shown = drawn(decode(recorded.message), outlines[recorded.log_ns], "", PICTURE_PX)
-            image = np.ascontiguousarray(shown[:, :, ::-1])
-            found[wanted[recorded.log_ns]] = base64.b64encode(encode(Frame(image, 0, 0), 85).data).decode()
+            pixels = np.ascontiguousarray(shown[:, :, ::-1])
+            found[wanted[recorded.log_ns]] = encode(Frame(pixels, 0, 0), 85).data
     return found

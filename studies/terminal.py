@@ -1,4 +1,4 @@
-"""Pieces of work whose results are kept, so that a study that was interrupted goes on where it was."""
+"""What the commands of the studies show alike: verdicts, errors, and the progress of work whose results are kept."""
 
 from __future__ import annotations
 
@@ -12,16 +12,36 @@ from rich.progress import Progress
 
 from paramove.cli.evaluation_io import PROGRESS
 from paramove.supervision import exit_codes
-from studies.movements.sweep import ClusterMissingError, run_stored
+
+_COLOURS = {"yes": "green", "in part": "yellow", "no": "red", "–": "bright_black"}
+
+
+def marked(verdict: str) -> str:
+    """A verdict ("yes", "in part", "no" or "–") in its colour, as Rich's markup."""
+    return f"[{_COLOURS[verdict]}]{verdict}[/]"
+
+
+def say_error(text: str) -> None:
+    """To standard error, unbroken."""
+    Console(stderr=True, highlight=False, markup=False).print(text, soft_wrap=True)
 
 
 def stored_results(
-    work: Sequence[Any], cache: Path, title: str, console: Console, *, jobs: int, scheduler: str | None = None
+    work: Sequence[Any],
+    keys: Sequence[str],
+    cache: Path,
+    title: str,
+    console: Console,
+    *,
+    jobs: int,
+    scheduler: str | None = None,
 ) -> list[dict[str, Any]]:
-    """Results of all pieces of work, with a progress bar; what is finished is kept in `cache`.
+    """Results of all pieces of work, with a progress bar; what is finished is kept in `cache` by its key.
 
-    Each piece has a `key()`. The command ends with exit code 66 without the cluster of `scheduler`, 130 on Ctrl-C.
+    The command ends with exit code 66 without the cluster of `scheduler`, 130 on Ctrl-C.
     """
+    from studies.movements.sweep import ClusterMissingError, run_stored
+
     with Progress(*PROGRESS, console=console) as progress:
         shown = progress.add_task(title, total=None)
 
@@ -29,10 +49,9 @@ def stored_results(
             progress.update(shown, completed=done, total=total, description=last[:60] or title)
 
         try:
-            keys = [one.key() for one in work]
             return run_stored(work, keys, cache, workers=jobs, scheduler=scheduler, finished=finished)
         except ClusterMissingError as error:
-            Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
+            say_error(str(error))
             raise typer.Exit(exit_codes.INPUT_MISSING) from error
         except KeyboardInterrupt:
             console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
