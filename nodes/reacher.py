@@ -8,10 +8,9 @@ Says    arm/trajectory          JointTrajectory         event   rad
 """
 
 from pathlib import Path
-from typing import Any
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
 from paramove.imitation.reach_task import ReachStep, ReachTask
 from paramove.imitation.servo_arm_reaching import ServoArmReaching
 from paramove.imitation.setup import MovementSource
@@ -41,10 +40,7 @@ def run(bus: Bus, config: Config) -> None:
             hear[HEARS.index(event.topic)](event.message)
             continue
         said = task.tick(event.now_ns)
-        messages: tuple[Any, ...] = (said.trajectories, said.speech)
-        for topic, some in zip(SAYS, messages, strict=True):
-            for message in some:
-                bus.publish(topic, message)
+        publish_each(bus, SAYS, (said.trajectories, said.speech))
         if task.failure:
             bus.failed(task.failure)
         if task.finished or task.failure:

@@ -9,10 +9,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
         speech               Speech             event
 """
 
-from typing import Any
-
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
 from paramove.rules.relocator import Relocator
 from paramove.rules.relocator_options import RelocatorOptions
 
@@ -34,10 +32,7 @@ def run(bus: Bus, config: Config) -> None:
             hear[HEARS.index(event.topic)](event.message)
             continue
         said = relocator.tick(event.now_ns * 1e-9)
-        messages: tuple[Any, ...] = (said.goals, said.stages, said.speech)
-        for topic, some in zip(SAYS, messages, strict=True):
-            for message in some:
-                bus.publish(topic, message)
+        publish_each(bus, SAYS, (said.goals, said.stages, said.speech))
         if relocator.failure:
             bus.failed(relocator.failure)
         if relocator.finished or relocator.failure:

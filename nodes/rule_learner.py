@@ -11,7 +11,7 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
 """
 
 from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
+from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
 from paramove.rules.rule_learner import RuleLearner
 from paramove.rules.stage import Pointing, RuleLearnerOptions
 from paramove.rules.table import Surface
@@ -36,8 +36,8 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until all objects are put away, the arm is not armed any more, or the bus closes."""
     places = config.model_dump(exclude={"surface_x", "surface_y"})
-    surface = Surface(config.surface_x, config.surface_y)
-    learner = RuleLearner(RuleLearnerOptions(**places, surface=surface), f"goal-{bus.now_ns}")
+    options = RuleLearnerOptions(**places, surface=Surface(config.surface_x, config.surface_y))
+    learner = RuleLearner(options, f"goal-{bus.now_ns}")
     hear = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")
     for event in bus.events(*HEARS, tick=True):
@@ -45,9 +45,7 @@ def run(bus: Bus, config: Config) -> None:
             hear[HEARS.index(event.topic)](event.message)
             continue
         said = learner.tick(event.now_ns * 1e-9)
-        for topic, new in zip(SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech), strict=True):
-            for message in new:  # type: ignore[attr-defined]
-                bus.publish(topic, message)
+        publish_each(bus, SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech))
         if learner.failure:
             bus.failed(learner.failure)
         if learner.finished or learner.failure:

@@ -18,7 +18,7 @@ import argparse
 import logging
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,7 +34,7 @@ from paramove.bus.turns import Tick
 from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 
-__all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "read_node_file"]
+__all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "publish_each", "read_node_file"]
 
 _log = logging.getLogger(__name__)
 
@@ -80,6 +80,13 @@ def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Con
         return file, config_type.model_validate(file.parameters)
     except ValidationError as error:
         raise ConfigurationError(_sentence(path, error, "parameters.")) from error
+
+
+def publish_each(bus: Bus, said: Sequence[Topic], messages: Sequence[Iterable[Any]]) -> None:
+    """Says all messages of the first topic, then those of the second, and so on; see `Bus.publish`."""
+    for topic, some in zip(said, messages, strict=True):
+        for message in some:
+            bus.publish(topic, message)
 
 
 def main(
