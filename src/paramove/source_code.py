@@ -17,6 +17,7 @@ _IMPORT = re.compile(
     rb"import[ \t]+((?:paramove|sim|studies)\.[\w.]+))",
     re.MULTILINE,
 )
+_IN_STUB = re.compile(r"^from \.([\w.]+) import (\w+) as", re.MULTILINE)
 
 
 @cache
@@ -55,11 +56,19 @@ def _origin(module: str, name: str) -> str:
 
 @cache
 def _imports(module: str) -> list[tuple[str, list[str]]]:
-    """The modules of the project that the source of a module imports, with the names that it takes from each."""
-    return [
+    """The modules of the project that the source of a module imports, with the names that it takes from each.
+
+    A package that imports only what is asked for has its names in a stub beside it.
+    """
+    found = [
         ((source or whole).decode(), [name.decode() for name in re.findall(rb"\w+", names)])
         for source, names, whole in _IMPORT.findall(_source(module))
     ]
+    file = _file(module)
+    stub = file.with_suffix(".pyi") if file is not None and file.name == "__init__.py" else None
+    if stub is not None and stub.is_file():
+        found += [(f"{module}.{source}", [name]) for source, name in _IN_STUB.findall(stub.read_text(encoding="utf-8"))]
+    return found
 
 
 @cache

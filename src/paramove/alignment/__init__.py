@@ -1,5 +1,5 @@
 """Alignment of movements in time: dynamic time warping (thesis appendix B)."""
 
-from paramove.alignment.warping import Alignment, movement_distance, warp
+import lazy_loader
 
-__all__ = ["Alignment", "movement_distance", "warp"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

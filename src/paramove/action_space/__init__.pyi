@@ -1,0 +1,17 @@
+from .grammar import Grammar as Grammar
+from .grammar_file import read_grammar as read_grammar
+from .particle_filter import FilterOptions as FilterOptions
+from .placement import PersonPlacement as PersonPlacement
+from .setup import Person as Person
+from .setup import TrackingSetup as TrackingSetup
+from .target_detection import DetectedTarget as DetectedTarget
+from .target_detection import DetectionOptions as DetectionOptions
+from .track_health import HealthOptions as HealthOptions
+from .tracker import ActionBelief as ActionBelief
+from .tracker import ActionTracker as ActionTracker
+from .tracker import TrackerOptions as TrackerOptions
+from .training import table_action as table_action
+from .video_tracker import TrackedMoment as TrackedMoment
+from .video_tracker import VideoTracker as VideoTracker
+from .vocabulary import ActionModel as ActionModel
+from .vocabulary import Vocabulary as Vocabulary

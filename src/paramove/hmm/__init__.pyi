@@ -1,0 +1,12 @@
+from .chain import ChainParameters as ChainParameters
+from .chain import Topology as Topology
+from .estimation import Parameters as Parameters
+from .filtering import OnlineFilter as OnlineFilter
+from .gaussian import GaussianHMM as GaussianHMM
+from .left_right import LeftRightHMM as LeftRightHMM
+from .options import TrainingOptions as TrainingOptions
+from .options import TrainingSummary as TrainingSummary
+from .rejection import LikelihoodTest as LikelihoodTest
+from .sequences import SequenceLengthError as SequenceLengthError
+from .sequences import resample as resample
+from .training import LikelihoodDecreaseWarning as LikelihoodDecreaseWarning

@@ -1,0 +1,14 @@
+from .classification import Classification as Classification
+from .classification import MovementClassifier as MovementClassifier
+from .description import MovementDescription as MovementDescription
+from .grid import ParameterGrid as ParameterGrid
+from .interpolative import InterpolativePHMM as InterpolativePHMM
+from .neural import NeuralPHMM as NeuralPHMM
+from .parametric import ParameterEstimate as ParameterEstimate
+from .parametric import ParametricHMM as ParametricHMM
+from .polynomial import CubicPHMM as CubicPHMM
+from .polynomial import Examination as Examination
+from .polynomial import LinearPHMM as LinearPHMM
+from .polynomial import PolynomialPHMM as PolynomialPHMM
+from .polynomial import QuadraticPHMM as QuadraticPHMM
+from .storage import ModelFileError as ModelFileError
