@@ -41,9 +41,9 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # run as a program, only this folder is known
 
 from benchmarks.fuzz_bus import mutate  # noqa: E402
+from paramove.cameras.frames import FrameError  # noqa: E402
 from paramove.documents.positions import LaunchFileError  # noqa: E402
 from paramove.input_error import InputError  # noqa: E402
-from paramove.vision.frames import FrameError  # noqa: E402
 
 MOST_S = 5.0
 HANGS_S = 30.0
@@ -128,7 +128,7 @@ def _calibration(path: Path) -> object:
 
 
 def _cameras(path: Path) -> object:
-    from paramove.observation.cameras import read_cameras
+    from paramove.cameras.calibrated import read_cameras
 
     return read_cameras(path)
 
@@ -158,16 +158,16 @@ def _node(path: Path) -> object:
 
 
 def _picture(path: Path) -> object:
-    from paramove.vision.calibration_images import file_source
-    from paramove.vision.frame_sources import open_source
-    from paramove.vision.replayed_frames import PICTURES
+    from paramove.cameras.calibration_images import file_source
+    from paramove.cameras.frame_sources import open_source
+    from paramove.cameras.replayed_frames import PICTURES
 
     found = file_source(path.parent).held()
     return open_source(f"folder:{path.parent}@10", 64, 48).frame(0) if path.suffix in PICTURES else found
 
 
 def _video(path: Path) -> object:
-    from paramove.vision.frame_sources import FileFrames
+    from paramove.cameras.frame_sources import FileFrames
 
     frames = FileFrames(path)
     try:
@@ -439,7 +439,7 @@ def _arm(folder: Path) -> bytes:
 
 
 def _two_cameras(folder: Path) -> bytes:
-    from paramove.observation.cameras import CalibratedCamera, write_cameras
+    from paramove.cameras.calibrated import CalibratedCamera, write_cameras
 
     matrix = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
     two = [CalibratedCamera(name, 640, 480, matrix, np.zeros(5), np.eye(4)) for name in ("left", "right")]

@@ -28,17 +28,17 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
+from paramove.cameras.frames import Frame, decode, encode
 from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
 from paramove.imitation.setup import MovementSource, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
+from paramove.objects.colour_tracker import ColourTracker
+from paramove.objects.homography import PlaneHomography
+from paramove.objects.recognizer import Recognizer
 from paramove.robots.description import RobotDescription
 from paramove.runs.batch import seeds_of
-from paramove.vision.colour_tracker import ColourTracker
-from paramove.vision.frames import Frame, decode, encode
-from paramove.vision.homography import PlaneHomography
-from paramove.vision.recognizer import Recognizer
 from sim import looks, places, scene, tool_box
 from sim.camera import Eye, Sensor
 from sim.hand_path import minimum_jerk

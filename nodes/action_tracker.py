@@ -12,7 +12,7 @@ from paramove.action_space.messages import arm_pose_message, estimate_message, o
 from paramove.action_space.setup import TrackingSetup
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.vision.frames import FrameError, decode
+from paramove.cameras.frames import FrameError, decode
 
 HEARS = topics.CAMERA_IMAGES
 SAYS = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)

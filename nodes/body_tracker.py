@@ -9,9 +9,9 @@ Says    human/arm_pose                    ArmPose                     15 Hz   ta
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.vision.body_messages import arm_pose_message, outline_message, scene_message
-from paramove.vision.body_tracking import BodyTrackingSetup
-from paramove.vision.frames import FrameError, decode
+from paramove.cameras.frames import FrameError, decode
+from paramove.observation.body_messages import arm_pose_message, outline_message, scene_message
+from paramove.observation.body_tracking import BodyTrackingSetup
 
 HEARS = topics.CAMERA_IMAGES
 SAYS = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)

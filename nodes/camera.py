@@ -8,8 +8,8 @@ from pydantic import Field
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.vision.frame_sources import open_source
-from paramove.vision.frames import EndOfFrames, FrameChecks, FrameError, encode
+from paramove.cameras.frame_sources import open_source
+from paramove.cameras.frames import EndOfFrames, FrameChecks, FrameError, encode
 
 HEARS = (topics.CAMERA_LIGHT,)
 SAYS = (topics.CAMERA_IMAGE,)

@@ -6,8 +6,8 @@ Says    objects/tracked  TrackedObjects             15 Hz   image plane, pixels
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
-from paramove.vision.colour_tracker import DEFAULT_COLOURS, Colour, ColourTracker
-from paramove.vision.frames import FrameError, decode
+from paramove.cameras.frames import FrameError, decode
+from paramove.objects.colour_tracker import DEFAULT_COLOURS, Colour, ColourTracker
 
 HEARS = (topics.CAMERA_IMAGE,)
 SAYS = (topics.OBJECTS_TRACKED,)

@@ -11,11 +11,11 @@ Says    gestures            Gesture            event   pixels, and metres once c
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
-from paramove.vision.homography import HomographyError, PlaneHomography
-from paramove.vision.object_motion import MotionThresholds
-from paramove.vision.pointing import PointingThresholds
-from paramove.vision.pointing_source import PointingSetup
-from paramove.vision.recognizer import Recognizer, RecognizerOptions
+from paramove.objects.homography import HomographyError, PlaneHomography
+from paramove.objects.object_motion import MotionThresholds
+from paramove.objects.pointing import PointingThresholds
+from paramove.objects.recognizer import Recognizer, RecognizerOptions
+from paramove.pointing.source import PointingSetup
 
 HEARS = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE, topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE)
 SAYS = (topics.GESTURES, topics.GESTURES_SCENE)

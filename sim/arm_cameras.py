@@ -11,7 +11,7 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
-from paramove.observation.cameras import CalibratedCamera
+from paramove.cameras.calibrated import CalibratedCamera
 from sim.camera import Eye, Image
 from sim.human import camera_frame
 from sim.performances import Lens

@@ -11,8 +11,8 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
+from paramove.cameras.calibrated import write_cameras
 from paramove.msgs.truth_pb2 import TruthArm
-from paramove.observation.cameras import write_cameras
 from paramove.robots.description import RobotDescription
 from sim import scene
 from sim.arm_cameras import ArmCameras, add_arm_cameras, calibrated, draw_arm_cameras

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.observation.cameras import CalibratedCamera
+from paramove.cameras.calibrated import CalibratedCamera
 from sim.human import Pattern, PersonLook, add_person, camera_frame
 from sim.persons.performances import Performance
 from sim.worn_markers import add_markers, mute

@@ -11,9 +11,9 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
+from paramove.cameras.calibrated import write_cameras
 from paramove.demonstrations.reaching import table_place
 from paramove.msgs.truth_pb2 import TruthArm
-from paramove.observation.cameras import write_cameras
 from sim.performances import Studio
 from sim.persons.performances import Performance, assembled, kind_named, pointed_once
 from sim.persons.performers import draw_performer

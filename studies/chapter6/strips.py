@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera
 from sim.persons.clips import Clip
 from studies.chapter6.measures import Track
 

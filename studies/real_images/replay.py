@@ -21,13 +21,13 @@ from paramove.action_space.propagation import PropagationOptions
 from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import Vocabulary
+from paramove.cameras.calibrated import CalibratedCamera
+from paramove.cameras.frame_sources import open_source
+from paramove.cameras.frames import EndOfFrames, FrameChecks, decode, encode
 from paramove.input_error import InputError
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera
-from paramove.vision.frame_sources import open_source
-from paramove.vision.frames import EndOfFrames, FrameChecks, decode, encode
 from studies.real_images import seated_person
 from studies.real_images.pointing_model import NAME, pointing_action
 

@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.documents.report_page import report_page, section
-from paramove.observation.cameras import CalibratedCamera
 from studies.chapter4.drawing import drawn
 from studies.real_images.experiment import JUDGED, Replay
 from studies.real_images.scores import GOAL_PX, RANGES, middle_of_hand

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.placement import PersonPlacement
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.arm import unit
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
-from paramove.observation.cameras import CalibratedCamera
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 
 from paramove.action_space.training import table_action_demonstrations, train_action
+from paramove.cameras.calibrated import CalibratedCamera, write_cameras
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera, write_cameras
 from tests.action_space.performances import performed
 
 WIDTH, HEIGHT = 160, 120

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from paramove.observation.cameras import read_cameras
-from paramove.vision.charuco_board import BoardFinder
+from paramove.cameras.calibrated import read_cameras
+from paramove.cameras.charuco_board import BoardFinder
+from tests.cameras.board_scene import Sheet, blank, camera, held, looking, session
 from tests.cli.conftest import call
-from tests.vision.board_scene import Sheet, blank, camera, held, looking, session
 
 SHEET = Sheet()
 EYES = {
@@ -178,7 +178,7 @@ def test_no_such_live_camera(tmp_path):
 
 def test_the_scene_shows_what_the_camera_sees():
     """The images of these tests are true: corners are found where the camera's own projection puts them."""
-    from paramove.vision.charuco_board import Board
+    from paramove.cameras.charuco_board import Board
 
     eye = EYES["left"]
     view = BoardFinder().find(SHEET.seen_by(eye))

@@ -18,7 +18,7 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.msgs.tracked_objects_pb2 import OutlinePoint, TrackedObject, TrackedObjects
-from paramove.vision.homography import PlaneHomography
+from paramove.objects.homography import PlaneHomography
 
 WIDTH, HEIGHT = 480, 360
 ORANGE_BGR = (20, 120, 240)

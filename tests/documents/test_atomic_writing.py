@@ -6,13 +6,13 @@ import stat
 import numpy as np
 import pytest
 
+from paramove.cameras.calibrated import write_cameras
 from paramove.demonstrations.labels import LabelsFile, Segment, append_segments, write_labels
 from paramove.demonstrations.pose_recording import PoseRecording, write_poses
 from paramove.documents.atomic_writing import replacing
-from paramove.observation import write_cameras
 from paramove.robots.dynamixel.arm_calibration import sign_again
 from paramove.training.movement_writing import Made, write_movement
-from tests.observation.test_cameras import lens_camera
+from tests.cameras.test_calibrated import lens_camera
 from tests.phmm.test_model_files import small_model
 from tests.robots.dynamixel.test_arm_calibration import ARM
 

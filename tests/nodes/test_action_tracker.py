@@ -10,8 +10,8 @@ from paramove.action_space.messages import TablePlace
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
+from paramove.cameras.frames import Frame, encode
 from paramove.demonstrations import table_place
-from paramove.vision.frames import Frame, encode
 from tests.action_space.drawn_arm import camera, drawn, pointing, write_setup
 
 

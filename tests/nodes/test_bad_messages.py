@@ -33,26 +33,26 @@ from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
+from paramove.cameras.calibrated import write_cameras
+from paramove.cameras.frames import Frame, encode
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
-from paramove.observation.cameras import write_cameras
-from paramove.vision.frames import Frame, encode
-from paramove.vision.homography import PlaneHomography
+from paramove.objects.homography import PlaneHomography
 from tests.action_space import drawn_arm
 from tests.imitation.fake_driver import Cell, goal
 from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 from tests.imitation.servo_cell import ServoCell
 from tests.nodes.bad_messages import first_not_finite, variants
 from tests.nodes.test_reacher import ARM_FOLDER, TASKS
+from tests.objects.tracks import hand_with_tip, image_of, standing
+from tests.observation.test_markers import EYES, with_markers
+from tests.pointing.persons import performed, poses
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import FakeRobot, trajectory
 from tests.rules.pointing_story import PointingStory
 from tests.rules.story import Story
-from tests.vision.persons import performed, poses
-from tests.vision.test_markers import EYES, with_markers
-from tests.vision.tracks import hand_with_tip, image_of, standing
 
 PERIOD_NS = 66_666_667
 Event = Heard | Tick

@@ -10,11 +10,11 @@ from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
+from paramove.cameras.calibrated import write_cameras
+from paramove.cameras.frames import Frame, encode
 from paramove.input_error import InputError
-from paramove.observation.cameras import write_cameras
-from paramove.vision.frames import Frame, encode
 from tests.nodes.recorded_bus import PERIOD_NS
-from tests.vision.test_markers import ARM, EYES, HUES, with_colours, with_markers
+from tests.observation.test_markers import ARM, EYES, HUES, with_colours, with_markers
 
 BOTH = (0, 1)
 

@@ -13,8 +13,8 @@ from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
+from paramove.cameras.frames import FrameError, decode
 from paramove.input_error import InputError
-from paramove.vision.frames import FrameError, decode
 from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard, bus_with_ticks
 
 

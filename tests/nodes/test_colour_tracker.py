@@ -4,7 +4,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from nodes import colour_tracker
 from paramove.bus import topics
-from paramove.vision.frames import Frame, encode
+from paramove.cameras.frames import Frame, encode
 from tests.nodes.recorded_bus import bus_that_heard
 
 

@@ -6,8 +6,8 @@ from paramove.demonstrations import table_place
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard
-from tests.vision.persons import performed, poses
-from tests.vision.tracks import image_of, standing
+from tests.objects.tracks import image_of, standing
+from tests.pointing.persons import performed, poses
 
 
 def test_says_gestures_with_places_once_calibrated() -> None:

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.input_error import InputError
-from paramove.observation import ArmObserver, ArmSizes, CalibratedCamera, ObservationOptions
+from paramove.observation import ArmObserver, ArmSizes, ObservationOptions
 from tests.observation.scenes import cluttered, displaced, rendered_person
 from tests.observation.test_silhouette import drawn
 from tests.observation.views import camera_at, four_cameras, some_poses

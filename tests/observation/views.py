@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations import RESTING_SHOULDER
-from paramove.observation import ArmSizes, CalibratedCamera, fitted_poses
+from paramove.observation import ArmSizes, fitted_poses
 
 AROUND = ((1.7, 0.0, 0.9), (1.2, -1.2, 0.8), (0.3, -1.8, 0.7), (0.9, 1.1, 1.1))
 """Places of four cameras about the table, m."""

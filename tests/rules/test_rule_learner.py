@@ -11,9 +11,9 @@ from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
+from paramove.objects.homography import PlaneHomography
 from paramove.rules.conversation import SILENT_S
 from paramove.rules.rule_learner import RuleLearner
-from paramove.vision.homography import PlaneHomography
 from tests.rules.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REFUSED, SUCCEEDED, Story
 
 CALIBRATE, LEARN = ApplicationStage.STAGE_CALIBRATE, ApplicationStage.STAGE_LEARN

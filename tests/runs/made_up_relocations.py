@@ -15,7 +15,7 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.truth_pb2 import TruthArm, TruthBody, TruthLayout, TruthState
 from paramove.recording.writer import RecordingWriter
-from paramove.vision.frames import Frame, encode
+from paramove.cameras.frames import Frame, encode
 
 PERIOD_NS = 66_666_667
 EVERY_S = 10.0

@@ -15,12 +15,12 @@ from paramove.action_space.setup import TrackingSetup
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
+from paramove.cameras.calibrated import read_cameras
 from paramove.msgs.rule_pb2 import Speech
-from paramove.observation.cameras import read_cameras
+from paramove.objects.colour_tracker import ColourTracker
+from paramove.pointing.events import PointingEventOptions, PointingEvents
 from paramove.robots.description import RobotDescription
 from paramove.supervision.launch_file import load
-from paramove.vision.colour_tracker import ColourTracker
-from paramove.vision.pointing_events import PointingEventOptions, PointingEvents
 from sim import arm_simulator, looks, tool_box, truth
 from sim.arm_instructor import SEATED_S, TIP
 from sim.arm_simulation import ArmSimulation

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from paramove.observation.arm_body import ArmSizes
-from paramove.observation.cameras import CalibratedCamera
 from sim import human
 from sim.human import ArmSilhouette, PersonLook, camera_frame, tapered_capsule
 

@@ -12,9 +12,9 @@ from paramove.bus import topics
 from paramove.bus.subscriber import Heard
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.rule_pb2 import Speech
+from paramove.objects.colour_tracker import ColourTracker
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.stream import StreamWriter
-from paramove.vision.colour_tracker import ColourTracker
 from sim import looks, tool_box, truth
 from sim.camera import Eye, GraphicsError
 from sim.simulation import Simulation, step_of_tick

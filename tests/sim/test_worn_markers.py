@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paramove.vision.body_tracking import BodyTrackingSetup
+from paramove.observation.body_tracking import BodyTrackingSetup
 from sim.pointing_world import PointingWorld
 from sim.worn_markers import muted
 

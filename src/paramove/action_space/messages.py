@@ -9,19 +9,25 @@ import numpy as np
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict
 
 from paramove.action_space.video_tracker import TrackedMoment
+from paramove.cameras.calibrated import WORLD_FRAME
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.arm_body import BENT_POSE_POINTS, HAND
-from paramove.observation.cameras import WORLD_FRAME
-from paramove.vision.pointing_events import BALL_M, ball_colour, certainty
 
 Floats = NDArray[np.float64]
 
 NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", "wrist": "wrist"}
+
+
+UNCERTAIN_M = 0.10
+"""Deviation of a target from which on nothing is known of it: the ball that shows it is red (figure 6.10)."""
+
+BALL_M = 0.03
+"""Diameter of that ball."""
 
 
 class TablePlace(BaseModel):
@@ -56,6 +62,17 @@ class TablePlace(BaseModel):
 
 
 AT_TABLE = TablePlace()
+
+
+def certainty(deviation: ArrayLike) -> float:
+    """0 to 1 of a target with these deviations along x, y, z in m."""
+    greatest = float(np.max(np.asarray(deviation, dtype=np.float64)))
+    return float(np.clip(1.0 - greatest / UNCERTAIN_M, 0.0, 1.0))
+
+
+def ball_colour(certain: float) -> tuple[float, float, float]:
+    """Red over yellow to green, each 0 to 1."""
+    return min(1.0, 2.0 * (1.0 - certain)), min(1.0, 2.0 * certain), 0.1
 
 
 def estimate_message(

@@ -18,11 +18,11 @@ from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
+from paramove.cameras.measured_files import measured_cameras, measured_file
 from paramove.documents.positions import read_document
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.measured_files import measured_cameras, measured_file
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 LEAST_GROWN = 0.8

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.tracker import ActionBelief, ActionTracker
+from paramove.cameras.aligned_views import AlignedViews, Views
+from paramove.cameras.calibrated import CalibratedCamera
+from paramove.cameras.watch import CameraWatch
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera
-from paramove.vision.aligned_views import AlignedViews, Views
-from paramove.vision.camera_watch import CameraWatch
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]

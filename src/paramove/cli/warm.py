@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from paramove.observation.cameras import CalibratedCamera
+    from paramove.cameras.calibrated import CalibratedCamera
 
 app = typer.Typer(add_completion=False)
 
@@ -107,7 +107,7 @@ def _interpolation() -> None:
 def _camera() -> CalibratedCamera:
     import numpy as np
 
-    from paramove.observation.cameras import CalibratedCamera
+    from paramove.cameras.calibrated import CalibratedCamera
 
     place = np.array([[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
     lens = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
@@ -135,7 +135,7 @@ def _reaching() -> None:
 def _tracking() -> None:
     """A tracker of pointing."""
     from paramove.action_space.setup import TrackingSetup
-    from paramove.observation.cameras import write_cameras
+    from paramove.cameras.calibrated import write_cameras
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cameras.yaml"

@@ -4,8 +4,5 @@ from .arm_body import ArmSizes as ArmSizes
 from .arm_body import fitted_poses as fitted_poses
 from .arm_observer import ArmObserver as ArmObserver
 from .arm_observer import ContourMatch as ContourMatch
-from .cameras import CalibratedCamera as CalibratedCamera
-from .cameras import read_cameras as read_cameras
-from .cameras import write_cameras as write_cameras
 from .options import ObservationOptions as ObservationOptions
 from .presence import Presence as Presence

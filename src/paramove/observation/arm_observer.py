@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
 from paramove.observation.background_kernels import FULL
-from paramove.observation.cameras import CalibratedCamera
 from paramove.observation.contour_kernels import EVERY, Contour, fill_segments, new_contour, place_key_points
 from paramove.observation.edge_images import EdgeImages
 from paramove.observation.edge_kernels import DIRECTIONS

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.observation.arm_body import HAND
 from paramove.observation.background_kernels import FULL
-from paramove.observation.cameras import CalibratedCamera
 
 Floats = NDArray[np.float64]
 

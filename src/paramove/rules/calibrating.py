@@ -9,9 +9,9 @@ from __future__ import annotations
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from paramove.objects.homography import HomographyError, PlaneHomography
 from paramove.rules.stage import Mind, Place, Stage, cm
 from paramove.rules.table import Sighting
-from paramove.vision.homography import HomographyError, PlaneHomography
 
 HELD_STILL_S = 1.0
 HAND_AWAY_S = 0.5

@@ -12,7 +12,7 @@ from paramove.bus import topics
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.spread import spread
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.vision.homography import PlaneHomography
+from paramove.objects.homography import PlaneHomography
 
 FloatArray = NDArray[np.float64]
 

@@ -21,8 +21,8 @@ from paramove.documents.atomic_writing import replacing
 from paramove.runs.recorded_run import recording_in
 from paramove.runs.video_writer import VideoWriter
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.observation.cameras import CalibratedCamera, read_cameras
-from paramove.vision.frames import decode
+from paramove.cameras.calibrated import CalibratedCamera, read_cameras
+from paramove.cameras.frames import decode
 
 Picture = NDArray[np.uint8]
 

@@ -16,8 +16,8 @@ from paramove.runs import plots
 from paramove.runs.pointing_video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in
 from paramove.runs.relocate_by_pointing_run import GOAL, SCALE, PointedRelocation
-from paramove.vision.frames import Frame, decode, encode
-from paramove.vision.pointing_events import ball_colour
+from paramove.cameras.frames import Frame, decode, encode
+from paramove.action_space.messages import ball_colour
 
 TRUE, ENDED = "#1d2530", "#d9a400"
 RADIUS_CM = 1.0

@@ -30,7 +30,7 @@ from paramove.runs.video_frame import (
     paste,
 )
 from paramove.runs.video_writer import VideoWriter
-from paramove.vision.frames import decode
+from paramove.cameras.frames import decode
 
 Picture = NDArray[np.uint8]
 

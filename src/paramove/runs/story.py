@@ -12,7 +12,7 @@ from paramove.runs.relocations import Relocation
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.recording.reader import Recorded
-from paramove.vision.homography import PlaneHomography
+from paramove.objects.homography import PlaneHomography
 
 GESTURE_SHOWN_S = 1.5
 _IN_WORDS = {

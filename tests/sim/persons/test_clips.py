@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
-from paramove.observation.cameras import CalibratedCamera
 from sim.persons import clips
 from sim.persons.clips import Clip, Truth, pack, read_clip, read_clips, unpacked, write_clip
 from sim.persons.performances import Act

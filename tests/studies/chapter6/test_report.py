@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from paramove.observation.cameras import CalibratedCamera
+from paramove.cameras.calibrated import CalibratedCamera
 from studies.chapter6.findings import findings_of
 from studies.chapter6.measures import Track
 from studies.chapter6.report import typical, write_results

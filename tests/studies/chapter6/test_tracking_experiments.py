@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from paramove.action_space.placement import PersonPlacement
+from paramove.cameras.calibrated import CalibratedCamera, write_cameras
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera, write_cameras
 from sim.persons.actions import EYE, FAR_ORIGIN, far_place
 from sim.persons.clips import TRUE_CAMERAS, Clip, Truth, read_clip, write_clip
 from sim.persons.performances import KINDS, Act, kind_named

@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from paramove.cameras.calibrated import CalibratedCamera
 from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.cameras import CalibratedCamera
 from studies.real_images import pointing_model, seated_person
 from studies.real_images.scores import middle_of_hand
 

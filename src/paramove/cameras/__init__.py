@@ -1,0 +1,1 @@
+"""Where images come from and how they are measured: sources, calibration boards, lenses, places, stereo."""

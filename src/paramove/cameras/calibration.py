@@ -1,0 +1,241 @@
+"""Lens and place of cameras from images of the ChArUco board (Zhang 2000, as in OpenCV), with reasons for refusal.
+
+The lens comes from views of the board at many angles; the place in the table frame from views in which the board lies
+on the table. Image points: the middle of the first pixel is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.cameras.charuco_board import Board, BoardView
+from paramove.input_error import InputError
+
+Matrix = NDArray[np.float64]
+
+LEAST_VIEWS = 6
+GOOD_VIEWS = 15
+GOOD_ERROR_PX, POOR_ERROR_PX = 0.5, 1.0
+LEAST_TILT_DEG = 7.0
+"""Root mean square angle of the boards to their mean direction; a hand that turns the board reaches 20 to 30."""
+MOST_FOCAL_SD = 0.015
+"""Of the focal length. More than that is 15 mm of distance at 1 m."""
+OUTLIER_FACTOR, OUTLIER_PX = 3.0, 1.0
+MOST_OUTLIERS = 0.25
+SCALE_TOLERANCE, SCALE_SUSPICION = 0.005, 0.15
+"""A printer that fits to the page changes sizes by 3 to 6 %. What differs more than 15 % is another board."""
+GRID = 4
+"""Cells across and down the image in which corners should have been."""
+RADIAL_GAIN = 0.8
+"""A third radial coefficient is taken if it lowers the error below this share."""
+
+
+class CalibrationError(InputError):
+    """Images that cannot calibrate a camera; the message says what is missing and how to get it."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Lens of one camera.
+
+    Attributes:
+        name: Of the camera.
+        size: Width and height of the image, px.
+        matrix: [3, 3], px. distortion: [5] in OpenCV's order k1 k2 p1 p2 k3.
+        error_px: Root mean square distance of corners to where the model sees them.
+        focal_sd_px, centre_sd_px: Standard deviations of the focal length and of the image's centre.
+        tilt_deg: Root mean square angle of the boards to their mean direction.
+        covered: Share of the image, in cells of a 4 x 4 grid, in which corners were seen.
+        used, left_out: Names of the views that were used, and that were not as they do not agree with the others.
+    """
+
+    name: str
+    size: tuple[int, int]
+    matrix: Matrix
+    distortion: Matrix
+    error_px: float
+    focal_sd_px: float
+    centre_sd_px: float
+    tilt_deg: float
+    covered: float
+    used: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+    def advice(self) -> list[str]:
+        """What would make it better; empty if it is good."""
+        said = []
+        if self.error_px >= GOOD_ERROR_PX:
+            degree = "poor" if self.error_px >= POOR_ERROR_PX else "usable, not good"
+            said.append(
+                f"{self.error_px:.2f} px is {degree} (good: < {GOOD_ERROR_PX:g} px): hold the board still, with more "
+                "light against blur, glue it to a flat plate, and switch the camera's autofocus off"
+            )
+        if len(self.used) < GOOD_VIEWS:
+            said.append(f"{len(self.used)} views were used; take {GOOD_VIEWS} or more")
+        if self.tilt_deg < 2 * LEAST_TILT_DEG:
+            said.append(f"the board was tilted by only {self.tilt_deg:.0f} deg: tilt it by 30 to 45 deg to all sides")
+        if self.covered < 0.75:
+            said.append(
+                f"corners were seen in {self.covered:.0%} of the image: hold the board near its borders and corners too"
+            )
+        return said
+
+
+def check_square(board: Board, views: Sequence[BoardView]) -> list[str]:
+    """Remarks on the size of the squares, by the markers, which tell what the board was printed for.
+
+    Raises CalibrationError if images show different boards, or one printed for another size.
+    """
+    firsts = {view.first_id: view for view in views}
+    if len(firsts) > 1:
+        shown = " and ".join(f"that of {_size_of(first)} in {view.name}" for first, view in sorted(firsts.items()))
+        raise CalibrationError(f"the images show different boards: {shown}; use one board in all images")
+    nominal = Board(board.square, next(iter(firsts))).nominal_square if firsts else None
+    if nominal is None or abs(board.square / nominal - 1.0) <= SCALE_TOLERANCE:
+        return []
+    found, wanted = f"{board.square * 1000:.4g} mm", f"{nominal * 1000:.4g} mm"
+    if abs(board.square / nominal - 1.0) > SCALE_SUSPICION:
+        raise CalibrationError(
+            f"wrong size of the squares? --square says {found}, and the markers are those of a board printed with "
+            f"{wanted}: measure the side of one black square; for squares of another size print a board with "
+            "`paramove calibrate board --square`"
+        )
+    return [f"squares of {found} on a board printed for {wanted}: right if you measured it on the print"]
+
+
+def _size_of(first_id: int) -> str:
+    nominal = Board(0.03, first_id).nominal_square
+    return "unusual squares" if nominal is None else f"squares of {nominal * 1000:g} mm"
+
+
+def calibrate_lens(name: str, views: Sequence[BoardView], board: Board) -> Lens:
+    """Lens of a camera from views of the board at different angles.
+
+    Raises CalibrationError: different resolutions, too few views, all views parallel, a lens that stays unknown.
+    """
+    _check_views(name, views)
+    tilt = _tilt_deg(views, board)
+    if tilt < LEAST_TILT_DEG:
+        raise CalibrationError(
+            f"{name}: in all {len(views)} views the board is parallel (its directions differ by {tilt:.1f} deg, more "
+            f"than {LEAST_TILT_DEG:g} needed), so focal length and distance cannot be told apart: tilt the board by 30 "
+            "to 45 deg to all sides"
+        )
+    fitted = _fit(views, board)
+    kept = _agreeing(fitted.view_errors_px)
+    left_out = tuple(view.name for view, keep in zip(views, kept, strict=True) if not keep)
+    if left_out:
+        views = [view for view, keep in zip(views, kept, strict=True) if keep]
+        fitted = _fit(views, board)
+    focal = 0.5 * float(fitted.matrix[0, 0] + fitted.matrix[1, 1])
+    _check_lens(name, fitted, focal, views[0].size)
+    return Lens(
+        name=name,
+        size=views[0].size,
+        matrix=fitted.matrix,
+        distortion=fitted.distortion,
+        error_px=fitted.error_px,
+        focal_sd_px=fitted.focal_sd_px,
+        centre_sd_px=fitted.centre_sd_px,
+        tilt_deg=tilt,
+        covered=_covered(views),
+        used=tuple(view.name for view in views),
+        left_out=left_out,
+    )
+
+
+def _check_views(name: str, views: Sequence[BoardView]) -> None:
+    sizes = {view.size: view.name for view in views}
+    if len(sizes) > 1:
+        shown = ", ".join(f"{width} x {height} px ({image})" for (width, height), image in sizes.items())
+        raise CalibrationError(f"{name}: images of different resolutions: {shown}; take all with the same setting")
+    if len(views) < LEAST_VIEWS:
+        raise CalibrationError(
+            f"{name}: too few views: the board was found in {len(views)} images, at least {LEAST_VIEWS} needed, "
+            f"{GOOD_VIEWS} are good; see that the whole board is in the image, sharp, and lit evenly"
+        )
+
+
+def _tilt_deg(views: Sequence[BoardView], board: Board) -> float:
+    """Root mean square angle of the boards' normals to their mean, for a lens of 53 deg.
+
+    The normal is Kᵀ l with l the vanishing line: boards that are parallel have one line, so one normal whatever K is.
+    """
+    width, height = views[0].size
+    focal = float(max(width, height))
+    guess = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
+    normals = []
+    for view in views:
+        homography, _ = cv2.findHomography(board.corners()[view.corner_ids, :2] / board.square, view.points)
+        normal = guess.T @ np.linalg.inv(homography)[2]
+        normals.append(normal / np.linalg.norm(normal) * np.sign(normal[2]))
+    middle = np.mean(normals, axis=0)
+    cosines = np.clip(np.array(normals) @ (middle / np.linalg.norm(middle)), -1.0, 1.0)
+    return float(np.rad2deg(np.sqrt(np.mean(np.arccos(cosines) ** 2))))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    matrix: Matrix
+    distortion: Matrix
+    error_px: float
+    view_errors_px: Matrix
+    focal_sd_px: float
+    centre_sd_px: float
+
+
+def _fit(views: Sequence[BoardView], board: Board) -> _Fit:
+    """With two radial coefficients, or three where the third is seen to matter."""
+    plain, bent = (_fitted(views, board, flags) for flags in (cv2.CALIB_FIX_K3, 0))
+    surely_better = bent.error_px < RADIAL_GAIN * plain.error_px and plain.error_px > 0.3 * GOOD_ERROR_PX
+    return bent if surely_better else plain
+
+
+def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
+    corners = board.corners() - [0.0, 0.0, board.thickness]  # Zhang's method wants the plane z = 0
+    on_board = [corners[view.corner_ids].astype(np.float32) for view in views]
+    in_image = [view.points.astype(np.float32) for view in views]
+    start: Any = None
+    error, matrix, distortion, _, _, deviations, _, per_view = cv2.calibrateCameraExtended(
+        on_board, in_image, views[0].size, start, start, flags=flags
+    )
+    return _Fit(
+        np.asarray(matrix, dtype=np.float64),
+        np.asarray(distortion, dtype=np.float64).ravel()[:5],
+        float(error),
+        np.asarray(per_view, dtype=np.float64).ravel(),
+        float(np.max(deviations.ravel()[:2])),
+        float(np.max(deviations.ravel()[2:4])),
+    )
+
+
+def _agreeing(errors_px: Matrix) -> NDArray[np.bool_]:
+    """Views to keep: all but those that are far worse than the rest (blurred, bent, moved); at most a quarter."""
+    bad = errors_px > max(OUTLIER_PX, OUTLIER_FACTOR * float(np.median(errors_px)))
+    too_many = bad.sum() > MOST_OUTLIERS * len(bad) or (~bad).sum() < LEAST_VIEWS
+    return np.ones(len(bad), dtype=np.bool_) if too_many else ~bad
+
+
+def _check_lens(name: str, fitted: _Fit, focal: float, size: tuple[int, int]) -> None:
+    centre_x, centre_y = float(fitted.matrix[0, 2]), float(fitted.matrix[1, 2])
+    inside = 0.0 < centre_x < size[0] and 0.0 < centre_y < size[1]
+    plausible = 0.2 * max(size) < focal < 10.0 * max(size)
+    if fitted.focal_sd_px <= MOST_FOCAL_SD * focal and inside and plausible:
+        return
+    raise CalibrationError(
+        f"{name}: the views do not tell the lens (focal length {focal:.0f} ± {fitted.focal_sd_px:.0f} px, ± "
+        f"{MOST_FOCAL_SD:.1%} wanted; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
+        f"error {fitted.error_px:.2f} px): take more views, nearer, tilted by 30 to 45 deg to all sides"
+    )
+
+
+def _covered(views: Sequence[BoardView]) -> float:
+    points = np.vstack([view.points for view in views])
+    cells = np.clip((points / np.array(views[0].size) * GRID).astype(int), 0, GRID - 1)
+    return len({(int(u), int(v)) for u, v in cells}) / GRID**2

@@ -1,0 +1,224 @@
+"""Where the images for a calibration come from: a folder, a video file, or a camera that is watched.
+
+Every source gives the views of the board held before the camera, for the lens, and those of the board on the table, for
+the camera's place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from paramove.cameras.calibration import GOOD_VIEWS, CalibrationError
+from paramove.cameras.charuco_board import BoardFinder, BoardView, Image
+from paramove.documents.pictures import opened_video, read_picture
+from paramove.input_error import InputError
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+TABLE_PREFIX = "table"
+LOOKS_PER_S = 5.0
+"""How often a video or a live camera is looked at for a new view."""
+STILL_SHARE = 0.01
+"""Of the image's width, by which the board may move between two looks to be still; faster ones are blurred."""
+NEW_SHARE = 0.05
+"""Of the image's width, by which the corners of a new view differ from those of all before."""
+MOST_VIEWS = 40
+"""More views cost time and tell nothing new."""
+TABLE_S = 1.0
+"""For so long, at the end of a video or before a live camera, the board lies still on the table."""
+TABLE_LOOKS = 5
+PATIENCE_S = 60.0
+"""For so long a live camera is watched without a new view."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Views of a camera. `looked_at`: number of images in which the board was looked for."""
+
+    views: tuple[BoardView, ...]
+    looked_at: int
+
+
+class ImageSource(Protocol):
+    """Images of one camera."""
+
+    name: str
+
+    def held(self) -> Found:
+        """Views of the board before the camera, the table's included. Raises InputError."""
+
+    def table(self) -> Found:
+        """Views of the board on the table. Raises InputError."""
+
+
+class FolderImages:
+    """Images of a folder; those whose names begin with "table" show the board on the table.
+
+    Raises InputError if there is no folder, or no image in it, or one that cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.name = folder.resolve().name
+        self._paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+        if not self._paths:
+            raise InputError(f"no image in {folder}: {', '.join(IMAGE_SUFFIXES)} expected", missing=True)
+        self._views: list[tuple[Path, BoardView | None]] | None = None
+
+    def held(self) -> Found:
+        return self._found(lambda path: True)
+
+    def table(self) -> Found:
+        return self._found(lambda path: path.name.lower().startswith(TABLE_PREFIX))
+
+    def _found(self, wanted: Callable[[Path], bool]) -> Found:
+        if self._views is None:
+            finder = BoardFinder()
+            self._views = [(path, finder.find(read_picture(path), path.name)) for path in self._paths]
+        looked_at = [view for path, view in self._views if wanted(path)]
+        return Found(tuple(view for view in looked_at if view is not None), len(looked_at))
+
+
+class VideoImages:
+    """A video in which the board is held at many angles, still for a moment each, and lies on the table at the end.
+
+    Raises InputError if the file is no video.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.name = path.stem
+        self._path = path
+        self._found: tuple[Found, Found] | None = None
+
+    def held(self) -> Found:
+        return self._both()[0]
+
+    def table(self) -> Found:
+        return self._both()[1]
+
+    def _both(self) -> tuple[Found, Found]:
+        if self._found is None:
+            looks, last_s = [], -1.0
+            finder = BoardFinder()
+            for time_s, image in _video(self._path):
+                if time_s - last_s >= 1.0 / LOOKS_PER_S - 1e-3:
+                    looks.append((time_s, finder.find(image, f"{self._path.name} at {time_s:.1f} s")))
+                    last_s = time_s
+            collector = ViewCollector()
+            for _, view in looks:
+                collector.offer(view)
+            at_end = [view for time_s, view in looks if time_s > last_s - TABLE_S]
+            lying = tuple(view for view in at_end if view is not None)
+            self._found = Found(tuple(collector.views), len(looks)), Found(lying, len(at_end))
+        return self._found
+
+
+class LiveImages:
+    """A camera that is watched: a view is taken by itself whenever the board is held still in a new way.
+
+    Args:
+        name: Of the camera.
+        frames: Pairs of time, s, and image, without end.
+        say: Tells the person what to do next.
+    """
+
+    def __init__(self, name: str, frames: Iterator[tuple[float, Image]], say: Callable[[str], None]) -> None:
+        self.name = name
+        self._frames = frames
+        self._say = say
+        self._finder = BoardFinder()
+
+    def held(self) -> Found:
+        collector, looked_at, newest_s = ViewCollector(), 0, None
+        self._say(f"{self.name}: hold the board before the camera, still for a moment, each time at another angle")
+        for time_s, view in self._looks():
+            looked_at += 1
+            newest_s = time_s if newest_s is None else newest_s
+            if collector.offer(view):
+                newest_s = time_s
+                self._say(f"{self.name}: view {len(collector.views)} of {GOOD_VIEWS}")
+            if len(collector.views) == GOOD_VIEWS:
+                break
+            if time_s - newest_s > PATIENCE_S:
+                raise CalibrationError(
+                    f"{self.name}: no new view of the board for {PATIENCE_S:g} s, {len(collector.views)} of "
+                    f"{GOOD_VIEWS} taken: more light, the board nearer, tilted, and held still for a second"
+                )
+        return Found(tuple(collector.views), looked_at)
+
+    def table(self) -> Found:
+        self._say(f"{self.name}: waiting until the board lies still on the table")
+        lying: list[BoardView] = []
+        start_s = None
+        for looked_at, (time_s, view) in enumerate(self._looks(), 1):
+            start_s = time_s if start_s is None else start_s
+            still = view is not None and (not lying or _motion(view, lying[0]) < 0.2 * STILL_SHARE)
+            lying = [*lying, view] if still and view is not None else []
+            if len(lying) > TABLE_LOOKS:
+                return Found(tuple(lying), looked_at)
+            if time_s - start_s > PATIENCE_S:
+                break
+        raise CalibrationError(f"{self.name}: the board on the table was not seen lying still for {PATIENCE_S:g} s")
+
+    def _looks(self) -> Iterator[tuple[float, BoardView | None]]:
+        last_s = -np.inf
+        for time_s, image in self._frames:
+            if time_s - last_s >= 1.0 / LOOKS_PER_S - 1e-3:
+                last_s = time_s
+                yield time_s, self._finder.find(image, f"{self.name} at {time_s:.1f} s")
+
+
+class ViewCollector:
+    """Keeps the views in which the board is still and that differ from those kept before."""
+
+    def __init__(self) -> None:
+        self.views: list[BoardView] = []
+        self._before: BoardView | None = None
+
+    def offer(self, view: BoardView | None) -> bool:
+        """The view of the next look, None where no board was found. True if it is kept."""
+        before, self._before = self._before, view
+        if view is None or before is None or len(self.views) >= MOST_VIEWS:
+            return False
+        if _motion(view, before) > STILL_SHARE or any(_motion(view, kept) < NEW_SHARE for kept in self.views):
+            return False
+        self.views.append(view)
+        return True
+
+
+def _motion(view: BoardView, other: BoardView) -> float:
+    """Largest move of a common corner by the image's width; infinite without common corners or for other boards."""
+    both, here, there = np.intersect1d(view.corner_ids, other.corner_ids, return_indices=True)
+    if not len(both) or view.first_id != other.first_id or view.size != other.size:
+        return float("inf")
+    return float(np.linalg.norm(view.points[here] - other.points[there], axis=1).max()) / view.size[0]
+
+
+def file_source(path: Path) -> FolderImages | VideoImages:
+    """The images of a folder or of a video file. Raises InputError if there is neither."""
+    if path.is_dir():
+        return FolderImages(path)
+    if not path.exists():
+        raise InputError(
+            f"there is nothing at {path}: a folder with images, a video file or a camera's number expected",
+            missing=True,
+        )
+    return VideoImages(path)
+
+
+def _video(path: Path) -> Iterator[tuple[float, Image]]:
+    capture = opened_video(path)
+    try:
+        rate_hz, count = capture.get(cv2.CAP_PROP_FPS), 0
+        while True:
+            done, image = capture.read()
+            if not done:
+                break
+            yield count / rate_hz, image
+            count += 1
+    finally:
+        capture.release()

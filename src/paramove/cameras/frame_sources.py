@@ -1,0 +1,269 @@
+"""Where frames come from: a topic, a file, or a V4L2 device. One protocol, so a camera node has one code path."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import cv2
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+
+from paramove.cameras.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
+from paramove.cameras.replayed_frames import FolderFrames, RecordingFrames
+from paramove.diagnosis.devices import holders
+from paramove.documents.pictures import opened_video
+from paramove.input_error import InputError
+
+_log = logging.getLogger(__name__)
+
+SOURCES = "topic:camera/light, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
+PATIENCE_NS = 1_000_000_000
+"""A source that is silent for longer has a fault."""
+
+
+class SourceError(FrameError, InputError):
+    """A source that cannot be opened; the message says what was found and what helps."""
+
+    def __init__(self, sentence: str, missing: bool = False) -> None:
+        InputError.__init__(self, sentence, missing)
+        self.kind = "missing" if missing else "source"
+
+
+class Capture(Protocol):
+    """What is needed of cv2.VideoCapture."""
+
+    def isOpened(self) -> bool: ...  # noqa: N802
+    def grab(self) -> bool: ...
+    def retrieve(self) -> tuple[bool, Any]: ...
+    def get(self, prop: int) -> float: ...
+    def set(self, prop: int, value: float) -> bool: ...
+    def release(self) -> None: ...
+
+
+class FrameSource(Protocol):
+    """Gives frames when asked, once a tick, or (a topic) once a message."""
+
+    hears_light: bool
+    """True if frames come as messages, False if they are fetched at each tick."""
+
+    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        """The newest frame, None if there is no new one yet. Raises FrameError."""
+
+    def close(self) -> None: ...
+
+
+class TopicFrames:
+    """Frames said by another node as raw images, such as the simulator's camera."""
+
+    hears_light = True
+
+    def __init__(self) -> None:
+        self._index = 0
+        self._newest_ns: int | None = None
+
+    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
+        if light is None:
+            self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
+            if now_ns - self._newest_ns > PATIENCE_NS:
+                raise FrameError(
+                    "no image on camera/light for more than 1 s: see what says it (the simulator)", "silent"
+                )
+            return None
+        self._newest_ns = now_ns
+        self._index += 1
+        return Frame(image_of_raw(light), now_ns, self._index - 1)
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class FileFrames:
+    """Frames of a video file, at the file's own rate; frames between two ticks are left out.
+
+    Raises SourceError if the file does not exist or is no video; EndOfFrames after the last frame.
+    """
+
+    hears_light = False
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._capture: Capture = opened_video(path, SourceError)
+        self._rate_hz = self._capture.get(cv2.CAP_PROP_FPS)
+        self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        readable = self._capture.grab()
+        self._capture.release()
+        if not readable:
+            raise SourceError(f"{path} ({path.stat().st_size} bytes) holds no frame: it is cut off or damaged")
+        self._capture = opened_video(path, SourceError)  # from the first frame on
+        self._start_ns: int | None = None
+        self._grabbed = 0
+
+    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        self._start_ns = now_ns if self._start_ns is None else self._start_ns
+        # A quarter of a frame of tolerance, as ticks are rounded to milliseconds.
+        due = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + 0.25) + 1
+        if self._grabbed >= due:
+            return None
+        while self._grabbed < due:
+            if not self._capture.grab():
+                raise self._end()
+            self._grabbed += 1
+        done, image = self._capture.retrieve()
+        if not done:
+            raise FrameError(f"frame {self._grabbed - 1} of {self._path} cannot be decoded", "corrupt")
+        return Frame(image, now_ns, self._grabbed - 1)
+
+    def close(self) -> None:
+        self._capture.release()
+
+    def _end(self) -> EndOfFrames:
+        early = f" of {self._count}: the file is cut off" if self._grabbed < self._count else ""
+        return EndOfFrames(f"{self._path} has ended after {self._grabbed} frames{early}")
+
+
+class DeviceFrames:
+    """Frames of a V4L2 device, read by a thread that keeps only the newest, so that an old frame never waits.
+
+    A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
+    #14044): silence is noticed here after `patience_ns` of the caller's clock, repetition by `FrameChecks`. Every
+    `patience_ns` the device is opened again.
+
+    Args:
+        path: /dev/v4l/by-id/... (stays the same when plugged in elsewhere), /dev/videoN, or N.
+        width_px, height_px, rate_hz: asked of the device.
+        open_capture: opens a path; tests give a fake device.
+    """
+
+    hears_light = False
+
+    def __init__(
+        self,
+        path: str,
+        width_px: int,
+        height_px: int,
+        rate_hz: float = 15.0,
+        patience_ns: int = PATIENCE_NS,
+        open_capture: Callable[[str], Capture] | None = None,
+    ) -> None:
+        self._path = f"/dev/video{path}" if path.isdigit() else path
+        self._wanted = {
+            cv2.CAP_PROP_FRAME_WIDTH: float(width_px),
+            cv2.CAP_PROP_FRAME_HEIGHT: float(height_px),
+            cv2.CAP_PROP_FPS: rate_hz,
+            cv2.CAP_PROP_BUFFERSIZE: 1.0,
+        }
+        self._patience_ns = patience_ns
+        self._open_capture = open_capture or _open_v4l2
+        self._newest_ns: int | None = None
+        self._index = 0
+        self._reader = _Reader(self._open())
+
+    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
+        image = self._reader.take()
+        if image is None:
+            silent_ns = now_ns - self._newest_ns
+            if silent_ns < self._patience_ns:
+                return None
+            self._reopen(now_ns)
+            raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")
+        self._newest_ns = now_ns
+        self._index += 1
+        return Frame(image, now_ns, self._index - 1)
+
+    def close(self) -> None:
+        self._reader.stop()
+
+    def _open(self) -> Capture:
+        capture = self._open_capture(self._path)
+        for prop, value in self._wanted.items():
+            capture.set(prop, value)
+        return capture
+
+    def _reopen(self, now_ns: int) -> None:
+        self._reader.stop()
+        self._newest_ns = now_ns
+        self._reader = _Reader(self._open())
+
+
+class _Reader:
+    """A thread that reads frames and keeps the newest. It ends when a read fails."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+        self._lock = threading.Lock()
+        self._newest: Image | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="camera reader", daemon=True)
+        self._thread.start()
+
+    def take(self) -> Image | None:
+        """The newest frame since the last call, if any."""
+        with self._lock:
+            newest, self._newest = self._newest, None
+        return newest
+
+    def stop(self) -> None:
+        """Ask the thread to end. It releases the device itself, as another thread's release during a read crashes."""
+        self._stopping.set()
+        self._thread.join(timeout=0.2)
+
+    def _read(self) -> None:
+        try:
+            while not self._stopping.is_set() and self._capture.grab():
+                done, image = self._capture.retrieve()
+                if not done:
+                    break
+                with self._lock:
+                    self._newest = image
+        except cv2.error as error:  # unplugged during a read; the silence is told by the other side
+            _log.warning("reading the camera: %s", error.err)
+        finally:
+            self._capture.release()
+
+
+def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
+    """The source that the text names. Raises InputError if there is none like it or it cannot be opened."""
+    kind, _, rest = source.partition(":")
+    if kind == "topic" and rest == "camera/light":
+        return TopicFrames()
+    if kind == "file" and rest:
+        return FileFrames(Path(rest))
+    if kind == "device" and rest:
+        return DeviceFrames(rest, width_px, height_px)
+    if kind == "folder" and rest:
+        path, _, rate = rest.rpartition("@")
+        try:
+            rate_hz = float(rate)
+        except ValueError as error:
+            raise SourceError(f"camera source {source!r}: folder:PATH@RATE expected, as folder:pictures@10") from error
+        return FolderFrames(Path(path), rate_hz)
+    if kind == "recording" and "#" in rest:
+        path, _, topic = rest.rpartition("#")
+        return RecordingFrames(Path(path), topic)
+    raise SourceError(f"camera source {source!r}: {SOURCES} expected")
+
+
+def _open_v4l2(path: str) -> Capture:
+    """Raises SourceError that names what is there, the remedy for missing rights, or who holds the device."""
+    device = Path(path)
+    if not device.exists():
+        found = sorted(str(p) for p in [*Path("/dev").glob("video*"), *Path("/dev/v4l/by-id").glob("*")])
+        raise SourceError(f"no camera {path}; found: {', '.join(found) or 'none at all: plug one in'}", missing=True)
+    try:
+        device.open("rb").close()
+    except PermissionError as denied:
+        raise SourceError(f"no right to read {path}: run 'sudo usermod -aG video $USER' and log in again") from denied
+    except OSError as error:
+        raise SourceError(f"{path} cannot be opened: {error.strerror}; a V4L2 camera expected") from error
+    capture: Capture = cv2.VideoCapture(path, cv2.CAP_V4L2)
+    if not capture.isOpened():
+        capture.release()
+        held = ", ".join(map(str, holders(device)))
+        why = f"held by {held}: end it first" if held else "it is no V4L2 camera that captures"
+        raise SourceError(f"{path} gives no frames: {why}")
+    return capture

@@ -1,0 +1,138 @@
+"""Where a calibrated camera stands in the table frame, from images in which the board lies on the table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.cameras.calibrated import CalibratedCamera
+from paramove.cameras.calibration import CalibrationError, Lens
+from paramove.cameras.charuco_board import Board, BoardView
+
+Matrix = NDArray[np.float64]
+
+LEAST_NOISE_PX = 0.05
+"""Corners are never found better than this, however few there are to show it."""
+MOST_MOTION_PX = 2.0
+"""Of a corner between two images of the table; more is a board or camera that was moved."""
+CLEARER = 1.3
+"""The mirrored pose of a plane (Collins and Bartoli 2014) must fit worse by this factor, or be about the same pose."""
+SAME_TILT_DEG = 3.0
+DISTANCES = (0.1, 8.0)
+"""m; what lies outside is a wrong size of the squares rather than a camera at a table."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Place of one camera.
+
+    Attributes:
+        camera: With lens and place.
+        error_px: Root mean square distance of the table board's corners to where the camera should see them.
+        position_sd: Standard deviation of the camera's place, m, by the corners' noise and the lens.
+        turn_sd_deg: Of its direction.
+    """
+
+    camera: CalibratedCamera
+    error_px: float
+    position_sd: float
+    turn_sd_deg: float
+
+
+def place_camera(lens: Lens, views: Sequence[BoardView], board: Board) -> Placement:
+    """Place of a camera from one or several views of the board on the table; none of them may have been moved.
+
+    Raises CalibrationError: no view, another resolution, a board that was moved, a tilt that cannot be told, a distance
+    that no camera at a table has.
+    """
+    _check_views(lens, views)
+    on_table = np.vstack([board.corners()[view.corner_ids] for view in views])
+    in_image = np.vstack([view.points for view in views])
+    rotation, shift = _best_pose(lens, on_table, in_image)
+    seen, jacobian = cv2.projectPoints(on_table, rotation, shift, lens.matrix, lens.distortion)
+    error_px = float(np.sqrt(np.mean(np.sum((seen.reshape(-1, 2) - in_image) ** 2, axis=1))))
+    camera_from_world = np.eye(4)
+    camera_from_world[:3, :3] = cv2.Rodrigues(rotation)[0]
+    camera_from_world[:3, 3] = shift.ravel()
+    camera = CalibratedCamera(lens.name, *lens.size, lens.matrix, lens.distortion, camera_from_world)
+    distance = float(np.linalg.norm(camera.position - on_table.mean(axis=0)))
+    if not DISTANCES[0] < distance < DISTANCES[1]:
+        raise CalibrationError(
+            f"{lens.name}: the camera would be {distance:.2f} m from the board; {DISTANCES[0]:g} to {DISTANCES[1]:g} m "
+            f"expected: is a square really {board.square * 1000:g} mm wide? Measure it and give it by --square"
+        )
+    noise = max(error_px / np.sqrt(2.0), LEAST_NOISE_PX)
+    turn_sd, position_sd = _deviations(np.asarray(jacobian[:, :6], dtype=np.float64), rotation, shift, noise)
+    position_sd = float(np.hypot(position_sd, distance * lens.focal_sd_px / lens.matrix[0, 0]))
+    turn_sd = float(np.hypot(turn_sd, np.rad2deg(lens.centre_sd_px / lens.matrix[0, 0])))
+    return Placement(camera, error_px, position_sd, turn_sd)
+
+
+def _check_views(lens: Lens, views: Sequence[BoardView]) -> None:
+    if not views:
+        raise CalibrationError(
+            f"{lens.name}: the board on the table was not found: lay it down as its words say, wholly in the camera's "
+            "view, and take an image of it (in a folder: a name that begins with 'table')"
+        )
+    for view in views:
+        if view.size != lens.size:
+            raise CalibrationError(
+                f"{lens.name}: different resolutions: {view.name} has {view.size[0]} x {view.size[1]} px, "
+                f"the lens was calibrated with {lens.size[0]} x {lens.size[1]} px"
+            )
+        both, here, there = np.intersect1d(view.corner_ids, views[0].corner_ids, return_indices=True)
+        motion = np.linalg.norm(view.points[here] - views[0].points[there], axis=1) if len(both) else np.zeros(1)
+        if float(np.median(motion)) > MOST_MOTION_PX:
+            raise CalibrationError(
+                f"{lens.name}: between {views[0].name} and {view.name} the board on the table or the camera moved by "
+                f"{float(np.median(motion)):.0f} px: all images of the table must show one place"
+            )
+
+
+def _best_pose(lens: Lens, on_table: Matrix, in_image: Matrix) -> tuple[Any, Any]:
+    """Rotation vector and translation of the better of the two poses in which a plane can be seen, refined."""
+    level = on_table - [0.0, 0.0, on_table[0, 2]]
+    count, rotations, shifts, _ = cv2.solvePnPGeneric(
+        level, in_image, lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE
+    )
+    found = []
+    for rotation, shift in zip(rotations[:count], shifts[:count], strict=True):
+        lifted = shift - cv2.Rodrigues(rotation)[0] @ np.array([[0.0], [0.0], [on_table[0, 2]]])
+        pose = cv2.solvePnPRefineLM(on_table, in_image, lens.matrix, lens.distortion, rotation, lifted)
+        seen, _ = cv2.projectPoints(on_table, *pose, lens.matrix, lens.distortion)
+        found.append((float(np.sqrt(np.mean((seen.reshape(-1, 2) - in_image) ** 2))), pose))
+    found.sort(key=lambda one: one[0])
+    if len(found) > 1:
+        (best, pose), (other, mirrored) = found[:2]
+        between = cv2.Rodrigues(pose[0])[0] @ cv2.Rodrigues(mirrored[0])[0].T
+        angle = np.rad2deg(np.linalg.norm(cv2.Rodrigues(between)[0]))
+        if other < CLEARER * max(best, LEAST_NOISE_PX) and angle > SAME_TILT_DEG:
+            raise CalibrationError(
+                f"{lens.name}: the board on the table looks too small to tell its tilt (two poses {angle:.0f} deg "
+                "apart fit equally): move the camera nearer, use a larger board or a higher resolution"
+            )
+    return found[0][1]
+
+
+def _deviations(jacobian: Matrix, rotation: Any, shift: Any, noise_px: float) -> tuple[float, float]:
+    """Standard deviations of the direction, deg, and of the place, m, from d(pixels)/d(rotation, translation)."""
+    covariance = noise_px**2 * np.linalg.inv(jacobian.T @ jacobian)
+    place_by_pose = np.empty((3, 6))
+    step = 1e-6
+    for column in range(6):
+        moved = np.concatenate([rotation.ravel(), shift.ravel()])
+        moved[column] += step
+        place_by_pose[:, column] = (
+            _position(moved) - _position(np.concatenate([rotation.ravel(), shift.ravel()]))
+        ) / step
+    place = place_by_pose @ covariance @ place_by_pose.T
+    return float(np.rad2deg(np.sqrt(np.trace(covariance[:3, :3])))), float(np.sqrt(np.trace(place)))
+
+
+def _position(pose: Matrix) -> Matrix:
+    return np.asarray(-cv2.Rodrigues(pose[:3])[0].T @ pose[3:], dtype=np.float64)

@@ -1,0 +1,198 @@
+"""From tracked objects to gestures: appeared, moved, rested, vanished, pointed at (thesis 5.2.6, steps 3 and 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
+from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
+from paramove.objects.full_size import FullSize
+from paramove.objects.homography import PlaneHomography
+from paramove.objects.object_motion import Happening, MotionThresholds, ObjectMotion, State
+from paramove.objects.openings import SeenOpenings
+from paramove.objects.pointing import Pointing, PointingThresholds
+from paramove.objects.sinking import Sample
+
+HAND_SEEN_S = 0.18
+HAND_GONE_S = 0.5
+BLIND_S = 0.35
+"""Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
+LONGEST_STEP_S = 0.2
+"""More time than this between two images is no time of watching."""
+MOST_PX = 1e6
+CLOCK_BACK_S = 5.0
+"""An image older than this is no late one: the clock, or an image's time, was wrong."""
+
+
+@dataclass(frozen=True)
+class RecognizerOptions:
+    """Thresholds."""
+
+    motion: MotionThresholds = field(default_factory=MotionThresholds)
+    pointing: PointingThresholds = field(default_factory=PointingThresholds)
+
+
+class Recognizer:
+    """Keeps a small state per object and says what happens to it, in the order of names, objects before the hand.
+
+    All durations are times of watching: while no image comes (the camera starts again, it is dark), they stand still.
+    """
+
+    def __init__(self, options: RecognizerOptions | None = None) -> None:
+        self._options = options or RecognizerOptions()
+        self._full_size = FullSize()
+        self._openings = SeenOpenings()
+        self._objects: dict[str, ObjectMotion] = {}
+        self._last_seen: dict[str, Sample] = {}
+        self._pointing = Pointing(self._options.pointing)
+        self._hand = _HandPresence()
+        self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
+        self._newest_s: float | None = None
+        self._watched_s = 0.0
+
+    def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
+        """What happens in this image. An image not newer than the one before is ignored.
+
+        Raises HomographyError if the calibration holds no homography.
+        """
+        step_s = self._step_s(tracked.captured.ToNanoseconds() * 1e-9)
+        if step_s <= 0.0:
+            return []
+        if step_s > BLIND_S:
+            for motion in self._objects.values():
+                motion.blind = True
+        self._watched_s += min(step_s, LONGEST_STEP_S)
+        now_s = self._watched_s
+        homography = self._homography(calibration)
+        if not all(_in_some_image(one) for one in tracked.objects):
+            usable = [one for one in tracked.objects if _in_some_image(one)]
+            tracked = TrackedObjects(captured=tracked.captured, objects=usable)
+        self._openings.see(tracked.openings)
+        hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
+        said: list[Gesture] = []
+        for name, happening in self._follow_objects(tracked, hand, now_s):
+            said.append(self._gesture(tracked, name, happening, homography))
+        said += [self._gesture(tracked, "", moment, homography) for moment in self._hand.update(hand, now_s)]
+        pointed_at = self._pointed_at(hand, now_s, homography)
+        if pointed_at is not None:
+            said.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
+        return said
+
+    def _step_s(self, captured_s: float) -> float:
+        """Time since the image before; 0 for one that is not newer."""
+        newest_s, self._newest_s = self._newest_s, captured_s
+        if newest_s is None:
+            return LONGEST_STEP_S
+        if newest_s - CLOCK_BACK_S < captured_s <= newest_s:
+            self._newest_s = newest_s
+            return 0.0
+        return abs(captured_s - newest_s)
+
+    def _follow_objects(
+        self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float
+    ) -> list[tuple[str, Happening]]:
+        seen = {s.name: Sample.of(s, now_s) for s in tracked.objects if s.kind == TrackedObject.KIND_OBJECT}
+        self._last_seen |= seen
+        happened: list[tuple[str, Happening]] = []
+        for name in sorted(self._last_seen):
+            if name not in self._objects:
+                self._objects[name] = ObjectMotion(name, self._full_size, self._options.motion)
+            near = hand is not None and _touch(hand, self._last_seen[name])
+            happened += [(name, moment) for moment in self._objects[name].update(seen.get(name), now_s, near)]
+        return happened
+
+    def _pointed_at(
+        self, hand: TrackedObject | None, now_s: float, homography: PlaneHomography | None
+    ) -> tuple[str, Happening] | None:
+        resting = {
+            name: motion.place
+            for name, motion in self._objects.items()
+            if motion.state is State.RESTING and motion.place is not None
+        }
+        any_moving = any(motion.state is State.MOVING for motion in self._objects.values())
+        name = self._pointing.update(now_s, hand, resting, any_moving, homography)
+        if name is None:
+            return None
+        place = resting[name]
+        return name, Happening(Gesture.KIND_POINTED_AT, place.u_px, place.v_px, self._objects[name].share(place))
+
+    def _homography(self, calibration: PlaneCalibration | None) -> PlaneHomography | None:
+        if calibration is None:
+            return None
+        if self._calibrated is None or self._calibrated[0] != calibration:
+            self._calibrated = (calibration, PlaneHomography.from_message(calibration))
+        return self._calibrated[1]
+
+    def _gesture(
+        self, tracked: TrackedObjects, name: str, happening: Happening, homography: PlaneHomography | None
+    ) -> Gesture:
+        gesture = Gesture(
+            captured=tracked.captured,
+            kind=happening.kind,
+            object=name,
+            u_px=happening.u_px,
+            v_px=happening.v_px,
+            confidence=happening.confidence,
+        )
+        if homography is not None and name and happening.placed:
+            if happening.in_motion:
+                self._put_over_opening(gesture, homography)
+            gesture.located, gesture.frame = True, homography.plane_frame
+            gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
+        return gesture
+
+    def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
+        """An object that vanished over an opening stood where one would be seen whose foot is the opening's middle.
+
+        The homography says how much a circle on the plane is foreshortened, the object's own image how far below its
+        middle its foot is seen, and both together from where the camera looks.
+        """
+        full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
+        if full is None:
+            return
+        du, dv = full.foot_px(homography.foreshortening(gesture.u_px, gesture.v_px))
+        opening = self._openings.at(gesture.u_px + du, gesture.v_px + dv)
+        if opening is not None:
+            gesture.u_px, gesture.v_px, gesture.confidence = opening[0] - du, opening[1] - dv, 1.0
+
+
+class _HandPresence:
+    """Says once when the hand comes and once when it has gone."""
+
+    def __init__(self) -> None:
+        self._present = False
+        self._change_s: float | None = None
+        self._place = (0.0, 0.0)
+
+    def update(self, hand: TrackedObject | None, now_s: float) -> list[Happening]:
+        if hand is not None:
+            self._place = (hand.u_px, hand.v_px)
+        if (hand is not None) == self._present:
+            self._change_s = None
+            return []
+        self._change_s = now_s if self._change_s is None else self._change_s
+        if now_s - self._change_s + 1e-6 < (HAND_GONE_S if self._present else HAND_SEEN_S):
+            return []
+        self._present, self._change_s = not self._present, None
+        kind = Gesture.KIND_HAND_APPEARED if self._present else Gesture.KIND_HAND_VANISHED
+        return [Happening(kind, *self._place, confidence=1.0)]
+
+
+def _in_some_image(seen: TrackedObject) -> bool:
+    """Whether its numbers can be pixels: what is not, nobody has seen."""
+    box = (seen.left_px, seen.top_px, seen.width_px, seen.height_px)
+    outline = (number for point in seen.outline for number in (point.u_px, point.v_px))
+    numbers = (seen.u_px, seen.v_px, seen.area_px, *box, *outline)
+    return all(abs(number) < MOST_PX for number in numbers)  # NaN is not below
+
+
+def _touch(hand: TrackedObject, place: Sample) -> bool:
+    """Whether the hand's box, widened by half an object, overlaps the object's."""
+    margin = 0.5 * place.width_px
+    return (
+        hand.left_px - margin < place.right_px
+        and hand.left_px + hand.width_px + margin > place.left_px
+        and hand.top_px - margin < place.bottom_px
+        and hand.top_px + hand.height_px + margin > place.top_px
+    )

@@ -1,0 +1,126 @@
+"""Where an object was last seen at its full height, when it sank into an opening or went out of sight.
+
+While a standing cylinder sinks, the opening's near rim cuts it off from below: the lower border of what is seen stays
+where it is, on the rim, and the rest shrinks towards it. So the lower border is the best trace of the place, also while
+a hand hides the upper end. The middle of the object at its full height is found from it upwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from statistics import median
+from typing import Self
+
+import numpy as np
+
+from paramove.msgs.tracked_objects_pb2 import TrackedObject
+from paramove.objects.full_size import FullSize, Size
+
+BORDER_PX = 2.0
+"""The lower border scatters by about 0.3 px; on the rim it stays within this range."""
+LEAST_HEIGHT_SHARE = 0.1
+"""Below this share of the height before sinking, the border is scatter."""
+LAST_SAMPLES = 20
+"""A second and a half: longer than any lowering into an opening."""
+STEEPEST_AXIS = 0.6
+"""Largest du/dv of a standing object's axis: a near camera looking down sees axes lean by 0.4 at its sides."""
+ASIDE_PX = 8.0
+"""u of an object's visible part changes by less than this while it sinks along a leaning axis."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """An object in one image, px; time in s."""
+
+    time_s: float
+    u_px: float
+    v_px: float
+    area_px: float
+    left_px: float
+    top_px: float
+    width_px: float
+    height_px: float
+    lean: float
+
+    @classmethod
+    def of(cls, tracked: TrackedObject, time_s: float) -> Self:
+        box = (tracked.left_px, tracked.top_px, tracked.width_px, tracked.height_px)
+        return cls(time_s, tracked.u_px, tracked.v_px, tracked.area_px, *box, tracked.lean)
+
+    @classmethod
+    def median(cls, samples: Sequence[Sample]) -> Sample:
+        """Median of each number; the time of the last."""
+        rows = np.array([astuple(sample) for sample in samples])
+        return Sample(samples[-1].time_s, *(float(value) for value in np.median(rows, axis=0)[1:]))
+
+    @property
+    def right_px(self) -> float:
+        return self.left_px + self.width_px
+
+    @property
+    def bottom_px(self) -> float:
+        return self.top_px + self.height_px
+
+    @property
+    def size(self) -> Size:
+        """As if nothing hid it."""
+        lean = float(np.clip(self.lean, -STEEPEST_AXIS, STEEPEST_AXIS))
+        return Size(self.area_px, self.height_px, self.width_px, self.bottom_px - self.v_px, lean)
+
+    def teach(self, full_size: FullSize, name: str) -> None:
+        """Give this sample of an object at rest to what is known of full sizes."""
+        full_size.learn(name, self.u_px, self.v_px, self.size)
+
+    def displacement_px(self, other: Sample) -> float:
+        """How far the object has moved for certain.
+
+        Something in front of an object moves one border inwards, or both; motion moves opposite borders the same way.
+        So the smaller of the two counts, and nothing if they move apart or together.
+        """
+        across = _common(self.left_px - other.left_px, self.right_px - other.right_px)
+        along = _common(self.top_px - other.top_px, self.bottom_px - other.bottom_px)
+        return float(np.hypot(across, along))
+
+    def border_change_px(self, other: Sample) -> float:
+        """Largest change of a border."""
+        return max(
+            abs(self.left_px - other.left_px),
+            abs(self.right_px - other.right_px),
+            abs(self.top_px - other.top_px),
+            abs(self.bottom_px - other.bottom_px),
+        )
+
+
+def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> tuple[float, float]:
+    """Middle (u, v), px, of an object that is seen no more, where it was last at its full height.
+
+    If it sank into an opening, it is seen nearer to the camera than it was, by the gap between it and the rim.
+
+    Args:
+        samples: at least one, in the order of time, to the last one seen.
+    """
+    tallest = max(samples, key=lambda sample: sample.height_px)  # has to do for what was never seen at rest
+    full = full_size.expected(name, samples[-1].u_px, samples[-1].v_px) or tallest.size
+    heights = sorted(s.height_px for s in samples[-LAST_SAMPLES:])
+    carried_px = median(heights[len(heights) // 2 :])  # less than the full height where a hand holds the upper end
+    seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * carried_px] or [samples[-1]]
+    bottom_px = median(s.bottom_px for s in _on_rim(seen))
+    full = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
+    middle_px = bottom_px - full.lower_px
+    return seen[-1].u_px + full.lean * (middle_px - seen[-1].v_px), middle_px
+
+
+def _on_rim(seen: Sequence[Sample]) -> list[Sample]:
+    """The last samples whose lower border is where that of the very last is, across and along."""
+    on_rim = [seen[-1]]
+    for sample in reversed(seen[:-1]):
+        lifted = abs(sample.bottom_px - median(s.bottom_px for s in on_rim)) > BORDER_PX
+        if lifted or abs(sample.u_px - seen[-1].u_px) > ASIDE_PX:
+            break
+        on_rim.append(sample)
+    return on_rim[::-1]
+
+
+def _common(a: float, b: float) -> float:
+    return 0.0 if a * b <= 0 else min(abs(a), abs(b))

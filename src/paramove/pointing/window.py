@@ -1,0 +1,185 @@
+"""Pointing from a recent window of tracked elbow and hand positions (paper 5.4): said once, with its place.
+
+At every new sample, windows of several lengths that end there are judged by the model of the last part of pointing. The
+one most like it counts. It is a pointing if it is not too strange, rather pointing than reaching, and leads to a place
+on the table; it is said as soon as no later window has been more like it for a moment.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from numpy.typing import NDArray
+
+from paramove.action_space.messages import BALL_M, ball_colour, certainty
+from paramove.action_space.placement import PersonPlacement
+from paramove.cameras.calibrated import WORLD_FRAME
+from paramove.demonstrations import table_place
+from paramove.demonstrations.last_parts import FRAMES, at_times
+from paramove.msgs.arm_pose_pb2 import ArmPose
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.pointing.events import FARTHEST_M
+from paramove.pointing.last_part_model import Judgement, LastPartModel
+from paramove.pointing.window_options import PointingWindowOptions
+
+Floats = NDArray[np.float64]
+
+LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
+"""Of the windows that are tried, over the mean duration of the demonstrated last parts."""
+LEAST_PERIOD_S = 0.03
+"""A tracker may be faster; windows are not judged more often than this."""
+RESTARTED_S = 1.0
+"""A sample that is so much older than the newest is the first of a tracker that was started again."""
+
+
+@dataclass(frozen=True)
+class WindowBelief:
+    """What the newest window says.
+
+    Attributes:
+        captured_ns: of its last sample.
+        judgement: of the window most like pointing.
+        place: where that points, (3,), m, in the world. deviation: along each axis, (3,), m.
+        hand: the last of the points at its end, (3,), m, in the world.
+        pointing: whether it is taken for pointing.
+    """
+
+    captured_ns: int
+    judgement: Judgement
+    place: Floats
+    deviation: Floats
+    hand: Floats
+    pointing: bool
+
+    @property
+    def likeness(self) -> float:
+        """0 of what is no pointing to 1 of what is as pointing usually is."""
+        return float(self.judgement.typicality**0.25) if self.pointing else 0.0
+
+
+class PointingWindow:
+    """Hears arm poses and says each pointing once, when it has just been completed.
+
+    Args:
+        model: of the last part of pointing, made for the points of the options.
+        placement: where the person sits, and how large the person is.
+
+    Attributes:
+        belief: what the window that ends with the newest pose says; None if there is none without a gap.
+    """
+
+    def __init__(
+        self, model: LastPartModel, placement: PersonPlacement, options: PointingWindowOptions | None = None
+    ) -> None:
+        self._options = options if options is not None else PointingWindowOptions()
+        self._model = model
+        self._placement = placement
+        self._lengths_s = [length * model.duration_s for length in LENGTHS]
+        self._clear()
+
+    def _clear(self) -> None:
+        self._times_ns: deque[int] = deque()
+        self._samples: deque[Floats] = deque()
+        self._judged_ns = -(10**18)
+        self._best: WindowBelief | None = None
+        self._said_at: Floats | None = None
+        self.belief: WindowBelief | None = None
+
+    def update(self, pose: ArmPose) -> Gesture | None:
+        """The gesture that this sample completes, if there is one.
+
+        Late and repeated samples, and those without one of the points or in another frame, are left out. If time goes
+        back by more than a second, the tracker was started again, and nothing is known of what was before.
+        """
+        captured_ns, sample = pose.captured.ToNanoseconds(), self._sample(pose)
+        if self._times_ns and captured_ns < self._times_ns[-1] - RESTARTED_S * 1e9:
+            self._clear()
+        self.belief = None
+        if sample is None or (self._times_ns and captured_ns <= self._times_ns[-1]):
+            return None
+        if self._times_ns and captured_ns - self._times_ns[-1] > self._options.most_gap_s * 1e9:
+            self._times_ns.clear()
+            self._samples.clear()
+            self._best = None
+        self._times_ns.append(captured_ns)
+        self._samples.append(sample)
+        while captured_ns - self._times_ns[1 if len(self._times_ns) > 1 else 0] > self._lengths_s[-1] * 1e9:
+            self._times_ns.popleft()
+            self._samples.popleft()
+        if captured_ns - self._judged_ns < LEAST_PERIOD_S * 1e9:
+            return None
+        self._judged_ns = captured_ns
+        self.belief = self._judged(captured_ns)
+        return self._told(captured_ns, sample[-3:])
+
+    def ball(self) -> SceneUpdate | None:
+        """A ball where the newest window points; green if it is like pointing, red if it is not (figure 16)."""
+        if self.belief is None:
+            return None
+        message = SceneUpdate()
+        entity = message.entities.add(id="pointed_at", frame_id=WORLD_FRAME)
+        entity.timestamp.FromNanoseconds(self.belief.captured_ns)
+        entity.lifetime.FromMilliseconds(1000)
+        ball = entity.spheres.add()
+        ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = self.belief.place
+        ball.pose.orientation.w = 1.0
+        ball.size.x = ball.size.y = ball.size.z = BALL_M
+        ball.color.r, ball.color.g, ball.color.b = ball_colour(self.belief.likeness)
+        ball.color.a = 1.0
+        return message
+
+    def _sample(self, pose: ArmPose) -> Floats | None:
+        """The points, (3 n,), m; None if one of them is missing or is at no place that an arm can be at."""
+        found = {point.name: (point.x, point.y, point.z) for point in pose.points}
+        if pose.frame != WORLD_FRAME or any(name not in found for name in self._options.points):
+            return None
+        sample = np.array([found[name] for name in self._options.points]).ravel()
+        return sample if bool(np.all(np.abs(sample) < FARTHEST_M)) else None  # NaN is not below either
+
+    def _judged(self, now_ns: int) -> WindowBelief | None:
+        """What the window most like pointing says."""
+        times = (np.array(self._times_ns) - now_ns) * 1e-9
+        lengths = [length for length in self._lengths_s if length <= -times[0]]
+        if not lengths:
+            return None
+        samples = np.array(self._samples)
+        placed = self._placement.in_model(samples)
+        windows = [at_times(np.linspace(-length, 0.0, FRAMES), times, placed) for length in lengths]
+        judged = [self._model.judged(window) for window in windows]
+        chosen = int(np.argmin([one.strangeness for one in judged]))
+        best = judged[chosen]
+        place = self._placement.in_world(table_place(best.theta))
+        slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
+        deviation = np.sqrt(np.einsum("pi,pq,qi->i", slopes, best.covariance, slopes))
+        return WindowBelief(now_ns, best, place, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best))
+
+    def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
+        options = self._options
+        beside = np.maximum(-judged.theta, judged.theta - 1.0).max()
+        if judged.typicality < options.level or beside > options.margin:
+            return False
+        return self._model.lead(window, judged) >= options.least_lead
+
+    def _told(self, now_ns: int, hand: Floats) -> Gesture | None:
+        """The best window of this stay at a place once it is over."""
+        if self._said_at is not None:
+            if np.linalg.norm(hand - self._said_at) < self._options.apart_m:
+                return None
+            self._said_at = None
+        belief, best = self.belief, self._best
+        least = np.inf if best is None else best.judgement.strangeness
+        if belief is not None and belief.pointing and belief.judgement.strangeness < least:
+            self._best = best = belief
+        if best is None or now_ns - best.captured_ns < self._options.settled_s * 1e9:
+            return None
+        self._said_at, self._best = best.hand, None
+        x, y, _ = best.place
+        gesture = Gesture(
+            kind=Gesture.KIND_POINTED_AT, located=True, frame=WORLD_FRAME, x=x, y=y,
+            confidence=certainty(best.deviation),
+        )  # fmt: skip
+        gesture.captured.FromNanoseconds(now_ns)
+        return gesture

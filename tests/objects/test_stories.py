@@ -1,0 +1,87 @@
+"""From rendered images to gestures: the instructor shows a rule and points (thesis 5.2.6, steps 3 and 4)."""
+
+import numpy as np
+import pytest
+
+from benchmarks.many_worlds import RESTS, View, tolerance
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.robots.description import RobotDescription
+from sim import tool_box
+from sim.scene import ROBOT_MODEL
+from sim.tool_box import Measures
+from sim.world import OPENINGS_UP
+from tests.objects.scene import Look, Scene
+from tests.objects.stories import OPENING, RIM_RADIUS, Story, segment, show_rule
+
+
+@pytest.mark.parametrize(
+    ("seed", "lowering_ticks", "drop"), [(0, 12, False), (1, 25, False), (2, 12, True), (5, 9, False)]
+)
+def test_a_shown_rule_is_located_within_four_millimetres(seed: int, lowering_ticks: int, drop: bool) -> None:
+    draw = np.random.default_rng(seed)
+    with Scene(Look.random(seed), seed, opening_radius=RIM_RADIUS) as scene:
+        story = Story(scene)
+        story.calibrate()
+        start = (draw.uniform(0.13, 0.18), draw.uniform(-0.12, -0.07))
+        show_rule(story, "blue", start, lowering_ticks, drop, yaw=draw.uniform(-0.6, 0.6))
+    assert story.kinds("blue") == ["APPEARED", "MOVED", "VANISHED"]
+    vanished = next(g for g in story.gestures if g.kind == Gesture.KIND_VANISHED)
+    assert vanished.located
+    assert np.hypot(vanished.x - OPENING[0], vanished.y - OPENING[1]) < 0.004
+
+
+@pytest.mark.parametrize("seed", [3, 7])
+def test_the_object_that_the_finger_is_near_is_pointed_at(seed: int) -> None:
+    places = {"yellow": (0.14, -0.10), "green": (0.17, -0.03), "blue": (0.13, 0.05)}
+    with Scene(Look.random(seed), seed) as scene:
+        story = Story(scene)
+        story.calibrate()
+        for name, place in places.items():
+            scene.stand(name, *place)
+        story.step(12)
+        x, y = places["green"]
+        for centre in segment((0.40, 0.20, 0.12), (x + 0.085, y, 0.055), 20):
+            scene.put("hand", tuple(centre))
+            story.step()
+        story.step(22)
+    pointed = [g for g in story.gestures if g.kind == Gesture.KIND_POINTED_AT]
+    assert [g.object for g in pointed] == ["green"]
+    assert np.hypot(pointed[0].x - x, pointed[0].y - y) < 0.003
+
+
+@pytest.fixture(scope="module")
+def hoap3() -> RobotDescription:
+    return RobotDescription.load(ROBOT_MODEL.parent)
+
+
+@pytest.mark.parametrize(
+    ("seed", "elevation_deg", "diameter_mm", "chamfer_mm"),
+    [
+        (0, 35, 25, 2),
+        (1, 35, 34, 8),
+        (2, 42, 28, 6),
+        (3, 52, 28, 6),
+        (4, 52, 34, 2),
+        (5, 58, 25, 4),
+        (6, 65, 25, 2),
+        (7, 65, 34, 8),
+    ],
+)
+def test_rules_hold_whatever_camera_and_openings(
+    seed: int, elevation_deg: float, diameter_mm: float, chamfer_mm: float, hoap3: RobotDescription
+) -> None:
+    """Nobody tells the robot of either: it sees from where the camera looks, and where the rims are."""
+    measures = Measures(elevation_deg, diameter_mm / 2000, chamfer_mm / 1000)
+    view = View(seed, hoap3, measures)
+    try:
+        assert view.calibrate(lambda: np.zeros(2)) == []
+        view.park()
+        view.world.move_box(np.zeros(3), OPENINGS_UP)
+        view.see(RESTS)
+        for place, (colour, name) in enumerate(view.looks.rules.items()):
+            rule = view.show_rule(colour, np.array((0.175, 0.03 * place - 0.05)))
+            opening = next(item for item in tool_box.OPENINGS if item.name == name)
+            assert rule is not None
+            assert np.linalg.norm(rule - opening.centre[:2]) < min(0.0045, tolerance(measures))
+    finally:
+        view.close()
