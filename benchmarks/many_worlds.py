@@ -29,8 +29,8 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.cameras.frames import Frame, decode, encode
-from paramove.imitation.clear_plans import ClearPlans, NoClearPlanError
-from paramove.imitation.setup import MovementSource, SurfaceParameters, plans_for
+from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
+from paramove.motion.setup import MovementSource, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject

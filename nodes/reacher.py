@@ -9,11 +9,11 @@ Says    arm/trajectory          JointTrajectory         event   rad
 
 from pathlib import Path
 
+from paramove.applications.reach_task import ReachStep, ReachTask
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
-from paramove.imitation.reach_task import ReachStep, ReachTask
-from paramove.imitation.servo_arm_reaching import ServoArmReaching
-from paramove.imitation.setup import MovementSource
+from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.motion.setup import MovementSource
 from paramove.robots.description import RobotDescription
 
 HEARS = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)

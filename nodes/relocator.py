@@ -9,10 +9,10 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
         speech               Speech             event
 """
 
+from paramove.applications.relocator import Relocator
+from paramove.applications.relocator_options import RelocatorOptions
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
-from paramove.rules.relocator import Relocator
-from paramove.rules.relocator_options import RelocatorOptions
 
 HEARS = (topics.GESTURES, topics.ACTION_ESTIMATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 SAYS = (topics.RELOCATION_GOAL, topics.APPLICATION_STAGE, topics.SPEECH)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.imitation.setup import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.motion.setup import MovementSource, SurfaceParameters, synthesizer_for
 
 HEARS = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
 SAYS = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.alignment import warp
-from paramove.imitation.reaching_movement import ArmPoses
+from paramove.motion.reaching_movement import ArmPoses
 
 FloatArray = NDArray[np.float64]
 Ints = NDArray[np.int64]

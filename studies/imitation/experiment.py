@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.demonstrations.reaching import train_reaching_model
-from paramove.imitation.arm_pose import ArmPoseSolver
-from paramove.imitation.conversion import RobotMovement
+from paramove.motion.arm_pose import ArmPoseSolver
+from paramove.motion.conversion import RobotMovement
 from paramove.robots.description import RobotDescription
 from studies.imitation.errors import SIGNIFICANT, Errors, Movement, errors_of, largest, ranges
 from studies.imitation.reference import ReferenceKind, References, on_robot, reference_movement

@@ -12,10 +12,10 @@ from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.reaching import demonstrations_at, reaching_grid_demonstrations
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.sequences import resample
-from paramove.imitation.arm_pose import ArmPoseSolver
-from paramove.imitation.conversion import RobotMovement
-from paramove.imitation.motion import RelocationOptions
-from paramove.imitation.reaching_movement import ArmPoses
+from paramove.motion.arm_pose import ArmPoseSolver
+from paramove.motion.conversion import RobotMovement
+from paramove.motion.planned_motion import RelocationOptions
+from paramove.motion.reaching_movement import ArmPoses
 from paramove.phmm import InterpolativePHMM
 from paramove.phmm.synchronisation import synchronised
 from studies.imitation.errors import Movement, RobotArm

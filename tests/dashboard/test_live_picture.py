@@ -15,7 +15,7 @@ from paramove.bus.topics import Topic
 from paramove.dashboard.live_picture import LivePicture, Surface
 from paramove.dashboard.node_table import NodeTable
 from paramove.dashboard.robot_shape import RobotShape
-from paramove.imitation.setup import SurfaceParameters
+from paramove.motion.setup import SurfaceParameters
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration

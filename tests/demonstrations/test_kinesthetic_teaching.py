@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.kinesthetic_teaching import PARAMETERS, KinestheticTeacher, moved_part
-from paramove.imitation.reaching_file import load_reaching_model
-from paramove.imitation.servo_arm_reaching import ServoArmReaching
-from paramove.imitation.timing import minimum_jerk
+from paramove.motion.reaching_file import load_reaching_model
+from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.motion.timing import minimum_jerk
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.emulated_servo import EmulatedServo
 from paramove.robots.dynamixel.emulator import DynamixelEmulator

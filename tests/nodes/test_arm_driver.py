@@ -10,7 +10,7 @@ from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
-from tests.imitation.reaching import ROBOT_FOLDER
+from tests.motion.reaching import ROBOT_FOLDER
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import TICK_NS, FakeRobot, trajectory
 

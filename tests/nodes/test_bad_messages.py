@@ -41,9 +41,11 @@ from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
 from paramove.objects.homography import PlaneHomography
 from tests.action_space import drawn_arm
-from tests.imitation.fake_driver import Cell, goal
-from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
-from tests.imitation.servo_cell import ServoCell
+from tests.applications.pointing_story import PointingStory
+from tests.applications.servo_cell import ServoCell
+from tests.applications.story import Story
+from tests.motion.fake_driver import Cell, goal
+from tests.motion.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 from tests.nodes.bad_messages import first_not_finite, variants
 from tests.nodes.test_reacher import ARM_FOLDER, TASKS
 from tests.objects.tracks import hand_with_tip, image_of, standing
@@ -51,8 +53,6 @@ from tests.observation.test_markers import EYES, with_markers
 from tests.pointing.persons import performed, poses
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import FakeRobot, trajectory
-from tests.rules.pointing_story import PointingStory
-from tests.rules.story import Story
 
 PERIOD_NS = 66_666_667
 Event = Heard | Tick

@@ -18,7 +18,7 @@ from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.safety.gate_io import PERSON_STOP
 from tests.dashboard import scene
 from tests.dashboard.conftest import WAIT_S, Visitor
-from tests.imitation.reaching import ROBOT_FOLDER
+from tests.motion.reaching import ROBOT_FOLDER
 
 CONFIG = dashboard.Config(robot=ROBOT_FOLDER)
 SENTENCE = "stopped from the page by a person"

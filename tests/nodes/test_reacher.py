@@ -15,8 +15,8 @@ from paramove.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.phmm import ModelFileError
 from paramove.robots.description import DescriptionError
-from tests.imitation.reaching import ROBOT_FOLDER, reaching_model
-from tests.imitation.servo_cell import STEPS, ServoCell
+from tests.applications.servo_cell import STEPS, ServoCell
+from tests.motion.reaching import ROBOT_FOLDER, reaching_model
 
 ARM_FOLDER = ROBOT_FOLDER.parent / "open_manipulator_x"
 TASKS = [step.model_dump(exclude_none=True) for step in STEPS]

@@ -7,7 +7,7 @@ from nodes import relocator
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.msgs.safety_state_pb2 import SafetyState
-from tests.rules.pointing_story import PointingStory
+from tests.applications.pointing_story import PointingStory
 
 
 def test_replays_the_whole_story():

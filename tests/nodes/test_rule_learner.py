@@ -7,7 +7,7 @@ from nodes import rule_learner
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.msgs.rule_pb2 import ApplicationStage
-from tests.rules.story import OPTIONS, PLACES, Story
+from tests.applications.story import OPTIONS, PLACES, Story
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.input_error import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
-from tests.imitation.fake_driver import Cell, goal
-from tests.imitation.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
+from tests.motion.fake_driver import Cell, goal
+from tests.motion.reaching import OPENINGS, ROBOT_FOLDER, reaching_model
 
 
 @pytest.fixture

@@ -127,7 +127,7 @@ def _images() -> None:
 
 
 def _reaching() -> None:
-    from paramove.imitation.setup import MovementSource
+    from paramove.motion.setup import MovementSource
 
     MovementSource().trained()
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Motion, Relocation
-from paramove.imitation.motion import RelocationOptions
+from paramove.motion.planned_motion import RelocationOptions
 from paramove.robots.description import RobotDescription
 
 FloatArray = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.imitation.reaching_movement import ArmPoses
+from paramove.motion.reaching_movement import ArmPoses
 from studies.imitation.errors import Movement, RobotArm, errors_of, largest, pairs, ranges
 
 N = 80

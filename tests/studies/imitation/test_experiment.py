@@ -28,7 +28,7 @@ from studies.imitation.reasons import limit_uses, why
 from studies.imitation.reference import References
 from studies.imitation.report import write_results
 from studies.imitation.thesis import compared
-from tests.imitation.reaching import ROBOT_FOLDER, reaching_model, solver
+from tests.motion.reaching import ROBOT_FOLDER, reaching_model, solver
 
 
 @cache

@@ -1,0 +1,190 @@
+"""Stage 3: the robot puts each object away that the instructor points at (thesis 5.2.6, step 4)."""
+
+from __future__ import annotations
+
+from paramove.applications.pointed_object import object_at
+from paramove.applications.stage import Mind, Place, Stage, cm
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+
+HAND_AWAY_S = 0.3
+HAND_PATIENCE_S = 6.0
+SETTLED_S = 1.0
+"""A person points at what has stood for so long: before, the hand has just put it there."""
+
+
+class Applying(Stage):
+    """States: waiting (for a pointing hand), letting_hand_leave, relocating, returning, looking, helped."""
+
+    stage = ApplicationStage.STAGE_APPLY
+
+    def __init__(self, mind: Mind) -> None:
+        super().__init__(mind)
+        self._object = ""
+        self._source: Place = (0.0, 0.0)
+        self._attempt = 0
+        self._began_s = 0.0
+        self._failure = ""
+        self._avoided: tuple[str, ...] = ()
+        self._stuck: set[str] = set()
+
+    def enter(self) -> None:
+        """Ask the instructor to point."""
+        self._ask()
+
+    def on_gesture(self, gesture: Gesture) -> None:
+        """Remember who is pointed at while waiting for that."""
+        if gesture.kind != Gesture.KIND_POINTED_AT or self.state != "waiting":
+            return
+        if self.mind.options.pointing == "nearness":
+            if gesture.object or not gesture.located:
+                self._pointed_at(gesture.object)
+        elif not gesture.object and gesture.captured.ToNanoseconds() * 1e-9 > self.mind.now_s - self.for_s:
+            self._pointed_at_place(gesture)
+
+    def step(self) -> ApplicationStage.Stage | None:
+        """One tick."""
+        steps = {
+            "waiting": self._waiting,
+            "letting_hand_leave": self._letting_hand_leave,
+            "relocating": self._relocating,
+            "returning": self._returning,
+            "looking": self._looking,
+            "helped": self._helped,
+        }
+        return steps[self.state]()
+
+    def _ask(self) -> None:
+        self.mind.tell("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
+        self.go("waiting")
+
+    def _waiting(self) -> None:
+        if self.for_s > self.mind.options.patience_s:
+            self._ask()
+
+    def _pointed_at(self, name: str) -> None:
+        place = self.mind.table.standing().get(name)
+        if name not in self.mind.rules or place is None:
+            self.mind.tell(f"You point at {name or 'something'}, but I do not know where it stands or belongs.")
+            return
+        self._object, self._source, self._attempt = name, place, 0
+        self.mind.tell(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.mind.rules[name])}.")
+        self.go("letting_hand_leave")
+
+    def _pointed_at_place(self, gesture: Gesture) -> None:
+        """The object at rest there. Beside the table, and while it is being arranged, nobody points at anything."""
+        mind = self.mind
+        if not gesture.located or gesture.frame != mind.options.frame:
+            mind.tell(
+                f"You point at a place in the frame {gesture.frame!r}; I only know places in {mind.options.frame!r}."
+            )
+            return
+        settled = mind.table.standing(settled_s=gesture.captured.ToNanoseconds() * 1e-9 - SETTLED_S)
+        found = object_at((gesture.x, gesture.y), settled)
+        if found.name:
+            self._pointed_at(found.name)
+        elif mind.options.surface.contains((gesture.x, gesture.y)) and set(mind.rules) - mind.done <= set(settled):
+            mind.tell(f"{found.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
+            self.go("waiting")
+
+    def _letting_hand_leave(self) -> None:
+        away = self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S
+        if away or self.for_s > HAND_PATIENCE_S:
+            self._relocate()
+
+    def _relocate(self) -> None:
+        self._attempt += 1
+        self._began_s, self._failure = self.mind.now_s, ""
+        mind = self.mind
+        standing = mind.table.standing(but=self._object)
+        self._avoided = tuple(standing)
+        mind.errand.start(
+            RelocationGoal.KIND_RELOCATE,
+            mind.now_s,
+            self._object,
+            source=mind.goals.position(self._source),
+            target=mind.goals.position(mind.rules[self._object]),
+            avoid=standing.values(),
+            attempt=self._attempt,
+        )
+        self.go("relocating")
+
+    def _relocating(self) -> None:
+        outcome = self.mind.errand.outcome
+        if outcome is None:
+            return
+        if outcome.state == RelocationStatus.STATE_REFUSED:
+            self._refused(outcome)
+        elif outcome.state == RelocationStatus.STATE_FAILED:
+            self._failure = outcome.reason or "it failed"
+            self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+            self.go("returning")
+        else:
+            self.go("looking")
+
+    def _refused(self, outcome: RelocationStatus) -> None:
+        """No way round a standing object: that one first. Only where each stands in the other's way is help needed."""
+        self._stuck.add(self._object)
+        in_the_way = (self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided))
+        other = next((name for name in in_the_way if name not in self._stuck | self.mind.done), "")
+        if other:
+            sentence = f"{other} stands in the way of {self._object}. Please point at {other} first."
+            self.mind.tell(sentence, Speech.REQUEST_POINT_AT_OBJECT, other)
+            self.go("waiting")
+        else:
+            self._ask_for_help(f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}.")
+
+    def _returning(self) -> None:
+        """The arm may have been left anywhere: bring it to its base pose before looking."""
+        if self.mind.errand.outcome is not None:
+            self.go("looking")
+
+    def _looking(self) -> ApplicationStage.Stage | None:
+        """The arm has left: is the object gone, or does it stand or lie somewhere?"""
+        if self.for_s < self.mind.options.settle_s:
+            return None
+        seen = self.mind.table.objects.get(self._object)
+        if not self._failure and seen is not None and seen.kind == Gesture.KIND_VANISHED:
+            return self._put_away()
+        if seen is not None and seen.at_rest and seen.place is not None:
+            unseen = not self._failure and seen.time_s < self._began_s
+            if unseen and self.for_s < 2 * self.mind.options.settle_s:
+                return None  # not seen since: the view is not settled yet
+            self._try_again(seen.place)
+            return None
+        if self.for_s > 3 * self.mind.options.settle_s:
+            self._ask_for_help(f"I have lost sight of {self._object}.")
+        return None
+
+    def _try_again(self, place: Place) -> None:
+        reason = self._failure
+        if self._attempt >= self.mind.options.attempts:
+            self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
+            return
+        self._source = place
+        self.mind.tell(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
+        self._relocate()
+
+    def _ask_for_help(self, sentence: str) -> None:
+        self.mind.tell(f"{sentence} Please put it to another place.", Speech.REQUEST_HELP, self._object)
+        self.go("helped")
+
+    def _helped(self) -> None:
+        seen = self.mind.table.objects.get(self._object)
+        came = seen is not None and seen.at_rest and seen.time_s > self.mind.now_s - self.for_s
+        if came and self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S:
+            self._stuck.clear()
+            self._ask()
+        elif self.for_s > self.mind.options.patience_s:
+            self._ask_for_help(f"I still need help with {self._object}.")
+
+    def _put_away(self) -> ApplicationStage.Stage | None:
+        self.mind.done.add(self._object)
+        self._stuck.clear()
+        self.mind.tell(f"{self._object} is put away.")
+        if set(self.mind.options.objects) <= self.mind.done:
+            self.mind.tell("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
+            return ApplicationStage.STAGE_DONE
+        self._ask()
+        return None

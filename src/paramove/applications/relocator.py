@@ -1,0 +1,293 @@
+"""Relocation by pointing (paper 5.4, figure 16): the robot holds an object and puts it where a person points.
+
+Then it fetches the object again and the next place is pointed at. It knows where the object is: it has put it there.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+
+from paramove.applications.arm_sight import ArmSight
+from paramove.applications.arm_watch import ArmWatch
+from paramove.applications.conversation import Errand, Goals, Outbox
+from paramove.applications.relocator_options import RelocatorOptions
+from paramove.applications.stage import Place, cm
+from paramove.msgs.action_estimate_pb2 import ActionEstimate
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
+from paramove.msgs.rule_pb2 import ApplicationStage, Speech
+from paramove.msgs.safety_state_pb2 import SafetyState
+
+_log = logging.getLogger(__name__)
+
+STAGE_PERIOD_S = 1.0
+
+
+class Relocator:
+    """Hear messages with the `on_…` methods, then call `tick`.
+
+    States: resting, aligning (waiting for the object to be pointed at), fetching, waiting (for a place),
+    letting_hand_leave, placing, helped (waiting for help).
+
+    Args:
+        options: Places and patience.
+        run_name: Begins the goals' ids; a new one for every process, as the same id is done only once.
+
+    Attributes:
+        state: Name of the state.
+        sentence: What was said last.
+        placed: Places at which the object was put.
+    """
+
+    def __init__(self, options: RelocatorOptions, run_name: str) -> None:
+        self._options = options
+        self._goals = Goals(options.frame, options.grasp_z)
+        self._errand = Errand(self._goals, run_name)
+        self._watch = ArmWatch(options.arm_patience_s)
+        self._sight = ArmSight(options.frame)
+        self._outbox = Outbox()
+        self._now_s = 0.0
+        self._since_s = 0.0
+        self._quiet_since_s = 0.0
+        self._told: set[str] = set()
+        self._object_at = options.start
+        self._target: Place = options.start
+        self._offset: Place | None = None if options.aligns else (0.0, 0.0)
+        self._holding = False
+        self._missed = 0
+        self._said = ("", float("-inf"))
+        self.state = ""
+        self.sentence = ""
+        self.placed: list[Place] = []
+        self._steps = {
+            "resting": self._resting,
+            "aligning": lambda: self._watch_for(self._ask_to_align),
+            "fetching": self._fetching,
+            "waiting": lambda: self._watch_for(self._ask),
+            "letting_hand_leave": self._letting_hand_leave,
+            "placing": self._placing,
+            "helped": self._helped,
+        }
+
+    @property
+    def failure(self) -> str:
+        """Why the application cannot go on; empty while it can."""
+        return self._watch.sentence if self._watch.given_up(self._now_s) else ""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the object was put at all places."""
+        return len(self.placed) >= self._options.places
+
+    def on_gesture(self, gesture: Gesture) -> None:
+        """Somebody points at a place. What was pointed at before the robot asked does not count."""
+        asked = gesture.captured.ToNanoseconds() * 1e-9 > self._since_s
+        if gesture.kind != Gesture.KIND_POINTED_AT or not gesture.located or not asked:
+            return
+        if self.state == "waiting":
+            self._pointed_at(gesture)
+        elif self.state == "aligning":
+            self._pointed_at_object(gesture)
+
+    def on_estimate(self, estimate: ActionEstimate) -> None:
+        """What the tracker believes of the person's arm."""
+        self._sight.on_estimate(estimate, self._now_s)
+
+    def on_goal_status(self, status: RelocationStatus) -> None:
+        """The arm says how a goal fares."""
+        self._errand.on_status(status)
+
+    def on_safety(self, state: SafetyState) -> None:
+        """The safety gate says how it stands."""
+        armed = not self._watch.lost
+        self._watch.on_safety(state, self._now_s)
+        if armed and self._watch.lost:
+            self._tell(f"I cannot go on: {self._watch.sentence}.")
+
+    def tick(self, now_s: float) -> Outbox:
+        """One turn: what is to be said."""
+        self._now_s = now_s
+        if not self.state:
+            self._rest()
+        elif not self.finished and not self._watch.lost:
+            self._steps[self.state]()
+        self._errand.step(now_s, self._outbox)
+        self._say_stage()
+        outbox, self._outbox = self._outbox, Outbox()
+        return outbox
+
+    # States
+
+    def _rest(self) -> None:
+        """Bring the arm to its base pose, wherever it is."""
+        self._errand.start(RelocationGoal.KIND_REST, self._now_s)
+        self._go("resting")
+
+    def _resting(self) -> None:
+        outcome = self._errand.outcome
+        if self._errand.succeeded:
+            self._fetch() if self._offset is not None else self._ask_to_align()
+        elif outcome is not None:
+            self._ask_for_help(f"I cannot bring my arm to rest: {outcome.reason}")
+
+    def _fetch(self) -> None:
+        x, y, z = self._options.hold
+        source, hold = self._goals.position(self._object_at), Position(x=x, y=y, z=z)
+        self._start(RelocationGoal.KIND_FETCH, source, hold, 1 + self._missed)
+        self._go("fetching")
+
+    def _fetching(self) -> None:
+        outcome = self._errand.outcome
+        if self._errand.succeeded:
+            self._missed, self._holding = 0, True
+            self._ask()
+        elif outcome is not None:
+            self._missed += 1
+            failed = outcome.state == RelocationStatus.STATE_FAILED
+            if failed and self._missed < self._options.attempts:
+                self._tell(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}. I try again.")
+                self._rest()
+            else:
+                self._ask_for_help(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}")
+
+    def _ask(self, before: str = "") -> None:
+        self._tell(f"{before}Please point at the place where I shall put it.", Speech.REQUEST_POINT_AT_PLACE)
+        self._wait_for("waiting")
+
+    def _ask_to_align(self, before: str = "") -> None:
+        self._tell(f"{before}Please point at the object, so that I see how you point.", Speech.REQUEST_POINT_AT_OBJECT)
+        self._wait_for("aligning")
+
+    def _wait_for(self, state: str) -> None:
+        self._quiet_since_s, self._told = self._now_s, set()
+        self._go(state)
+
+    def _watch_for(self, ask: Callable[[str], None]) -> None:
+        unseen = self._sight.trouble(self._now_s)
+        if unseen:
+            self._quiet_since_s = self._now_s
+            if unseen not in self._told:
+                self._told.add(unseen)
+                self._tell(f"I do not see where you point: {unseen}. I wait.")
+        elif self._now_s - self._quiet_since_s > self._options.patience_s:
+            ask("I have not seen you point. ")
+
+    def _pointed_at(self, gesture: Gesture) -> None:
+        assert self._offset is not None
+        place = (gesture.x - self._offset[0], gesture.y - self._offset[1])
+        doubt = self._doubt(gesture) or self._unfit(place)
+        if doubt:
+            self._ask(f"{doubt} ")
+            return
+        self._target = place
+        self._tell(f"You point at {cm(place)}, certain to {100 * gesture.confidence:.0f} %. I put it there.")
+        self._go("letting_hand_leave")
+
+    def _pointed_at_object(self, gesture: Gesture) -> None:
+        offset = (gesture.x - self._object_at[0], gesture.y - self._object_at[1])
+        doubt = self._doubt(gesture)
+        if not doubt and not math.hypot(*offset) <= self._options.most_offset:  # NaN is not below either
+            doubt = f"You point at {cm((gesture.x, gesture.y))}, but the object stands at {cm(self._object_at)}."
+        if doubt:
+            self._ask_to_align(f"{doubt} ")
+            return
+        self._offset, self._target = offset, self._object_at
+        self._tell(f"I see you point {1000 * math.hypot(*offset):.0f} mm beside the object. I bear that in mind.")
+        self._go("letting_hand_leave")
+
+    def _doubt(self, gesture: Gesture) -> str:
+        """Why it is not known where a gesture points; empty if it is."""
+        o = self._options
+        if gesture.frame != o.frame:
+            return f"You point at a place in the frame {gesture.frame!r}; I only know places in {o.frame!r}."
+        if not gesture.confidence >= o.least_certainty:  # NaN is not at least anything
+            return (
+                f"I am not sure where you point: certain to {100 * gesture.confidence:.0f} %, "
+                f"{100 * o.least_certainty:.0f} % are needed."
+            )
+        return ""
+
+    def _unfit(self, place: Place) -> str:
+        """Why the object cannot be put at a place; empty if it can."""
+        o = self._options
+        if not o.area.contains(place):
+            first, last = (cm(corner) for corner in zip(o.area_x, o.area_y, strict=True))
+            return f"You point at {cm(place)}, which I do not reach: my working area goes from {first} to {last}."
+        near = [other for other in o.standing if math.dist(other, place) < o.least_gap]
+        if near:
+            return f"You point at {cm(place)}, but something stands there, at {cm(near[0])}."
+        return ""
+
+    def _letting_hand_leave(self) -> None:
+        """The arm does not go where a hand still is, nor where it is not known whether one is there."""
+        away_s = self._sight.away_for(self._target, self._options.hand_away, self._now_s)
+        if away_s >= self._options.hand_away_s and not self._holding:
+            self._fetch()
+        elif away_s >= self._options.hand_away_s:
+            self._start(RelocationGoal.KIND_PLACE_HELD, None, self._goals.position(self._target))
+            self._go("placing")
+        elif self._now_s - self._since_s > self._options.patience_s:
+            self._tell(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
+            self._go("letting_hand_leave")
+
+    def _placing(self) -> None:
+        outcome = self._errand.outcome
+        if self._errand.succeeded:
+            self._object_at, self._holding = self._target, False
+            self.placed.append(self._target)
+            self._tell(f"It stands at {cm(self._target)}.")
+            self._finish() if self.finished else self._fetch()
+        elif outcome is None:
+            return
+        elif outcome.state == RelocationStatus.STATE_REFUSED:
+            self._ask(f"I cannot put it at {cm(self._target)}: {outcome.reason}. ")
+        else:
+            self._ask_for_help(f"I could not put it at {cm(self._target)}: {outcome.reason}")
+
+    def _finish(self) -> None:
+        self._tell("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
+        self._go("resting")
+
+    def _ask_for_help(self, sentence: str) -> None:
+        """Where the object is, only a person can tell now: it goes on from the start."""
+        self._object_at, self._missed, self._holding = self._options.start, 0, False
+        self._tell(f"{sentence}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
+        self._go("helped")
+
+    def _helped(self) -> None:
+        if self._now_s - self._since_s > self._options.patience_s:
+            self._rest()
+
+    # What is said
+
+    def _start(self, kind: RelocationGoal.Kind, source: Position | None, target: Position, attempt: int = 1) -> None:
+        o = self._options
+        self._errand.start(kind, self._now_s, o.object_name, source, target, o.standing, attempt)
+
+    def _go(self, state: str) -> None:
+        self.state, self._since_s = state, self._now_s
+
+    def _tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
+        speech = Speech(request=request, object=self._options.object_name, sentence=sentence)
+        speech.captured.FromNanoseconds(round(self._now_s * 1e9))
+        self._outbox.speech.append(speech)
+        self.sentence = sentence
+        _log.info("%.1f s: %s", self._now_s, sentence)
+
+    def _say_stage(self) -> None:
+        """Once a second, and whenever it changes."""
+        content = f"{self.state} {self.sentence} {self.finished}"
+        if content == self._said[0] and self._now_s - self._said[1] < STAGE_PERIOD_S:
+            return
+        self._said = (content, self._now_s)
+        message = ApplicationStage(
+            stage=ApplicationStage.STAGE_DONE if self.finished else ApplicationStage.STAGE_APPLY,
+            step="done" if self.finished else self.state,
+            sentence=self.sentence,
+            grasps=self._errand.grasps,
+            retries=self._errand.retries,
+        )
+        message.captured.FromNanoseconds(round(self._now_s * 1e9))
+        self._outbox.stages.append(message)

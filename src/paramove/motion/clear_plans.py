@@ -1,0 +1,189 @@
+"""Plans that keep their distance: the first of several ways to do a motion that is reachable and clear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.motion.arm_pose import UnreachablePoseError
+from paramove.motion.clearance import ClearanceChecker
+from paramove.motion.joint_path import joined, joint_motion
+from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.relocation import RelocationPlanner
+
+FloatArray = NDArray[np.float64]
+
+LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
+_HIGHER_ENTRY = 0.065
+_HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
+_BEHIND_ROW = 0.004
+_LEAST_TO_STANDING = 0.003  # m, where no way keeps more: places of standing objects are known to about 2 mm
+_HALF_OPEN = 0.45  # ξ; an object of 20 mm is let go at less than half of it
+_HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
+
+
+class NoClearPlanError(ValueError):
+    """No way of doing the motion is both reachable and clear; the message says why, way by way.
+
+    Attributes:
+        in_the_way: Numbers of the standing objects that ways would come too close to.
+    """
+
+    def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
+        super().__init__(message)
+        self.in_the_way = in_the_way
+
+
+class _Way(Protocol):
+    def __call__(self) -> PlannedMotion: ...
+
+
+_Choices = Mapping[str, object]
+"""Phase -> what a way does in it. Ways that do the same in a phase are alike there; all are in a phase not named."""
+
+
+class ClearPlans:
+    """Tries the ways of a motion in order of preference.
+
+    Args:
+        planner: Builds motions from the converted movement.
+        checker: Measures their distance from table, body and standing objects.
+    """
+
+    def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
+        self.planner, self._checker = planner, checker
+
+    def fetch(self, source: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it.
+
+        Args:
+            source: Where the object is grasped, [3], m, shoulder frame.
+            standing: Other objects, [M, 2].
+        """
+        heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
+        kinds = [(height, above) for above in (False, True) for height in heights]
+        ways = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
+        choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
+        return self._first(ways, standing, choices)
+
+    def deliver(self, start: FloatArray, target: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
+
+        Where the open fingers would touch a neighbour, the hand is opened less.
+        """
+        back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
+        detours: list[list[FloatArray]] = [[], [back], [back + _HIGHER_CARRY]]
+        leavings = [(upward, opened) for opened in (None, _HALF_OPEN) for upward in (False, True)]
+        kinds = [(number, leaving) for leaving in leavings for number in range(len(detours))]
+        ways = [
+            partial(
+                self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detours[number]], *leaving
+            )
+            for number, leaving in kinds
+        ]
+        choices = [
+            {"carry": number, "release": leaving[1], "withdraw": leaving, "retreat": leaving}
+            for number, leaving in kinds
+        ]
+        return self._first(ways, standing, choices)
+
+    def hold(self, start: FloatArray, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Carry a held object to `place` and stay there: straight, else over the start or over the place."""
+        corners = [np.array([*side[:2], max(start[2], place[2])]) for side in (start, place)]
+        ways = [[], *([self.planner.far_enough(corner)] for corner in corners)]
+        return self._first([partial(self.planner.hold, start, place, via) for via in ways], standing)
+
+    def leave(self, here: FloatArray, opening: float, standing: FloatArray) -> PlannedMotion:
+        """Open the hand and go back to the base pose, withdrawing back, else up."""
+        return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)
+
+    def home(self, angles: FloatArray, holding: bool, standing: FloatArray) -> PlannedMotion:
+        """From measured `angles` [6], rad, wherever they are, to the base pose.
+
+        A held object is put down where it is. An empty hand is opened and withdrawn as after a placing; where it is
+        already above all objects, or where that cannot be done, the arm goes straight in joint angles.
+        """
+        planner = self.planner
+        here = planner.arm.kinematics.forward(angles[:5]).gripper
+        span = planner.arm.fingers_open - planner.arm.fingers_closed
+        opening = 0.0 if holding else float(np.clip((angles[5] - planner.arm.fingers_closed) / span, 0.0, 1.0))
+        start = np.array([*angles[:5], planner.arm.fingers_angle(opening)])
+        grasped = self._checker.grasp_height
+        below = np.array([here[0], here[1], min(here[2], grasped)])
+        put_down: list[_Way] = [partial(planner.deliver, here, below, [], upward) for upward in (False, True)]
+        leave: list[_Way] = [partial(planner.leave, here, opening, upward) for upward in (False, True)]
+        learned = [partial(self._from, start, way, holding) for way in ([*put_down, *leave] if holding else leave)]
+        straight = partial(self._straight, start, planner.base_angles, "retreat")
+        high = here[2] > grasped + _HIGH and not holding
+        return self._first([straight, *learned] if high else [*learned, straight], standing)
+
+    def _from(self, start: FloatArray, way: _Way, holding: bool) -> PlannedMotion:
+        """The motion, begun with a way to its first sample."""
+        motion = way()
+        return joined(self._straight(start, motion.angles[0], "gather", holding), motion)
+
+    def _straight(self, start: FloatArray, end: FloatArray, phase: str, holding: bool = False) -> PlannedMotion:
+        planner = self.planner
+        kinematics = planner.arm.kinematics
+        return joint_motion(
+            start,
+            end,
+            kinematics,
+            planner.velocity,
+            planner.acceleration,
+            phase,
+            planner.options.sample_period,
+            holding,
+        )
+
+    def offer(self, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+        """Go to `place` with an open hand."""
+        return self._first([partial(self.planner.offer, place)], standing)
+
+    def fingers(self, here: FloatArray, start: float, end: float, standing: FloatArray) -> PlannedMotion:
+        """Open or close the hand where it is."""
+        return self._first([partial(self.planner.fingers, here, start, end)], standing)
+
+    def _first(
+        self, ways: Sequence[_Way], standing: FloatArray, choices: Sequence[_Choices] | None = None
+    ) -> PlannedMotion:
+        """The first way that is reachable and clear. With `choices`, ways that would fail as one before are skipped."""
+        if len(standing) > self._checker.n_standing:
+            raise NoClearPlanError(
+                f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
+            )
+        middle = self._checker.surface_z + self._checker.cylinder.height / 2
+        middles = np.column_stack([standing, np.full(len(standing), middle)])
+        reasons = []
+        in_the_way = set()
+        next_best: tuple[float, PlannedMotion | None] = (0.0, None)
+        hopeless: list[tuple[str, object]] = []
+        for number, way in enumerate(ways):
+            if choices and any(choices[number].get(phase) == choice for phase, choice in hopeless):
+                continue
+            try:
+                motion = way()
+            except UnreachablePoseError as error:
+                reasons.append(str(error))
+                continue
+            closest = self._checker.smallest(motion.angles, middles, motion.holding, every=6)
+            if closest.distance >= LEAST_CLEARANCE:
+                return motion
+            if closest.standing is not None:
+                in_the_way.add(closest.standing)
+                if closest.distance >= max(_LEAST_TO_STANDING, next_best[0]):
+                    next_best = closest.distance, motion
+            phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
+            if choices:
+                hopeless.append((phase, choices[number].get(phase)))
+            reasons.append(
+                f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
+                f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
+            )
+        if next_best[1] is not None:
+            return next_best[1]
+        raise NoClearPlanError("; ".join(dict.fromkeys(reasons)), frozenset(in_the_way))

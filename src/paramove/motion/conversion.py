@@ -1,0 +1,173 @@
+"""A person's movement model converted to a robot's arm (thesis 5.2.3).
+
+The converted model keeps the correspondence between the parameter and the place that is reached: a movement synthesised
+for a target in the robot's shoulder frame brings the gripper to that target.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.motion.body_points import arm_of, points_of
+from paramove.motion.elbow_interpolation import interpolated_elbow
+from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
+from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
+
+FloatArray = NDArray[np.float64]
+ElbowInterpolation = Literal["carried", "linear"]
+
+_NEWTON_STEPS = 3
+
+
+@dataclass(frozen=True)
+class RobotMovement(ReachingMovement):
+    """The converted model: local state means of (elbow, gripper, finger to thumb) on the grid of targets.
+
+    Attributes:
+        grid: Targets in the robot's shoulder frame (t̂ of 5.2.3), m.
+        means: [G, N, 9], m.
+        scale: s = l / l′.
+        o_min, o_max: Least and greatest distance of finger and thumb after scaling, m.
+        reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
+        release_state: Last state in which the object is held (T′).
+        duration: Mean duration of the demonstrations, s.
+        shoulder: p̄, the demonstrator's mean shoulder, which is the origin here, [3], m, frame of the demonstrations.
+        elbow_interpolation: "carried" interpolates the elbow as part of an arm (`elbow_interpolation.py`), "linear" as
+            a point on its own, as the thesis does.
+    """
+
+    grid: ParameterGrid
+    means: FloatArray
+    scale: float
+    o_min: float
+    o_max: float
+    reach_state: int
+    release_state: int
+    duration: float
+    shoulder: FloatArray
+    elbow_interpolation: ElbowInterpolation = "carried"
+
+    @classmethod
+    def from_model(
+        cls, model: InterpolativePHMM, arm_length: float, elbow_interpolation: ElbowInterpolation = "carried"
+    ) -> RobotMovement:
+        """Convert a trained model of a reaching action.
+
+        Args:
+            model: Its description names the points shoulder, elbow, knuckle, index and thumb and the progress at which
+                the target is reached and the object is last held.
+            arm_length: l = a + b of the robot, m.
+            elbow_interpolation: As the attribute.
+
+        Raises:
+            ValueError: The model lacks a point or does not say where in the movement the target is reached.
+        """
+        description = model.description or MovementDescription()
+        person = points_of(model.means_, description.point_names)
+        if not 0.0 < description.arrival < description.grasp < 1.0:
+            raise ValueError(
+                f"the model of {description.action!r} gives arrival {description.arrival} and grasp "
+                f"{description.grasp}; "
+                "a reaching action has 0 < arrival < grasp < 1"
+            )
+        shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
+        elbow, gripper, _ = arm_of(person, shoulder)
+        lengths = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
+        scale = arm_length / float(lengths.max())  # s = l / l′
+        means = np.concatenate(arm_of(person, shoulder), axis=-1) * scale  # (5.7)
+        size = np.linalg.norm(means[..., 6:], axis=-1)
+        grid = ParameterGrid((model.grid_.origin - shoulder) * scale, model.grid_.edges * scale, model.grid_.knots)
+        last = model.n_states - 1
+        return cls(
+            grid=grid,
+            means=means,
+            scale=scale,
+            o_min=float(size.min()),
+            o_max=float(size.max()),
+            reach_state=round(description.arrival * last),
+            release_state=round(description.grasp * last),
+            duration=description.duration,
+            shoulder=shoulder,
+            elbow_interpolation=elbow_interpolation,
+        )
+
+    def converted(self, means: FloatArray, point_names: tuple[str, ...]) -> ArmPoses:
+        """Other poses of the same person as this movement's are: scaled by s, seen from p̄ (5.7).
+
+        Args:
+            means: Body points, [K, 3 · points], m, frame of the demonstrations.
+            point_names: Their names, in order.
+
+        Raises:
+            ValueError: A needed point is missing.
+        """
+        return ArmPoses(*(self.scale * part for part in arm_of(points_of(means, point_names), self.shoulder)))
+
+    @property
+    def centre(self) -> FloatArray:
+        """Mean of the grid's targets, [3], m."""
+        return np.asarray(self.grid.points().mean(axis=0))
+
+    @property
+    def n_states(self) -> int:
+        """N, the number of states."""
+        return int(self.means.shape[1])
+
+    def poses(self, parameter: ArrayLike) -> ArmPoses:
+        """State means for one parameter [3] of the grid: N poses (5.2)-(5.4), corrected."""
+        return ArmPoses.from_stacked(self._means(np.asarray(parameter, dtype=np.float64)[None])[0])
+
+    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
+        """One state's mean for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
+        return ArmPoses.from_stacked(self._means(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
+
+    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+        """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
+
+        The demonstrations miss their targets a little; a few Newton steps on the effect remove that.
+        """
+        wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
+        parameter = wanted.copy()
+        steps = 0.01 * np.eye(3)
+        for _ in range(_NEWTON_STEPS):
+            reached = self._gripper(state, parameter)
+            columns = [(self._gripper(state, parameter + step) - reached) / 0.01 for step in steps]
+            jacobian = np.stack(columns, axis=-1)
+            parameter = parameter + np.linalg.solve(jacobian, (wanted - reached)[..., None])[..., 0]
+        return parameter
+
+    def opening(self, finger_to_thumb: ArrayLike) -> FloatArray:
+        """Normalised opening ξ of the gripper, [K], 1 open (after 5.24, corrected)."""
+        size = np.linalg.norm(np.asarray(finger_to_thumb, dtype=np.float64), axis=-1)
+        return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
+
+    def openings(self, states: ArmPoses) -> FloatArray:
+        """ξ in all states, as `opening`."""
+        return self.opening(states.finger_to_thumb)
+
+    def within_training(self, target: ArrayLike) -> bool | None:
+        """Whether the parameter of `target` [3] lies in the grid."""
+        coordinates = self.grid.coordinates(self.parameter_for(self.reach_state, target))
+        return bool(((coordinates >= 0.0) & (coordinates <= 1.0)).all())
+
+    def _means(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
+        """Means of all states, [K, N, 9], or of one, [K, 9], for K parameters."""
+        weights, corners = self._corners(parameters, state)
+        means: FloatArray = np.einsum("kc,kc...->k...", weights, corners)
+        if self.elbow_interpolation == "carried":
+            means[..., :3] = interpolated_elbow(weights, corners[..., :3], corners[..., 3:6])
+        return means
+
+    def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:
+        weights, corners = self._corners(parameters, state)
+        return np.asarray(np.einsum("kc,kcd->kd", weights, corners[..., 3:6]))
+
+    def _corners(self, parameters: FloatArray, state: int | None) -> tuple[FloatArray, FloatArray]:
+        """Weights [K, C] and means [K, C, N, 9] or [K, C, 9] of the grid points around each parameter."""
+        indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
+        means = self.means if state is None else self.means[:, state]
+        return weights, np.asarray(means[indices])

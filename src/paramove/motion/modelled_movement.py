@@ -1,0 +1,207 @@
+"""Any parametric HMM over the place that is reached, as a movement of a robot's arm (thesis 5.2.3).
+
+Unlike the interpolation of a grid (`conversion.py`) this asks the model for its state means, whatever it is: linear,
+quadratic, neural. A model of a movement that ends where it arrives, as when people touch something, has no way back;
+the hand then goes back as it came.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from paramove.motion.arm_pose import UnreachablePoseError
+from paramove.motion.body_points import arm_of, points_of
+from paramove.motion.conversion import RobotMovement
+from paramove.motion.reaching_movement import ArmPoses, ReachingMovement, TrainingTargets
+from paramove.motion.timing import minimum_jerk
+from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
+
+FloatArray = NDArray[np.float64]
+
+WIDEST_AT = 0.7
+"""Share of the way to an object after which a hand that will grasp is opened widest: 60 to 80 % (Jeannerod 1984)."""
+_STEP = 0.005  # m, of the differences
+_EXACT = 1e-7  # m
+_NEWTON_STEPS = 25
+_HALVINGS = 6
+_FARTHEST = 5.0  # arm lengths, of a parameter from the middle of the training
+
+
+class ModelledMovement(ReachingMovement):
+    """The converted model. Lengths are scaled by s, and seen from the shoulder where it is in each state.
+
+    A person's trunk leans towards what is reached, the robot's does not: it takes over the movement of the arm alone.
+    The parameter is the model's own, scaled and seen from the mean shoulder p̄.
+
+    Args:
+        model: Three parameters, the place that is reached; its description names the points shoulder, elbow, knuckle,
+            index and thumb, and the progress of arrival: 1 for a movement that ends there, else that of the grasp too.
+        arm_length: l = a + b of the robot, m.
+
+    Raises:
+        ValueError: The model lacks a point, has other parameters, or does not say when the target is reached.
+    """
+
+    def __init__(self, model: ParametricHMM, arm_length: float) -> None:
+        self._model = model
+        description = model.description or MovementDescription()
+        self._names = description.point_names
+        self._farthest = _FARTHEST * arm_length
+        self._returns = not ends_at_target(description)
+        self.begins_above_table = not self._returns
+        self.reach_state, self.release_state = _moments(description, model.n_states)
+        targets = _targets_of(model)
+        person = points_of(model.state_means(targets), self._names)
+        elbow, gripper, across = arm_of(person, person["shoulder"])
+        length = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
+        self.scale = arm_length / float(length.max())  # s = l / l′
+        self._shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
+        self._centre: FloatArray = (targets.mean(axis=0) - self._shoulder) * self.scale
+        size = self.scale * np.linalg.norm(across, axis=-1)
+        self.o_min, self.o_max = float(size.min()), float(size.max())
+
+    @property
+    def centre(self) -> FloatArray:
+        """Mean target of the training, [3], m."""
+        return self._centre
+
+    def poses(self, parameter: ArrayLike) -> ArmPoses:
+        """All states; those of a movement that ends at the target are followed by the same in reversed order."""
+        means = self._arm(np.asarray(parameter, dtype=np.float64)[None])[0]
+        return ArmPoses.from_stacked(means if self._returns else np.concatenate([means, means[::-1]]))
+
+    def poses_of_state(self, state: int, parameters: ArrayLike) -> ArmPoses:
+        """One state's mean for K parameters [K, 3]."""
+        return ArmPoses.from_stacked(self._arm(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
+
+    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+        """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
+
+        Newton's method with steps that are halved until they come nearer; a linear model needs one step. Also outside
+        the training's targets, as far as the model's movements go on to change with the target.
+
+        Raises:
+            UnreachablePoseError: No parameter is found for a point.
+        """
+        wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
+        parameter: FloatArray = wanted + self._centre - self._gripper(state, self._centre[None])
+        missed = wanted - self._gripper(state, parameter)
+        for _ in range(_NEWTON_STEPS):
+            if np.abs(missed).max() < _EXACT:
+                return parameter
+            parameter, missed = self._nearer(state, wanted, parameter, missed)
+        worst = int(np.abs(missed).max(axis=1).argmax())
+        if np.abs(missed[worst]).max() < _EXACT:
+            return parameter
+        raise UnreachablePoseError(self._refusal(wanted[worst], float(np.linalg.norm(missed[worst]))))
+
+    def openings(self, states: ArmPoses) -> FloatArray:
+        """ξ in all states: measured where the movement grasps, else opened on the way and closed on the way back."""
+        n = len(states)
+        if self._returns:
+            size = np.linalg.norm(states.finger_to_thumb, axis=-1)
+            return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
+        there = minimum_jerk(np.clip(np.linspace(0.0, 1.0, n // 2) / WIDEST_AT, 0.0, 1.0))
+        return np.concatenate([there, there[::-1]])
+
+    def within_training(self, target: ArrayLike) -> bool | None:
+        """Whether the parameter of `target` [3] lies in the hull of the training's; None in files without them."""
+        if self._hull is None:
+            return None
+        try:
+            parameter = self.parameter_for(self.reach_state, target)[0]
+        except UnreachablePoseError:
+            return False
+        return self._hull.enclose(parameter)
+
+    @cached_property
+    def _hull(self) -> TrainingTargets | None:
+        theta = self._model.training_theta_
+        return None if theta is None else TrainingTargets((theta - self._shoulder) * self.scale)
+
+    def _nearer(
+        self, state: int, wanted: FloatArray, parameter: FloatArray, missed: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """One step of Newton's method, halved where it would not come nearer."""
+        steps = _STEP * np.eye(3)
+        columns = [self._gripper(state, parameter + step) - self._gripper(state, parameter - step) for step in steps]
+        jacobian = np.stack(columns, axis=-1) / (2.0 * _STEP)
+        try:
+            change = np.linalg.solve(jacobian, missed[..., None])[..., 0]
+        except np.linalg.LinAlgError as error:
+            raise UnreachablePoseError(self._refusal(wanted[0], float(np.linalg.norm(missed[0])))) from error
+        distance = np.linalg.norm(missed, axis=1)
+        for _ in range(_HALVINGS):
+            tried = self._centre + np.clip(parameter + change - self._centre, -self._farthest, self._farthest)
+            left = wanted - self._gripper(state, tried)
+            worse = np.linalg.norm(left, axis=1) > distance
+            if not worse.any():
+                break
+            change = np.where(worse[:, None], 0.5 * change, change)
+        return tried, left
+
+    def _refusal(self, wanted: FloatArray, missed: float) -> str:
+        x, y, z = 100.0 * wanted
+        description = self._model.description or MovementDescription()
+        return (
+            f"no movement of the model {description.action!r} brings the gripper to ({x:.1f}, {y:.1f}, {z:.1f}) cm, "
+            f"the nearest is {100 * missed:.1f} cm beside it; its training reached no such place, and a linear "
+            "model extrapolates farther than others"
+        )
+
+    def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:
+        return self._arm(parameters, state)[..., 3:6]
+
+    def _arm(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
+        """Elbow, gripper, finger to thumb of all states, [K, N, 9], or of one, [K, 9], for K parameters (5.7)."""
+        means = self._model.state_means(parameters / self.scale + self._shoulder)
+        if state is not None:
+            means = means[:, min(state, 2 * self._model.n_states - 1 - state) if not self._returns else state]
+        person = points_of(means, self._names)
+        return np.concatenate(arm_of(person, person["shoulder"]), axis=-1) * self.scale
+
+
+def ends_at_target(description: MovementDescription) -> bool:
+    """Whether the movement arrives with its last frame, as it does where no arrival and no grasp are named."""
+    return description.arrival == 1.0 or (description.arrival < 0.0 and description.grasp < 0.0)
+
+
+def _targets_of(model: ParametricHMM) -> FloatArray:
+    """Targets [K, 3] that stand for all of the training."""
+    if model.training_theta_ is not None:
+        targets = model.training_theta_
+    elif model.parameter_bounds_ is not None:
+        targets = np.stack(np.meshgrid(*model.parameter_bounds_.T, indexing="ij"), axis=-1)
+        targets = targets.reshape(-1, model.parameter_bounds_.shape[1])
+    else:
+        raise ValueError("the model is not trained: call fit first")
+    if targets.shape[1] != 3:
+        raise ValueError(f"expected a model of 3 parameters, the place that is reached; found {targets.shape[1]}")
+    return targets
+
+
+def _moments(description: MovementDescription, n_states: int) -> tuple[int, int]:
+    """States of arrival and of the beginning of the way back."""
+    arrival, grasp, last = description.arrival, description.grasp, n_states - 1
+    if ends_at_target(description):
+        return last, last + 1
+    if not 0.0 < arrival < grasp < 1.0:
+        raise ValueError(
+            f"the model of {description.action!r} gives arrival {arrival} and grasp {grasp}; "
+            "a reaching action has 0 < arrival < grasp < 1, or arrival 1 if it ends at the target"
+        )
+    return round(arrival * last), round(grasp * last)
+
+
+def robot_movement(model: ParametricHMM, arm_length: float) -> ReachingMovement:
+    """The movement of a robot's arm of this length, m, by any model: a grid's with elbows as parts of an arm.
+
+    Raises:
+        ValueError: The model does not suit, as of `RobotMovement.from_model` and `ModelledMovement`.
+    """
+    if isinstance(model, InterpolativePHMM) and not ends_at_target(model.description or MovementDescription()):
+        return RobotMovement.from_model(model, arm_length)
+    return ModelledMovement(model, arm_length)

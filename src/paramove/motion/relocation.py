@@ -1,0 +1,319 @@
+"""The relocation action: fetch an object and put it elsewhere with a learned reaching movement (thesis 5.2.5).
+
+Approach and retreat are the synthesised movement; in between, the state T in which the gripper has reached the target
+is kept and only the parameter t varies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from paramove.motion.arm_pose import ArmPoseSolver
+from paramove.motion.planned_motion import Path, PlannedMotion, RelocationOptions
+from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
+from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
+from paramove.robots.description import Arm
+
+FloatArray = NDArray[np.float64]
+
+_UP = np.array([0.0, 0.0, 1.0])
+_SLOWING_ROUNDS = 6
+_FINAL_SHARE = 0.93  # of the limits, reached by the finished samples at most
+
+
+class RelocationPlanner:
+    """Builds the motions of the relocation action from a converted model.
+
+    Args:
+        movement: The converted reaching movement.
+        solver: Inverse kinematics of the arm.
+        arm: The arm's joints and fingers.
+        base_angles: Base pose of the five joints and the fingers, [6], rad; every motion starts or ends there or where
+            the last one ended.
+        velocity: Largest speed of the five joints and the fingers, [6], rad/s.
+        acceleration: Largest acceleration of them, [6], rad/s².
+        options: Sizes.
+    """
+
+    def __init__(
+        self,
+        movement: ReachingMovement,
+        solver: ArmPoseSolver,
+        arm: Arm,
+        base_angles: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        options: RelocationOptions | None = None,
+    ) -> None:
+        self.movement, self.solver, self.arm = movement, solver, arm
+        self.options = options or RelocationOptions()
+        self.velocity = np.asarray(velocity, dtype=np.float64)
+        self.acceleration = np.asarray(acceleration, dtype=np.float64)
+        self.base_angles = base = np.asarray(base_angles, dtype=np.float64)
+        self._base = self._pose_of(base[None, :5])
+        self._base_opening = float((base[5] - arm.fingers_closed) / (arm.fingers_open - arm.fingers_closed))
+
+    def fetch(self, target: ArrayLike, entry_height: float | None = None, from_above: bool = False) -> PlannedMotion:
+        """From the base pose to the object at `target`, close the hand, lift (first part of 5.2.5).
+
+        Args:
+            target: Where the gripper grasps it, [3], m, shoulder frame.
+            entry_height: Height above t′ at which the synthesised movement ends; None for the options' one.
+            from_above: Lower the open hand over the object instead of reaching from 3 cm before it.
+        """
+        t = np.asarray(target, dtype=np.float64)
+        o = self.options
+        path = self._new_path()
+        before = t + o.aside * self._right(t) if from_above else self._before(t)
+        grasp = t + o.grasp_aside * self._right(t)
+        entry = before + (o.entry_height if entry_height is None else entry_height) * _UP
+        self._approach(path, entry, o.work_opening)
+        self._move(path, "lower", [before], o.speed, o.work_opening)
+        self._move(path, "reach", [grasp], o.careful_speed, o.work_opening)
+        self._fingers(path, "grasp", o.work_opening, o.closed_opening)
+        self._move(path, "lift", [grasp + o.lift * _UP], o.careful_speed, o.closed_opening, holding=True)
+        return self._finish(path)
+
+    def deliver(
+        self,
+        start: ArrayLike,
+        target: ArrayLike,
+        via: Sequence[ArrayLike] = (),
+        upward: bool = False,
+        opened: float | None = None,
+    ) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `target`, let go, back to the base pose.
+
+        `upward` raises the open hand straight up afterwards instead of drawing it back; `opened` is its ξ then, None
+        for the options' one.
+        """
+        o = self.options
+        t = np.asarray(target, dtype=np.float64)
+        path = self._new_path()
+        here = np.asarray(start, dtype=np.float64)
+        above = t + o.lift * _UP
+        self._carry(path, here, [*via, above])
+        self._move(path, "place", [t + o.release_height * _UP], o.careful_speed, o.closed_opening, holding=True)
+        self._leave(path, t, o.closed_opening, upward, o.work_opening if opened is None else opened)
+        return self._finish(path)
+
+    def hold(self, start: ArrayLike, place: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `place` and stay there."""
+        path = self._new_path()
+        self._carry(path, np.asarray(start, dtype=np.float64), [*via, place])
+        return self._finish(path)
+
+    def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
+        """Open the hand where it is and go back to the base pose (last part of 5.2.5)."""
+        path = self._new_path()
+        here = np.asarray(start, dtype=np.float64)
+        self._stay(path, "release", here, opening)
+        self._leave(path, here, opening, upward, self.options.work_opening)
+        return self._finish(path)
+
+    def offer(self, target: ArrayLike) -> PlannedMotion:
+        """Go to `target` with an open hand and stay there."""
+        path = self._new_path()
+        self._approach(path, np.asarray(target, dtype=np.float64), self.options.offer_opening)
+        return self._finish(path)
+
+    def fingers(self, here: ArrayLike, start: float, end: float) -> PlannedMotion:
+        """Open or close the hand where it is."""
+        path = self._new_path()
+        self._stay(path, "fingers", np.asarray(here, dtype=np.float64), start)
+        self._fingers(path, "fingers", start, end)
+        return self._finish(path)
+
+    def _new_path(self) -> Path:
+        return Path(self.options.sample_period)
+
+    def _approach(self, path: Path, target: FloatArray, final_opening: float) -> None:
+        """States 1..T of the movement for `target`, started from the base pose."""
+        o = self.options
+        states, opening = self.movement.approach(self.far_enough(target))
+        n = len(states)
+        opening = _crossfaded(np.full(n, self._base_opening), opening, n)
+        level = fade_in(n, self._level_states(n))
+        opening = _crossfaded(opening, np.full(n, final_opening), n)
+        states = self._begun(states)
+        if self.movement.begins_above_table:
+            self._way_to_table(path, "approach", states[:1])
+        self._synthesised(path, "approach", states, opening, level, o.approach_duration)
+
+    def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool, opened: float) -> None:
+        o = self.options
+        self._fingers(path, "release", opening, opened)
+        aside = target + o.release_aside * self._right(target)
+        before = aside if upward else self._before(target)
+        high = self.far_enough(before + o.entry_height * _UP)
+        self._move(path, "withdraw", [aside], o.careful_speed, opened)
+        if not upward:
+            self._move(path, "withdraw", [before], o.speed, opened)
+        self._move(path, "withdraw", [high], o.speed, opened)
+        states, opening_path = self.movement.retreat(high)
+        n = len(states)
+        opening_path = _crossfaded(np.full(n, opened), opening_path, n)
+        opening_path = _crossfaded(opening_path, np.full(n, self._base_opening), n)
+        level = fade_in(n, self._level_states(n))[::-1]
+        backwards = self._begun(ArmPoses.from_stacked(states.stacked()[::-1]))
+        states = ArmPoses.from_stacked(backwards.stacked()[::-1])
+        first = path.end.stacked()[0]
+        fade = fade_in(n, n // 2)[::-1, None]
+        states = ArmPoses.from_stacked(states.stacked() + fade * (first - states.stacked()[0]))
+        self._synthesised(path, "retreat", states, opening_path, level, o.retreat_duration)
+        if self.movement.begins_above_table:
+            self._way_to_table(path, "retreat", states[-1:], backwards=True)
+
+    def _level_states(self, n: int) -> int:
+        """Over how many of n states the hand is levelled: all of them where people did not grasp but touch."""
+        return n if self.movement.begins_above_table else self.options.level_states
+
+    def _synthesised(
+        self, path: Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
+    ) -> None:
+        """State means in order (synthesis method D), smoothly timed from rest to rest."""
+        at = np.linspace(0.0, 1.0, len(states))
+        columns = np.concatenate([states.stacked(), opening[:, None], level[:, None]], axis=1)
+        curve = CubicSpline(at, columns, axis=0, bc_type="clamped")
+        n = max(2, round(duration / path.period))
+        values = curve(soft_ends(np.arange(1, n + 1) / n))
+        poses = ArmPoses.from_stacked(values[:, :9])
+        poses = ArmPoses(poses.elbow, self._outward(poses.gripper), poses.finger_to_thumb)
+        path.add(name, poses, np.clip(values[:, 9], 0.0, 1.0), np.clip(values[:, 10], 0.0, 1.0))
+
+    def _way_to_table(self, path: Path, name: str, begin: ArmPoses, backwards: bool = False) -> None:
+        """From the base pose to where the movement begins, or back: no movement of people, who sit at the table."""
+        o = self.options
+        first = self.solver.solve(begin.elbow, self._outward(begin.gripper), begin.finger_to_thumb).angles[0]
+        corners = np.concatenate([self.base_angles[None, :5], np.deg2rad(o.raise_via_deg), first[None]])
+        at = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(corners, axis=0)).max(axis=1))])
+        n = max(2, round(o.raise_duration / path.period))
+        along = minimum_jerk((np.arange(n, 0, -1) - 1 if backwards else np.arange(1, n + 1)) / n)
+        path.add(name, self._pose_of(PchipInterpolator(at / at[-1], corners)(along)), self._base_opening, 0.0)
+
+    def far_enough(self, point: FloatArray) -> FloatArray:
+        """The point moved away from the shoulder until `_outward` leaves it where it is."""
+        least = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
+        return point * max(1.0, least / float(np.linalg.norm(point)))
+
+    def _outward(self, gripper: FloatArray) -> FloatArray:
+        """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
+        return self.solver.moved_outward(gripper, self.options.reach_margin, self.options.reach_width)
+
+    def _move(
+        self, path: Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
+    ) -> None:
+        """θ_T^t along straight lines of t, at rest at every point."""
+        here = path.end.gripper[0]
+        for point in points:
+            distance = float(np.linalg.norm(point - here))
+            n = max(2, int(np.ceil(1.6 * distance / speed / path.period)))
+            along = minimum_jerk(np.arange(1, n + 1) / n)[:, None]
+            path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
+            here = point
+
+    def _carry(self, path: Path, here: FloatArray, points: Sequence[ArrayLike]) -> None:
+        o, along = self.options, [np.asarray(point, dtype=np.float64) for point in points]
+        self._stay(path, "carry", here, o.closed_opening, holding=True)
+        self._move(path, "carry", along, o.speed, o.closed_opening, holding=True)
+
+    def _stay(self, path: Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
+        path.add(name, self._reached(here[None]), opening, holding=holding)
+
+    def _fingers(self, path: Path, name: str, start: float, end: float) -> None:
+        o = self.options
+        n = max(2, round(o.finger_duration / path.period))
+        rest = max(1, round(o.settle_duration / path.period))
+        along = minimum_jerk(np.arange(1, n + 1) / n)
+        opening = np.concatenate([start + along * (end - start), np.full(rest, end)])
+        path.add(name, self._reached(np.repeat(path.end.gripper, n + rest, axis=0)), opening, holding=end < start)
+
+    def _reached(self, gripper: FloatArray) -> ArmPoses:
+        """Poses of state T in which the gripper is at the given points [K, 3]."""
+        m = self.movement
+        poses = m.poses_of_state(m.reach_state, m.parameter_for(m.reach_state, gripper))
+        return ArmPoses(poses.elbow, gripper, poses.finger_to_thumb)
+
+    def _right(self, target: FloatArray) -> FloatArray:
+        """b′⊥ of 5.2.5: level, to the right of the forearm when the gripper is at `target`."""
+        b = self._forward(target)
+        return np.array([b[1], -b[0], 0.0])
+
+    def _forward(self, target: FloatArray) -> FloatArray:
+        """b′ of 5.2.5: the forearm's direction projected onto the table plane."""
+        pose = self._reached(target[None])
+        solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, 1.0, self.options.work_slope)
+        b = (pose.gripper - solution.elbow)[0] * [1.0, 1.0, 0.0]
+        return np.asarray(b / np.linalg.norm(b))
+
+    def _before(self, target: FloatArray) -> FloatArray:
+        """t′ = t - 0.03 b′ + 0.01 b′⊥ of 5.2.5."""
+        return target - self.options.before * self._forward(target) + self.options.aside * self._right(target)
+
+    def _begun(self, states: ArmPoses) -> ArmPoses:
+        """The movement begun where the robot can: at its base pose, which fades out, or above the table."""
+        o = self.options
+        if not self.movement.begins_above_table:
+            return self._blended(states, self._base, o.blend_share)
+        gripper = np.clip(states.gripper[:1], *np.transpose(o.begin_within))
+        return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
+
+    def _blended(self, states: ArmPoses, first: ArmPoses, share: float) -> ArmPoses:
+        """The movement started from another pose, which fades out over the first `share`."""
+        values = states.stacked()
+        n = len(values)
+        fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (share * (n - 1)), 0.0, 1.0))
+        return ArmPoses.from_stacked(values + fade[:, None] * (first.stacked()[0] - values[0]))
+
+    def _pose_of(self, angles: FloatArray) -> ArmPoses:
+        """Poses of joint angles [K, 5]."""
+        points = self.arm.kinematics.forward(angles)
+        return ArmPoses(points.elbow, points.gripper, points.shoulder_from_hand[..., :, 1] * self.movement.o_max)
+
+    def _finish(self, path: Path) -> PlannedMotion:
+        poses = ArmPoses.joined(path.poses)
+        opening, level = np.concatenate(path.opening), np.concatenate(path.level)
+        smoothing = round(self.options.turn_smoothing / path.period)
+        solution = self.solver.solve(
+            poses.elbow, poses.gripper, poses.finger_to_thumb, level, self.options.work_slope, smoothing
+        )
+        closed, opened = self.arm.fingers_closed, self.arm.fingers_open
+        fingers = closed + opening * (opened - closed)
+        angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)
+        share = self.options.limit_share
+        stretched = slowed_times(angles, path.period, share * self.velocity, share * self.acceleration)
+        holding = np.concatenate(path.holding).astype(np.float64)
+        columns = np.concatenate([angles, poses.gripper], axis=1)
+        times, values = self._sampled(stretched, columns, path.period)
+        for _ in range(_SLOWING_ROUNDS):
+            excess = largest_excess(values[:, :6], path.period, self.velocity, self.acceleration) / _FINAL_SHARE
+            if excess <= 1.0:
+                break
+            stretched = 1.01 * excess * stretched
+            times, values = self._sampled(stretched, columns, path.period)
+        planned = path.period * np.arange(len(poses))
+        phases = [(name, float(np.interp(start, planned, stretched))) for name, start in path.phases]
+        return PlannedMotion(
+            times=times,
+            angles=values[:, :6],
+            gripper=values[:, 6:],
+            holding=np.interp(times, stretched, holding) > 0.5,
+            phases=tuple(phases),
+            elbow_turn=float(np.abs(solution.elbow_turn).max()),
+        )
+
+    def _sampled(self, times: FloatArray, columns: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+        """Joint angles and gripper positions at even times, the arm's joints within their limits."""
+        even, values = resampled(times, columns, period)
+        values[:, :5] = self.solver.pressed_inside(values[:, :5])
+        return even, values
+
+
+def _crossfaded(first: FloatArray, second: FloatArray, n: int) -> FloatArray:
+    """From one curve of n values to another."""
+    share = fade_in(n, n)
+    return np.asarray((1.0 - share) * first + share * second)

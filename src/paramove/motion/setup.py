@@ -1,0 +1,107 @@
+"""A synthesizer put together from a robot's folder, a movement and a working surface."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Literal, Self
+
+from platformdirs import user_cache_path
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from paramove.demonstrations.reaching import train_reaching_model
+from paramove.motion.arm_pose import ArmPoseSolver
+from paramove.motion.clear_plans import ClearPlans
+from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
+from paramove.motion.modelled_movement import robot_movement
+from paramove.motion.reaching_file import load_reaching_model
+from paramove.motion.recorded_reaching import people_model
+from paramove.motion.relocation import RelocationPlanner
+from paramove.motion.synthesizer import Synthesizer
+from paramove.phmm import ParametricHMM
+from paramove.robots.description import DescriptionError, RobotDescription
+
+_log = logging.getLogger(__name__)
+
+
+class MovementSource(BaseModel):
+    """Where the reaching movement comes from: a `file`, or a `model` that is trained when it is first asked for.
+
+    `synthetic`: demonstrations of the synthetic demonstrator with that `seed`. `table_reach`: recorded people that
+    reach for places on a table.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    file: Path | None = None
+    model: Literal["synthetic", "table_reach"] = "synthetic"
+    seed: int = 0
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if self.file is not None and "model" in self.model_fields_set:
+            raise ValueError(f"give either a file or a model, found file {self.file} and model {self.model!r}")
+        return self
+
+    def trained(self) -> ParametricHMM:
+        """The model, kept in the user's cache folder once trained. Raises ModelFileError for a bad `file`."""
+        if self.file is not None:
+            return load_reaching_model(self.file)
+        cache = _cache_folder()
+        if self.model == "table_reach":
+            return people_model(self.model, cache)
+        if cache is None:
+            return train_reaching_model(self.seed)
+        return train_reaching_model(self.seed, cache=cache / f"reaching_{self.seed}.npz")
+
+
+def _cache_folder() -> Path | None:
+    """The user's folder for trained models; None where it cannot be made."""
+    folder = user_cache_path("paramove")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        _log.warning("training the movement, which cannot be kept in %s: %s", folder, error.strerror)
+        return None
+    return folder
+
+
+class SurfaceParameters(BaseModel):
+    """The working surface in the shoulder's frame, m, and the upright objects on it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    x: tuple[float, float] = (0.100, 0.240)
+    y: tuple[float, float] = (-0.170, 0.130)
+    z: float = -0.134
+    object_radius: float = 0.010
+    object_height: float = 0.050
+
+
+def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> Synthesizer:
+    """Everything that a synthesizer needs, from files."""
+    return Synthesizer(plans_for(robot_folder, side, movement, surface))
+
+
+def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> ClearPlans:
+    """What plans the robot's movements, from files."""
+    robot = RobotDescription.load(robot_folder)
+    arm = robot.arm(side)
+    solver = ArmPoseSolver(robot, arm)
+    converted = robot_movement(movement.trained(), solver.length)
+    joints = [*arm.indices, arm.fingers_index]
+    planner = RelocationPlanner(
+        converted,
+        solver,
+        arm,
+        robot.base_pose[joints],
+        robot.operating_velocity[joints],
+        robot.operating_acceleration[joints],
+    )
+    box = WorkSurface(surface.x, surface.y, surface.z)
+    cylinder = UprightCylinder(surface.object_radius, surface.object_height)
+    try:
+        checker = ClearanceChecker(robot, side, box, cylinder)
+    except (KeyError, ValueError) as error:
+        raise DescriptionError(f"{robot.model_path} does not fit the robot's description: {error}") from error
+    return ClearPlans(planner, checker)

@@ -1,0 +1,341 @@
+"""From goals to trajectories: plays one goal after the other with the learned movement and says how it fares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from numpy.typing import NDArray
+
+from paramove.motion.arm_pose import UnreachablePoseError
+from paramove.motion.arm_state import FELT_OPENING, ArmState
+from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
+from paramove.motion.goals import FRAME, GoalRefusedError, centimetres, hull_of, point_of, standing_of
+from paramove.motion.motion_message import motion_message
+from paramove.motion.planned_motion import PlannedMotion
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
+from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
+
+FloatArray = NDArray[np.float64]
+
+RESEND_NS = 400_000_000
+REMEMBERED_GOALS = 200
+STALE_TRIES = 3
+NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
+RESTARTED = "the synthesizer was restarted; the motion it had begun was ended where it led; send a new goal"
+
+_ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
+
+
+@dataclass(frozen=True)
+class SynthesizerSays:
+    """What one tick gives."""
+
+    trajectories: tuple[JointTrajectory, ...]
+    statuses: tuple[RelocationStatus, ...]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    done: bool
+    reason: str = ""
+
+
+_Course = Generator[PlannedMotion, None, _Outcome]
+
+
+class _Hulls(NamedTuple):
+    """Where the places of a goal lie, seen by the movement model."""
+
+    goal_id: str = ""
+    from_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
+    to_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
+
+
+@dataclass
+class _Running:
+    """The goal being done: its course, the motion under way and what is known of it."""
+
+    goal: RelocationGoal
+    course: _Course
+    motion: PlannedMotion | None = None
+    message: JointTrajectory | None = None
+    acknowledged: bool = False
+    sent_ns: int = 0
+    time_s: float = 0.0
+    phase: str = ""
+    motions: int = 0
+    stale: int = 0
+    elbow_turn: float = 0.0
+
+
+class Synthesizer:
+    """Does one goal at a time. Hear messages with the `on_…` methods, then call `tick` once per turn.
+
+    Args:
+        plans: Builds motions from the converted movement that keep clear of table, body and standing objects.
+    """
+
+    def __init__(self, plans: ClearPlans) -> None:
+        self._plans = plans
+        self._arm = plans.planner.arm
+        self._hand = ArmState(self._arm, plans.planner.base_angles)
+        self._running: _Running | None = None
+        self._waiting: RelocationGoal | None = None
+        self._hulls = _Hulls()
+        self._newest: dict[str, RelocationStatus] = {}
+        self._statuses: list[RelocationStatus] = []
+        self._trajectories: list[JointTrajectory] = []
+        self._now_ns = 0
+        self._courses: dict[int, Callable[[RelocationGoal], _Course]] = {
+            RelocationGoal.KIND_RELOCATE: partial(self._fetch, then=self._plans.deliver),
+            RelocationGoal.KIND_FETCH: partial(self._fetch, then=self._plans.hold),
+            RelocationGoal.KIND_OFFER_HAND: self._offer_hand,
+            RelocationGoal.KIND_TAKE: self._take,
+            RelocationGoal.KIND_RELEASE: self._release,
+            RelocationGoal.KIND_PLACE_HELD: self._place_held,
+            RelocationGoal.KIND_REST: self._rest,
+        }
+
+    @property
+    def holding(self) -> bool:
+        """Whether the hand is commanded to be closed and its fingers feel something."""
+        return self._commanded_opening() < FELT_OPENING < self._hand.measured
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for people."""
+        if self._running is not None:
+            return f"goal {self._running.goal.id}: {self._running.phase or 'begins'}"
+        if self._waiting is not None:
+            return f"goal {self._waiting.id} waits until the arm rests, for where it is is not known yet"
+        return "waiting for a goal"
+
+    def on_goal(self, goal: RelocationGoal) -> None:
+        """Accept or refuse a goal. The same id again is answered with its newest status and not done twice.
+
+        While it is not known where the arm is (see `ArmState`), the newest goal waits until the arm rests.
+        """
+        known = self._newest.get(goal.id)
+        if known is not None:
+            self._statuses.append(known)
+        elif goal.asked_again:
+            self._say(goal.id, RelocationStatus.STATE_FAILED, reason=RESTARTED)
+        elif self._running is None and not self._hand.find_out(self._now_ns):
+            self._waiting = goal
+        else:
+            self._begin_or_refuse(goal)
+
+    def on_joint_states(self, message: JointStates) -> None:
+        """Hear the measured joints: where the arm is, and by the fingers whether something is held."""
+        if not self._hand.hear(message, self._now_ns):
+            return
+        running = self._running
+        if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
+            self._hand.lost |= self._hand.measured <= FELT_OPENING
+
+    def on_trajectory_status(self, status: TrajectoryStatus) -> None:
+        """Hear how the driver fares with the motion under way."""
+        running = self._running
+        if running is None or running.message is None or status.trajectory_id != running.message.id:
+            self._on_status_of_others(status)
+            return
+        if status.state == TrajectoryStatus.STATE_REFUSED and status.code == "stale" and running.stale < STALE_TRIES:
+            running.stale += 1  # planning took longer than the driver waits: it is said again with the time of now
+            running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
+            return
+        if not math.isfinite(status.time_s):
+            return
+        running.acknowledged = True
+        running.time_s = status.time_s
+        if status.state == TrajectoryStatus.STATE_SUCCEEDED:
+            self._next_motion(running)
+        elif status.state in _ENDED:
+            self._hand.forget()
+            self._end(running, _Outcome(False, f"the arm driver ended the motion: {status.reason}"))
+        else:
+            self._say_phase(running)
+
+    def tick(self, now_ns: int) -> SynthesizerSays:
+        """Once per turn: what is to be said."""
+        self._now_ns = now_ns
+        if self._waiting is not None and self._running is None and self._hand.find_out(now_ns):
+            waiting, self._waiting = self._waiting, None
+            self._begin_or_refuse(waiting)
+        running = self._running
+        unheard = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
+        if running is not None and running.message is not None and unheard:
+            running.message.captured.FromNanoseconds(now_ns)
+            self._trajectories.append(running.message)
+            running.sent_ns = now_ns
+        says = SynthesizerSays(tuple(self._trajectories), tuple(self._statuses))
+        self._trajectories, self._statuses = [], []
+        return says
+
+    def _on_status_of_others(self, status: TrajectoryStatus) -> None:
+        """A motion that an earlier process began, or one that was given up here, moves the arm."""
+        if status.state in (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_EXECUTING):
+            self._hand.moved_by_others(self._now_ns)
+            if self._running is None:
+                self._hand.forget()
+
+    # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
+
+    def _fetch(
+        self, goal: RelocationGoal, then: Callable[[FloatArray, FloatArray, FloatArray], PlannedMotion]
+    ) -> _Course:
+        source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
+        if not self._hand.at_base:
+            raise GoalRefusedError(NOT_AT_BASE)
+        fetch = self._plans.fetch(source, standing)
+        lifted = fetch.gripper[-1]
+        onwards = then(lifted, target, standing)  # known to be possible before the arm moves
+        yield fetch
+        if not self.holding:
+            yield self._plans.leave(lifted, self._hand.opening, standing)
+            return _Outcome(False, f"felt nothing in the hand at {centimetres(source)} cm")
+        yield onwards
+        return self._placed(target)
+
+    def _offer_hand(self, goal: RelocationGoal) -> _Course:
+        if not self._hand.at_base:
+            raise GoalRefusedError(NOT_AT_BASE)
+        yield self._plans.offer(point_of(goal, "from"), standing_of(goal))
+        return _Outcome(True)
+
+    def _take(self, goal: RelocationGoal) -> _Course:
+        here, options = self._waits_at(), self._plans.planner.options
+        yield self._plans.fingers(here, self._hand.opening, options.closed_opening, standing_of(goal))
+        if self.holding:
+            return _Outcome(True)
+        yield self._plans.fingers(here, self._hand.opening, options.offer_opening, standing_of(goal))
+        return _Outcome(False, "closed the hand and felt nothing")
+
+    def _release(self, goal: RelocationGoal) -> _Course:
+        opening = self._plans.planner.options.offer_opening
+        yield self._plans.fingers(self._waits_at(), self._hand.opening, opening, standing_of(goal))
+        return _Outcome(True)
+
+    def _place_held(self, goal: RelocationGoal) -> _Course:
+        target = point_of(goal, "to")
+        if not self.holding:
+            raise GoalRefusedError("nothing is held; take an object first")
+        yield self._plans.deliver(self._waits_at(), target, standing_of(goal))
+        return self._placed(target)
+
+    def _rest(self, goal: RelocationGoal) -> _Course:
+        if self._hand.found is not None:
+            yield self._plans.home(self._hand.found, self.holding, standing_of(goal))
+        elif not self._hand.at_base:
+            yield self._plans.leave(self._waits_at(), self._hand.opening, standing_of(goal))
+        return _Outcome(True)
+
+    def _placed(self, target: FloatArray) -> _Outcome:
+        if self._hand.lost:
+            return _Outcome(False, f"the object slipped out of the hand on the way to {centimetres(target)} cm")
+        return _Outcome(True)
+
+    def _begin_or_refuse(self, goal: RelocationGoal) -> None:
+        if self._running is None:
+            movement = self._plans.planner.movement
+            self._hulls = _Hulls(goal.id, hull_of(goal, "from", movement), hull_of(goal, "to", movement))
+        try:
+            self._begin(goal)
+        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
+            self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
+            if isinstance(refusal, NoClearPlanError):
+                self._newest[goal.id].in_the_way.extend(sorted(refusal.in_the_way))
+
+    def _begin(self, goal: RelocationGoal) -> None:
+        if not goal.id:
+            raise GoalRefusedError("a goal without an id; give each goal an id of its own")
+        if self._running is not None:
+            raise GoalRefusedError(f"busy with goal {self._running.goal.id}; one goal at a time")
+        if goal.frame != FRAME:
+            raise GoalRefusedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
+        course = self._courses.get(goal.kind)
+        if course is None:
+            kinds = [name.removeprefix("KIND_") for name in RelocationGoal.Kind.keys()[1:]]
+            raise GoalRefusedError(f"kind {goal.kind} is none of {', '.join(kinds)}")
+        running = _Running(goal, course(goal))
+        first = self._advance(running)
+        self._running = running
+        self._hand.lost = False
+        self._say(goal.id, RelocationStatus.STATE_ACCEPTED)
+        self._start_or_end(running, first)
+
+    def _advance(self, running: _Running) -> PlannedMotion | _Outcome:
+        try:
+            return next(running.course)
+        except StopIteration as end:
+            outcome: _Outcome = end.value
+            return outcome
+
+    def _next_motion(self, running: _Running) -> None:
+        assert running.motion is not None
+        self._hand.ended(running.motion)
+        try:
+            self._start_or_end(running, self._advance(running))
+        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as error:
+            self._end(running, _Outcome(False, str(error)))
+
+    def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
+        if isinstance(step, _Outcome):
+            self._end(running, step)
+            return
+        running.motions += 1
+        running.motion, running.acknowledged, running.time_s, running.stale = step, False, 0.0, 0
+        running.elbow_turn = max(running.elbow_turn, step.elbow_turn)
+        joints = (*self._arm.joints, self._arm.fingers)
+        running.message = motion_message(f"{running.goal.id}/{running.motions}", joints, step, self._now_ns)
+        running.sent_ns = self._now_ns
+        self._trajectories.append(running.message)
+
+    def _end(self, running: _Running, outcome: _Outcome) -> None:
+        running.course.close()
+        self._running = None
+        state = RelocationStatus.STATE_SUCCEEDED if outcome.done else RelocationStatus.STATE_FAILED
+        self._say(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
+
+    def _say_phase(self, running: _Running) -> None:
+        assert running.motion is not None
+        phase = [name for name, start in running.motion.phases if start <= running.time_s][-1]
+        if phase != running.phase:
+            running.phase = phase
+            self._say(running.goal.id, RelocationStatus.STATE_EXECUTING, phase, "", running.elbow_turn)
+
+    def _say(
+        self, goal_id: str, state: RelocationStatus.State, phase: str = "", reason: str = "", elbow_turn: float = 0.0
+    ) -> None:
+        status = RelocationStatus(
+            goal_id=goal_id, state=state, phase=phase, reason=reason, holding=self.holding, elbow_turn_rad=elbow_turn
+        )
+        status.captured.FromNanoseconds(self._now_ns)
+        if self._hulls.goal_id == goal_id:
+            status.from_hull, status.to_hull = self._hulls.from_hull, self._hulls.to_hull
+        self._statuses.append(status)
+        self._newest[goal_id] = status
+        while len(self._newest) > REMEMBERED_GOALS:
+            del self._newest[next(iter(self._newest))]
+
+    def _should_hold(self, motion: PlannedMotion, time_s: float) -> bool:
+        """Whether the motion holds an object from half a second before to half a second after `time_s`."""
+        around = np.searchsorted(motion.times, [time_s - 0.5, time_s + 0.5])
+        return bool(motion.holding[around[0] : max(around[1], around[0] + 1)].all()) and around[0] > 0
+
+    def _commanded_opening(self) -> float:
+        running = self._running
+        if running is None or running.motion is None:
+            return self._hand.opening
+        sample = min(int(np.searchsorted(running.motion.times, running.time_s)), len(running.motion.times) - 1)
+        return self._hand.opening_of(float(running.motion.angles[sample, 5]))
+
+    def _waits_at(self) -> FloatArray:
+        if self._hand.gripper is None:
+            raise GoalRefusedError("the arm is at its base pose; offer the hand first")
+        return self._hand.gripper

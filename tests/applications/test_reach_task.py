@@ -1,0 +1,182 @@
+"""A list of tasks: done in order from wherever the arm is, refused at the start or ended with the reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from pydantic import ValidationError
+
+from paramove.applications.reach_task import ReachStep, ReachTask
+from paramove.input_error import InputError
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.msgs.rule_pb2 import Speech
+from paramove.msgs.safety_state_pb2 import SafetyState
+from tests.applications.servo_cell import STEPS, ServoCell
+from tests.motion.servo_reaching import reaching
+
+
+def test_does_all_tasks_in_order_and_tells() -> None:
+    cell = ServoCell().run()
+    assert cell.task.finished
+    assert [message.id for message in cell.sent] == ["reach-0/1", "reach-0/2"]
+    assert [phase.name for phase in cell.sent[0].phases] == ["reach"]
+    assert [phase.name for phase in cell.sent[1].phases][:3] == ["approach", "lower", "grasp"]
+    assert list(cell.sent[0].joints) == list(cell.plan.joints)
+    first = cell.sent[1].points[0].position_rad
+    np.testing.assert_allclose(first, cell.sent[0].points[-1].position_rad, rtol=0, atol=1e-12)
+    told = [one.sentence for one in cell.speech]
+    assert told[0].startswith("task 1 of 2, reach for (0.150, 0.050, 0.100) m")
+    assert told[1].startswith("task 2 of 2, pick up at (0.150, -0.050, 0.016) m and place at (0.120, 0.080, 0.016) m")
+    assert told[2] == "all 2 tasks are done"
+
+
+def test_goes_back_to_the_base_pose_at_the_end() -> None:
+    cell = ServoCell(steps=STEPS[:1]).run()
+    assert [phase.name for phase in cell.sent[-1].phases] == ["retreat"]
+    np.testing.assert_allclose(cell.sent[-1].points[-1].position_rad, cell.plan.base_angles, rtol=0, atol=1e-12)
+
+
+def test_begins_where_the_arm_rests_and_not_before() -> None:
+    start = reaching("koch_v1_1").reach((0.12, -0.1, 0.12)).angles[-1]
+    cell = ServoCell("koch_v1_1", start=start)
+    assert cell.task.sentence == "waiting for the arm's driver"
+    cell.disarm(SafetyState.STATE_DISARMED, "servo 3 does not answer")
+    cell.tick(20)
+    assert not cell.sent
+    assert cell.task.sentence == "waiting until a person arms the arm (paramove arm enable); servo 3 does not answer"
+    for number in range(12):
+        if number == 4:
+            cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
+        cell.angles = cell.angles + np.deg2rad(0.2)
+        cell.tick()
+    assert not cell.sent
+    assert cell.task.sentence == "waiting until the arm rests"
+    rested = cell.angles
+    cell.run()
+    np.testing.assert_allclose(cell.sent[0].points[0].position_rad, rested, rtol=0, atol=1e-12)
+
+
+def test_a_wait_that_takes_longer_is_said_aloud_and_again_for_another_reason() -> None:
+    cell = ServoCell(steps=STEPS[:1])
+    cell.disarm(SafetyState.STATE_DISARMED, "joint 2 is far")
+    cell.tick(10)
+    assert not cell.speech
+    cell.tick(60)
+    cell.disarm(SafetyState.STATE_DISARMED, "joint 3 is far")
+    cell.tick(60)
+    wanted = "waiting until a person arms the arm (paramove arm enable); joint"
+    assert [one.sentence for one in cell.speech] == [f"{wanted} 2 is far", f"{wanted} 3 is far"]
+    cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
+    assert cell.run().task.finished
+
+
+def test_another_arm_than_the_planned_one_ends_the_tasks_with_what_helps() -> None:
+    cell = ServoCell()
+    cell.task.on_joint_states(JointStates(joints=[JointState(name="elbow_flex", position=0.1)]))
+    cell.task.tick(1)
+    assert "the arm has no joint joint1, joint2, joint3, joint4, gripper" in cell.task.failure
+    assert "the same `robot` as the arm's driver" in cell.task.failure
+
+
+def test_a_joint_a_little_outside_its_range_is_taken_in() -> None:
+    start = reaching("koch_v1_1").base_angles.copy()
+    start[1] = reaching("koch_v1_1").lower[1] - np.deg2rad(0.5)
+    cell = ServoCell("koch_v1_1", start=start).run()
+    assert cell.task.finished
+    assert cell.sent[0].points[0].position_rad[1] == pytest.approx(reaching("koch_v1_1").lower[1], rel=0, abs=1e-12)
+
+
+def test_a_joint_far_outside_its_range_ends_the_tasks_with_what_helps() -> None:
+    start = reaching("koch_v1_1").base_angles.copy()
+    start[1] = reaching("koch_v1_1").lower[1] - np.deg2rad(5.0)
+    cell = ServoCell("koch_v1_1", start=start).run()
+    assert not cell.sent
+    assert "joint shoulder_lift stands 5.0 deg outside its range; disarm, move it by hand" in cell.task.failure
+
+
+@pytest.mark.parametrize(
+    ("state", "word"), [(TrajectoryStatus.STATE_STOPPED, "stopped"), (TrajectoryStatus.STATE_REFUSED, "refused")]
+)
+def test_what_the_driver_stops_or_refuses_ends_the_tasks_with_its_reason(
+    state: TrajectoryStatus.State, word: str
+) -> None:
+    cell = ServoCell()
+    cell.answers, cell.reason = (TrajectoryStatus.STATE_ACCEPTED, state), "joint joint2 is too fast"
+    cell.run()
+    assert len(cell.sent) == 1
+    expected = f"task 1 of 2, reach for (0.150, 0.050, 0.100) m: the arm's driver {word} the motion: joint joint2 is"
+    assert cell.task.failure.startswith(expected)
+    assert cell.speech[-1].sentence == cell.task.failure
+    assert cell.speech[-1].request == Speech.REQUEST_HELP
+    cell.tick(20)
+    assert len(cell.sent) == 1
+
+
+def test_a_stale_trajectory_is_said_again_with_the_time_of_then() -> None:
+    cell = ServoCell()
+    cell.answers, cell.code = (TrajectoryStatus.STATE_REFUSED,), "stale"
+    while len(cell.sent) < 2:
+        cell.tick()
+    assert cell.sent[0].id == cell.sent[1].id
+    assert cell.sent[1].captured.ToNanoseconds() > cell.sent[0].captured.ToNanoseconds()
+    cell.run()
+    assert len(cell.sent) == 4
+    assert "refused the motion" in cell.task.failure
+
+
+def test_the_trajectory_is_said_again_until_the_driver_answers_and_then_given_up() -> None:
+    cell = ServoCell()
+    cell.answers = ()
+    cell.run()
+    assert len(cell.sent) > 10
+    assert {message.id for message in cell.sent} == {"reach-0/1"}
+    assert "has said nothing of the motion for 10 s" in cell.task.failure
+
+
+@pytest.mark.parametrize("state", [SafetyState.STATE_HOLD, SafetyState.STATE_DISCONNECTED])
+def test_an_arm_that_is_no_longer_armed_ends_the_tasks_with_the_reason(state: SafetyState.State) -> None:
+    cell = ServoCell()
+    cell.answers = (TrajectoryStatus.STATE_ACCEPTED,)
+    cell.tick(10)
+    assert cell.sent
+    cell.disarm(state, "servo 12 (joint2) is too hot")
+    cell.run()
+    assert "the arm is no longer armed" in cell.task.failure
+    assert "servo 12 (joint2) is too hot" in cell.task.failure
+
+
+def test_messages_of_other_motions_and_joints_change_nothing() -> None:
+    cell = ServoCell()
+    cell.answers = ()
+    cell.tick(10)
+    cell.task.on_trajectory_status(TrajectoryStatus(trajectory_id="x", state=TrajectoryStatus.STATE_SUCCEEDED))
+    assert not cell.task.failure
+    assert cell.task.sentence.startswith("task 1 of 2")
+
+
+def test_a_task_out_of_reach_is_refused_before_the_arm_moves() -> None:
+    steps = (*STEPS, ReachStep(reach=(0.6, 0.0, 0.1)))
+    with pytest.raises(InputError, match=r"task 3 of 3, reach for \(0.600, .*the nearest place that can be reached is"):
+        ReachTask(reaching("open_manipulator_x"), steps, "reach-0")
+    with pytest.raises(InputError, match="no tasks: expected a list"):
+        ReachTask(reaching("open_manipulator_x"), (), "reach-0")
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        {},
+        {"pick": [0.1, 0.0, 0.1]},
+        {"reach": [0.1, 0.0, 0.1], "place": [0.1, 0.0, 0.1]},
+        {"reach": [0.1, 0.0]},
+        {"reach": [0.1, 0.0, float("nan")]},
+        {"throw": [0.1, 0.0, 0.1]},
+        {"reach": [1e308, 0.0, 0.1]},
+        {"pick": [0.1, 0.0, 0.1], "place": [0.1, -2.1, 0.1]},
+    ],
+)
+def test_what_is_no_task_is_refused(step: dict[str, list[float]]) -> None:
+    with pytest.raises(ValidationError, match=r"expected \{reach|required|finite|Extra inputs|each from -2 to 2"):
+        ReachStep.model_validate(step)

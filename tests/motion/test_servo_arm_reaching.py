@@ -1,0 +1,187 @@
+"""Learned reaching on both servo arms: exact, within the limits, clear of the table, and with the person's shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from paramove.motion.planned_motion import PlannedMotion
+from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.robots.description import DescriptionError
+from paramove.robots.out_of_reach import OutOfReachError
+from paramove.safety.limits import MotionLimits
+from paramove.safety.trajectory_check import check_trajectory
+from tests.motion.reaching import HOAP3, reaching_model
+from tests.motion.servo_reaching import GRASP_Z, description, places, reaching
+from tests.robots.servo_arms import ARMS, ArmModel
+
+NAMES = [robot.name for robot in ARMS]
+each_arm = pytest.mark.parametrize("name", NAMES)
+
+
+class Oracle:
+    """MuJoCo's own kinematics and collisions of an arm at its table."""
+
+    def __init__(self, name: str) -> None:
+        self.robot = description(name)
+        self.scene = ArmModel(self.robot, "scene.xml")
+        assert self.robot.chain is not None
+        self.chain = self.robot.chain
+
+    def whole(self, row: np.ndarray) -> np.ndarray:
+        angles = self.robot.base_pose.copy()
+        angles[[*self.chain.indices, self.chain.gripper_index]] = row
+        return angles
+
+    def hand(self, row: np.ndarray) -> np.ndarray:
+        self.scene.place(self.whole(row))
+        return self.scene.data.site(self.chain.sites.end_effector).xpos.copy()
+
+    def touches_table(self, row: np.ndarray) -> bool:
+        self.scene.place(self.whole(row))
+        model, data = self.scene.model, self.scene.data
+        table = model.geom("table").id
+        pairs = [set(contact.geom.tolist()) for contact in data.contact[: data.ncon]]
+        others = [(pair - {table}).pop() for pair in pairs if table in pair]
+        names = [model.body(model.geom_bodyid[geom]).name for geom in others]
+        return any(name.split("_")[-1] not in ("cube", "cylinder") for name in names)
+
+
+def has_a_pose(plan: ServoArmReaching, target: np.ndarray) -> bool:
+    try:
+        plan._poses.pitch_at(target, 0.0, (np.deg2rad(-90), np.deg2rad(120)))
+    except OutOfReachError:
+        return False
+    return True
+
+
+def assert_playable(name: str, motion: PlannedMotion, start: np.ndarray | None = None) -> None:
+    """The driver's own check takes it, and the jerk is within the description's."""
+    plan, robot = reaching(name), description(name)
+    commanded = Oracle(name).whole(plan.base_angles if start is None else start)
+    limits = MotionLimits.of(robot)
+    checked = check_trajectory(plan.joints, motion.times, motion.angles, commanded, limits, np.deg2rad(0.01))
+    np.testing.assert_allclose(checked.duration_s, motion.times[-1], rtol=0, atol=0.011)
+    jerk = np.abs(np.diff(motion.angles, 3, axis=0)).max(axis=0) / 0.01**3
+    assert (jerk <= robot.jerk).all()
+
+
+@each_arm
+def test_reaches_what_is_in_reach_exactly_within_limits_and_clear_of_the_table(name: str) -> None:
+    plan, oracle = reaching(name), Oracle(name)
+    targets = [one for one in places(name, 25, (0.015, 0.2), seed=1) if has_a_pose(plan, one)]
+    assert len(targets) >= 22
+    for target in targets:
+        motion = plan.reach(target)
+        assert np.linalg.norm(oracle.hand(motion.angles[-1]) - target) < 1e-6
+        np.testing.assert_allclose(motion.angles[0], plan.base_angles, rtol=0, atol=1e-12)
+        assert_playable(name, motion)
+        assert not any(oracle.touches_table(row) for row in motion.angles[::4])
+
+
+@each_arm
+def test_picks_and_places_within_limits_and_clear_of_the_table(name: str) -> None:
+    plan, oracle = reaching(name), Oracle(name)
+    ends = places(name, 8, (GRASP_Z, GRASP_Z), seed=2, farthest=0.75)
+    for source, place in zip(ends[::2], ends[1::2], strict=True):
+        motion = plan.pick_and_place(source, place)
+        assert_playable(name, motion)
+        assert not any(oracle.touches_table(row) for row in motion.angles[::4])
+        at = {phase: motion.angles[round(start / 0.01)] for phase, start in motion.phases}
+        assert list(at) == [
+            "approach", "lower", "grasp", "lift", "carry", "place", "release", "withdraw", "retreat"
+        ]  # fmt: skip
+        for phase, point in (("grasp", source), ("lift", source), ("release", place)):
+            assert np.linalg.norm(oracle.hand(at[phase]) - point) < 1e-6
+        np.testing.assert_allclose(motion.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
+
+
+@each_arm
+def test_the_gripper_is_open_over_the_object_and_closed_while_it_holds_it(name: str) -> None:
+    chain, plan = description(name).chain, reaching(name)
+    assert chain is not None
+    motion = plan.pick_and_place((0.15, -0.05, GRASP_Z), (0.14, 0.08, GRASP_Z))
+    opening = (motion.angles[:, -1] - chain.gripper_closed) / (chain.gripper_open - chain.gripper_closed)
+    starts = {phase: round(start / 0.01) for phase, start in motion.phases}
+    np.testing.assert_allclose(opening[starts["lower"] : starts["grasp"]], 0.6, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(opening[starts["lift"] : starts["release"]], 0.0, rtol=0, atol=1e-9)
+    held = np.flatnonzero(motion.holding)
+    assert starts["grasp"] < held[0] <= starts["grasp"] + 1
+    assert abs(held[-1] - starts["release"]) <= 1
+    assert np.diff(held).max() == 1
+
+
+@each_arm
+def test_the_hand_points_down_where_it_grasps_if_it_can(name: str) -> None:
+    plan = reaching(name)
+    motion = plan.pick_and_place((0.15, 0.0, GRASP_Z), (0.12, 0.10, GRASP_Z))
+    pitch = np.rad2deg(description(name).chain.kinematics.forward(motion.angles[:, :-1]).pitch)
+    starts = {phase: round(start / 0.01) for phase, start in motion.phases}
+    np.testing.assert_allclose(pitch[[starts["grasp"], starts["release"]]], 90.0, rtol=0, atol=1e-6)
+
+
+@each_arm
+def test_begins_wherever_the_arm_is(name: str) -> None:
+    plan, oracle = reaching(name), Oracle(name)
+    start = plan.reach((0.10, -0.14, 0.05)).angles[-1]
+    start[-2] += 0.3 if name == "koch_v1_1" else 0.0  # the roll, which the planned paths leave at 0
+    motion = plan.reach((0.14, 0.10, 0.08), start)
+    np.testing.assert_allclose(motion.angles[0], start, rtol=0, atol=1e-12)
+    assert np.linalg.norm(oracle.hand(motion.angles[-1]) - (0.14, 0.10, 0.08)) < 1e-6
+    assert_playable(name, motion, start)
+    home = plan.home(motion.angles[-1])
+    np.testing.assert_allclose(home.angles[-1], plan.base_angles, rtol=0, atol=1e-12)
+    assert_playable(name, home, motion.angles[-1])
+
+
+@each_arm
+def test_the_way_has_the_arch_and_the_progress_of_the_person(name: str) -> None:
+    """Where nothing is in the way the hand follows the learned way, not a straight line."""
+    plan = reaching(name)
+    target = np.array([0.15, 0.06, 0.06])
+    motion = plan.reach(target)
+    way = plan._person.approach(target).between(motion.gripper[0], target, plan._arm.yaw_axis)
+    gaps = np.linalg.norm(motion.gripper[:, None] - way[None], axis=-1)
+    assert gaps.min(axis=0).max() < 0.004
+    line = target - motion.gripper[0]
+    along = (way - motion.gripper[0]) @ line / (line @ line)
+    beside = np.linalg.norm(way - motion.gripper[0] - along[:, None] * line, axis=1)
+    assert beside.max() > 0.1 * np.linalg.norm(line)
+
+
+@each_arm
+@pytest.mark.parametrize("target", [(0.6, 0.0, 0.1), (0.0, 0.55, 0.05), (0.1, 0.0, 0.8)])
+def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name: str, target: tuple) -> None:
+    plan = reaching(name)
+    with pytest.raises(OutOfReachError, match=r"cannot be reached.*nearest place that can be reached is") as refusal:
+        plan.reach(target)
+    nearest = refusal.value.position
+    assert nearest is not None
+    assert np.linalg.norm(nearest - target) < np.linalg.norm(target)
+    np.testing.assert_allclose(plan.reach(nearest).gripper[-1], nearest, rtol=0, atol=1e-6)
+
+
+@each_arm
+def test_below_the_table_nothing_is_reached(name: str) -> None:
+    with pytest.raises(OutOfReachError, match="the hand would touch the table or the arm itself") as refusal:
+        reaching(name).pick_and_place((0.15, 0.0, 0.002), (0.15, 0.05, GRASP_Z))
+    assert refusal.value.position is not None
+    assert refusal.value.position[2] > 0.005
+
+
+@each_arm
+@pytest.mark.parametrize("target", [(0.1, 0.0), (0.1, np.nan, 0.1), (1e300, 0.0, 0.1), "abc"])
+def test_what_is_no_place_is_refused(name: str, target: object) -> None:
+    with pytest.raises(ValueError, match=r"expected three numbers|could not convert"):
+        reaching(name).reach(target)
+
+
+def test_a_robot_without_a_chain_is_refused() -> None:
+    with pytest.raises(DescriptionError, match="it is not a servo arm"):
+        ServoArmReaching(HOAP3, reaching_model())
+
+
+def test_knows_whether_a_target_lies_between_those_of_the_training() -> None:
+    plan = reaching("open_manipulator_x")
+    assert plan.within_training((0.18, 0.0, 0.0))
+    assert not plan.within_training((0.30, 0.25, 0.3))
