@@ -38,13 +38,13 @@ from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm_setup import joint_servos, servo_port
-from paramove.robots.dynamixel.driven_arm import DrivenArm
-from paramove.robots.dynamixel.emulated_arm import EmulatedArm, emulated_servos
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.packets import Instruction, Packet, encoded
-from paramove.robots.dynamixel.servo_arm import Patience
-from paramove.robots.dynamixel.servo_loop import LoopSettings
+from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.servo_arm import Patience
+from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
+from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
+from paramove.robots.dynamixel.bus.packets import Instruction, Packet, encoded
+from paramove.robots.dynamixel.emulated.arm import EmulatedArm, emulated_servos
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from paramove.safety.gate_io import State
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -122,7 +122,7 @@ def _robot(path: Path) -> object:
 
 
 def _calibration(path: Path) -> object:
-    from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 
     return ArmCalibration.read(path)
 
@@ -427,7 +427,7 @@ def models(folder: Path) -> list[bytes]:
 
 
 def _arm(folder: Path) -> bytes:
-    from paramove.robots.dynamixel.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
+    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
 
     joint: dict[str, Any] = {"model": "xl430_w250", "firmware": 45, "sign": 1, "operating_mode": 3}
     joint |= {"homing_offset": 0, "zero_counts": 2048, "min_counts": 1000, "max_counts": 3000}

@@ -14,8 +14,8 @@ Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.robots.dynamixel.arm_setup import ServoArmSetup
-from paramove.robots.dynamixel.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.setup import ServoArmSetup
 from paramove.robots.this_launch import ThisLaunch
 
 HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)

@@ -10,7 +10,7 @@ from pydantic import Field
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, Tick, main
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated_arm import EmulatedArm
+from paramove.robots.dynamixel.emulated.arm import EmulatedArm
 
 HEARS = ()
 SAYS = (topics.TRUTH_STATE,)

@@ -4,9 +4,9 @@ import signal
 import sys
 from pathlib import Path
 
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250
+from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 chain = [EmulatedServo(model, 1 + i, 1_000_000) for i, model in enumerate((XL430_W250, XL330_M288, XL330_M288))]
 signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.cli.terminal_person import TerminalPerson
-from paramove.robots.dynamixel.calibration_path import calibration_path
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_setup import only_servo
+from paramove.robots.dynamixel.bus.servo_setup import only_servo
+from paramove.robots.dynamixel.calibration.path import calibration_path
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, koch_servos, rest
 from tests.robots.dynamixel.small_arm import LINK, SERIAL
 
@@ -71,8 +71,8 @@ class Bench:
         texts = [str(word) for word in ("arm", *words, *places)]
         app = build("arm")
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("paramove.robots.dynamixel.servo_setup.only_servo", few_rates)
-            patch.setattr("paramove.robots.dynamixel.servo_chain.TURN_S", 0.0)  # emulated servos answer at once
+            patch.setattr("paramove.robots.dynamixel.bus.servo_setup.only_servo", few_rates)
+            patch.setattr("paramove.robots.dynamixel.bus.servo_chain.TURN_S", 0.0)  # emulated servos answer at once
             for module in ("arm_setup", "arm_calibrate"):
                 patch.setattr(f"paramove.cli.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
             return CliRunner().invoke(app, texts)

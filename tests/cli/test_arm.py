@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.robots.dynamixel.arm_calibration import ArmCalibration
-from paramove.robots.dynamixel.calibration_path import calibration_path
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.servo_models import MODELS
-from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.bus.servo_models import MODELS
+from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+from paramove.robots.dynamixel.calibration.path import calibration_path
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from paramove.safety.gate_io import PERSON_STOP
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest
 from tests.robots.dynamixel.small_arm import LINK, SERIAL

@@ -24,7 +24,7 @@ from paramove.cli.main import build
 from paramove.cli.terminal_person import TerminalPerson
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.robots.jogging import Jogging
+from paramove.operator.jogging import Jogging
 from paramove.safety.gate_io import PERSON_STOP
 from tests.supervision.test_unread_terminal import stopped_terminal
 

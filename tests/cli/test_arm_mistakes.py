@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.servo_chain import ServoChain
-from paramove.robots.dynamixel.servo_models import MODELS
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain
+from paramove.robots.dynamixel.bus.servo_models import MODELS
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest
 
 

@@ -13,10 +13,10 @@ from paramove.cli.main import build
 from paramove.cli.terminal_person import TerminalPerson
 from paramove.demonstrations import DemonstrationSet
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
-from paramove.robots.dynamixel.calibration_path import calibration_path
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.limp_arm import LimpArm
+from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
+from paramove.robots.dynamixel.calibration.path import calibration_path
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, koch_servos
 from tests.robots.dynamixel.small_arm import LINK, SERIAL
 
@@ -153,7 +153,7 @@ def test_an_arm_that_has_to_be_calibrated_is(desk):
 
 
 def test_a_servo_that_falls_silent_ends_it_and_loses_nothing(desk, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.limp_arm.GIVES_UP", 3)
+    monkeypatch.setattr("paramove.robots.dynamixel.arm.limp_arm.GIVES_UP", 3)
     desk.calibrate()
 
     def unplug():

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 from paramove.cli import doctor
 from paramove.cli.main import build
 from paramove.diagnosis.finding import Machine
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_models import XL430_W250
+from paramove.robots.dynamixel.bus.servo_models import XL430_W250
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from tests.cli.conftest import call
 
 FAST = 1_000_000

@@ -9,12 +9,12 @@ import pytest
 
 from paramove.diagnosis.bus_findings import bus_findings, servo_findings
 from paramove.diagnosis.finding import Level
-from paramove.robots.dynamixel.bus_scan import FoundServo
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.packets import Instruction, PacketReader
-from paramove.robots.dynamixel.servo_models import XL330_M288, XL430_W250, XM430_W350
-from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.bus.packets import Instruction, PacketReader
+from paramove.robots.dynamixel.bus.scan import FoundServo
+from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250, XM430_W350
+from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 RATES = (57_600, 1_000_000)
 FAST = RATES[1]
@@ -52,7 +52,7 @@ class Overheard:
 def no_turns():
     """Emulated servos answer to a ping of all at once; real ones take turns, which are waited for."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("paramove.robots.dynamixel.servo_chain.TURN_S", 0.0)
+        patch.setattr("paramove.robots.dynamixel.bus.servo_chain.TURN_S", 0.0)
         yield
 
 

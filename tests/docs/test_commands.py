@@ -28,7 +28,7 @@ from ruamel.yaml import YAML
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.docs.command_line import unknown, unknown_study
 from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks
 from tests.docs.terminal import ENVIRONMENT, attended

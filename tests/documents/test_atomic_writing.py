@@ -10,11 +10,11 @@ from paramove.cameras.calibrated import write_cameras
 from paramove.demonstrations.labels import LabelsFile, Segment, append_segments, write_labels
 from paramove.demonstrations.pose_recording import PoseRecording, write_poses
 from paramove.documents.atomic_writing import replacing
-from paramove.robots.dynamixel.arm_calibration import sign_again
+from paramove.robots.dynamixel.calibration.arm_calibration import sign_again
 from paramove.training.movement_writing import Made, write_movement
 from tests.cameras.test_calibrated import lens_camera
 from tests.phmm.test_model_files import small_model
-from tests.robots.dynamixel.test_arm_calibration import ARM
+from tests.robots.dynamixel.calibration.test_arm_calibration import ARM
 
 
 def test_the_file_appears_at_the_end_of_the_block(tmp_path):

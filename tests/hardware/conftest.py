@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm_setup import servo_port
-from paramove.robots.dynamixel.emulated_arm import emulated_servos
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.arm.setup import servo_port
+from paramove.robots.dynamixel.emulated.arm import emulated_servos
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 
 ROOT = Path(__file__).parents[2]
 PATIENT_S = 0.3

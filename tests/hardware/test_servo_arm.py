@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from paramove.robots.dynamixel.arm_setup import joint_servos
-from paramove.robots.dynamixel.driven_arm import DrivenArm
-from paramove.robots.dynamixel.servo_arm import Patience, ServoArm
-from paramove.robots.dynamixel.servo_chain import ServoChain
-from paramove.robots.dynamixel.servo_loop import LoopSettings
+from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
+from paramove.robots.dynamixel.arm.setup import joint_servos
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from tests.robots.dynamixel.person import Person
 
 SETTINGS = LoopSettings(torque_off=True, patience=Patience(silent_s=1.0, watchdog_s=2.0, read_s=1.0))

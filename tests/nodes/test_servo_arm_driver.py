@@ -22,8 +22,8 @@ from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.operator.terminal_arming import arm_by_word
 from paramove.operator.terminal_stop import stop_arm
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated_arm import emulated_servos
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.arm import emulated_servos
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 
 FOLDER = Path("robot_description/open_manipulator_x")
 ROBOT = RobotDescription.load(FOLDER)

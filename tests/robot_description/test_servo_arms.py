@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.servo_models import BAUD_RATES, PULSES_PER_TURN, model_named
+from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, PULSES_PER_TURN, model_named
 from tests.robots.servo_arms import ARMS, KOCH, OPEN_MANIPULATOR_X, ArmModel
 
 STALL_TORQUE = {"xm430_w350": 4.1, "xl430_w250": 1.4, "xl330_m288": 0.52}

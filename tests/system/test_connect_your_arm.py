@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_models import MODELS
+from paramove.robots.dynamixel.bus.servo_models import MODELS
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from tests.docs.markdown import CONNECT_YOUR_ARM, blocks
 from tests.docs.terminal import ENVIRONMENT, at_terminal, attended, heard, launched, started
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands

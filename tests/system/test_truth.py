@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
-from paramove.diagnosis.devices import opened_files
+from paramove.devices import opened_files
 from tests.supervision.conftest import until
 from tests.system.conftest import WATCHING
 

@@ -3,8 +3,8 @@
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated_arm import emulated_servos
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.arm import emulated_servos
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.docs.terminal import ENVIRONMENT, at_terminal, heard, launched
 from tests.robots.dynamixel.small_arm import LINK
 

@@ -28,9 +28,9 @@ def calibrate(
     77 the data folder cannot be written, which is told at the start; 78 what was shown does not fit the description,
     with the cause; 130 Ctrl-C, and the old file stays.
     """
-    from paramove.robots.dynamixel.arm_plan import load_plan
-    from paramove.robots.dynamixel.calibration_path import check_can_be_kept
-    from paramove.robots.dynamixel.calibration_procedure import ArmCalibrator
+    from paramove.robots.dynamixel.calibration.arm_plan import load_plan
+    from paramove.robots.dynamixel.calibration.path import check_can_be_kept
+    from paramove.robots.dynamixel.calibration.procedure import ArmCalibrator
 
     with explained():
         plan = load_plan(robot)

@@ -70,8 +70,8 @@ class _Link:
     def __init__(self, folder: Path, step: float, by_person: bool) -> None:
         from paramove.bus import topics
         from paramove.bus.visitor import BusVisitor
-        from paramove.robots.arming_key import ArmingKey
-        from paramove.robots.jogging import Jogging
+        from paramove.operator.arming_key import ArmingKey
+        from paramove.operator.jogging import Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
         self._folder, self._topics, self._by_person = folder, topics, by_person

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.calibration_path import VARIABLE as DATA_VARIABLE
-from paramove.robots.dynamixel.calibration_path import calibration_path
-from paramove.robots.dynamixel.serial_adapters import VARIABLE as BY_ID_VARIABLE
-from paramove.robots.dynamixel.serial_adapters import SerialAdapter, serial_adapter
+from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE as BY_ID_VARIABLE
+from paramove.robots.dynamixel.bus.serial_adapters import SerialAdapter, serial_adapter
+from paramove.robots.dynamixel.calibration.path import VARIABLE as DATA_VARIABLE
+from paramove.robots.dynamixel.calibration.path import calibration_path
 from paramove.supervision import exit_codes
 from paramove.supervision.processes import printable
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel.arm_calibration import ArmCalibration
-    from paramove.robots.dynamixel.servo_chain import ServoChain
+    from paramove.robots.dynamixel.bus.servo_chain import ServoChain
+    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 
 DEFAULT_BAUD_RATE = 1_000_000
 LATENCY_S = 0.1
@@ -69,7 +69,7 @@ class OpenArm:
 
     def calibration(self) -> ArmCalibration:
         """Of this arm. Raises CalibrationError."""
-        from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+        from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 
         return ArmCalibration.load(self.path, self.adapter.serial)
 
@@ -77,8 +77,8 @@ class OpenArm:
 @contextlib.contextmanager
 def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int = 0) -> Iterator[OpenArm]:
     """The adapter's port, open at this baud rate or the calibrated one; ends the command, with the cause, on errors."""
-    from paramove.robots.dynamixel.servo_chain import ServoChain
-    from paramove.robots.dynamixel.servo_port import ServoPort
+    from paramove.robots.dynamixel.bus.servo_chain import ServoChain
+    from paramove.robots.dynamixel.bus.servo_port import ServoPort
 
     with explained():
         try:
@@ -98,8 +98,8 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
     """Ends the command with a sentence where a servo, the port or a file is not as it must be, and at Ctrl-C."""
-    from paramove.robots.dynamixel.servo_chain import ServoError, ServoSilentError
-    from paramove.robots.dynamixel.servo_port import PortLostError
+    from paramove.robots.dynamixel.bus.servo_chain import ServoError, ServoSilentError
+    from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
     try:
         yield
@@ -124,7 +124,7 @@ def ended(sentence: str, code: int) -> typer.Exit:
 
 def configured_baud_rate(path: Path) -> int:
     """As calibrated, 0 without a calibration that can be read."""
-    from paramove.robots.dynamixel.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 
     try:
         return ArmCalibration.read(path).bus.baud_rate

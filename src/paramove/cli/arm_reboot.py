@@ -25,7 +25,7 @@ def reboot(
     Exit codes: 0 rebooted and without error; 1 it still has a hardware error; 2 its joint carries something, so hold
     the arm and say --yes; 69 it does not answer.
     """
-    from paramove.robots.dynamixel import servo_reboot
+    from paramove.robots.dynamixel.bus import servo_reboot
 
     with open_arm(by_id, serial, data, baud_rate) as arm:
         servo = servo_reboot.servo_before_reboot(arm.chain, number)

@@ -30,7 +30,7 @@ from paramove.supervision.queued_output import QueuedOutput
 if TYPE_CHECKING:
     from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
     from paramove.robots.description import RobotDescription
-    from paramove.robots.dynamixel.limp_arm import LimpArm
+    from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 
 PERIOD_S = 0.02
 KEYS = "space begins and ends a segment, d drops the last one, q ends"
@@ -60,8 +60,8 @@ def teach(
     """
     from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
     from paramove.robots.description import RobotDescription
-    from paramove.robots.dynamixel.floating_arm import FloatingArm
-    from paramove.robots.dynamixel.limp_arm import LimpArm
+    from paramove.robots.dynamixel.arm.floating_arm import FloatingArm
+    from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 
     with explained():
         description = RobotDescription.load(robot)

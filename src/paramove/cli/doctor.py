@@ -12,7 +12,7 @@ import typer
 
 from paramove.diagnosis.finding import Finding, Level, Machine, Part
 from paramove.input_error import InputError
-from paramove.robots.dynamixel.serial_adapters import VARIABLE
+from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE
 from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:

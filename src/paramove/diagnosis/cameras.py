@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from paramove.diagnosis.devices import access_remedy, holders, may_use
+from paramove.devices import access_remedy, holders, may_use
 from paramove.diagnosis.finding import Finding, Level, Machine
 
 

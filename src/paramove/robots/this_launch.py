@@ -16,7 +16,7 @@ import psutil
 from paramove.bus import topics
 from paramove.bus.endpoint import owner_of, socket_path
 from paramove.bus.settings import BusSettings, lock_of
-from paramove.diagnosis.devices import opened_files, serving
+from paramove.devices import opened_files, serving
 
 PSEUDO_TERMINALS = Path("/dev/pts")
 SERIAL_PORTS = "/dev/tty"

@@ -2,10 +2,10 @@
 
 import math
 
-from paramove.robots.dynamixel.emulated_bus import EmulatedBus
-from paramove.robots.dynamixel.emulated_mechanics import DrivenJoint, MujocoMechanics
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.packets import Instruction, Packet, encoded
+from paramove.robots.dynamixel.bus.packets import Instruction, Packet, encoded
+from paramove.robots.dynamixel.emulated.bus import EmulatedBus
+from paramove.robots.dynamixel.emulated.mechanics import DrivenJoint, MujocoMechanics
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 COUNTS_PER_RAD = 4096 / (2 * math.pi)
 BAUD = 57600

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.robots.dynamixel.arm_calibration import COUNTS_PER_RAD
-from paramove.robots.dynamixel.arm_plan import load_plan
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_models import MODELS
+from paramove.robots.dynamixel.bus.servo_models import MODELS
+from paramove.robots.dynamixel.calibration.arm_calibration import COUNTS_PER_RAD
+from paramove.robots.dynamixel.calibration.arm_plan import load_plan
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 KOCH = Path(__file__).parents[3] / "robot_description" / "koch_v1_1"
 PLAN = load_plan(KOCH)

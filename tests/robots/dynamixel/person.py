@@ -6,7 +6,7 @@ import time
 from paramove.bus import topics
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
-from paramove.robots.dynamixel.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
 
 PATIENT_S = 120.0
 

@@ -9,13 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.robots.dynamixel.arm_calibration import COUNTS_PER_RAD, ArmCalibration, CalibratedBus, JointCalibration
-from paramove.robots.dynamixel.arm_plan import ArmPlan, PlannedServo
-from paramove.robots.dynamixel.emulated_servo import EmulatedServo
-from paramove.robots.dynamixel.emulator import DynamixelEmulator
-from paramove.robots.dynamixel.servo_chain import ServoChain
-from paramove.robots.dynamixel.servo_models import MODELS, PULSES_PER_TURN
-from paramove.robots.dynamixel.servo_port import ServoPort
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain
+from paramove.robots.dynamixel.bus.servo_models import MODELS, PULSES_PER_TURN
+from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel.calibration.arm_calibration import (
+    COUNTS_PER_RAD,
+    ArmCalibration,
+    CalibratedBus,
+    JointCalibration,
+)
+from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan, PlannedServo
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 SERIAL = "FT6Z5NCH"
 LINK = f"usb-FTDI_USB__-__Serial_Converter_{SERIAL}-if00-port0"

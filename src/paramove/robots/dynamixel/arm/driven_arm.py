@@ -1,0 +1,160 @@
+"""A servo arm as the arm's driver node sees it: messages in, messages out, the loop in a thread of its own between."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Any, Self
+
+import mujoco
+import numpy as np
+
+from paramove.bus import topics
+from paramove.bus.topics import Topic
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
+from paramove.msgs.motor_status_pb2 import MotorStatus
+from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.arm.servo_arm import ServoArm
+from paramove.robots.dynamixel.arm.servo_checks import JointServo
+from paramove.robots.dynamixel.arm.servo_loop import LoopSettings, ServoLoop
+from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.streaming.driver import ArmDriver
+from paramove.safety.gate_io import SafetySettings, State
+from paramove.safety.self_collision import SelfCollision
+
+FOLLOWING = float(np.deg2rad(10.0))
+"""How far a joint may be from where it is commanded: more means that somebody or something holds it."""
+EMERGENCY_MS = 500.0
+SILENCE = 1.5
+"""Times the loop's patience is the gate's, so that the loop, which knows the servos, tells first who is silent."""
+SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
+
+
+class DrivenArm:
+    """An arm that is driven while this is a context.
+
+    Args:
+        description: Of an arm with servos; its units are those of this very arm.
+        servos: In the order of its joints.
+        port: Of its bus, closed.
+        settings: How it is driven.
+
+    Raises:
+        InputError: On entering: the port is missing, forbidden or in use.
+
+    Attributes:
+        readable: A descriptor that can be read when `said` has something.
+    """
+
+    def __init__(
+        self, description: RobotDescription, servos: tuple[JointServo, ...], port: ServoPort, settings: LoopSettings
+    ) -> None:
+        following = np.full(description.n_joints, FOLLOWING)
+        following[list(description.gripper_indices)] = np.inf
+        safety = SafetySettings(
+            measured_timeout_ms=SILENCE * settings.patience.silent_s * 1e3,
+            following=following,
+            emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
+        )
+        self._caution = settings.caution
+        self._driver = ArmDriver(description, safety, self_collision(description), settings.why_no_program)
+        self.readable, self._written = os.pipe2(os.O_NONBLOCK)
+        self._loop = ServoLoop(self._driver, description, servos, port, settings, self._wake)
+        self._slow_ns = self._safety_ns = self._motors_ns = 0
+        self._state: State | None = None
+
+    def __enter__(self) -> Self:
+        self._loop.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._loop.__exit__(kind, error, where)
+
+    @property
+    def sentence(self) -> str:
+        """How the arm stands, for people."""
+        return self._driver.sentence
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong: a lost port, silent servos, low voltage, what presses the emergency stop, servos that are not
+        emulated though they should be; "" if nothing is.
+
+        Raises:
+            RuntimeError: The loop has failed; the servos rest by their own watchdog.
+        """
+        if self._loop.has_failed:
+            raise RuntimeError("the arm's loop has failed, the lines above say why; its servos rest by their watchdog")
+        loop = self._loop
+        return (
+            loop.lost
+            or loop.arm.unheard()
+            or "; ".join(filter(None, (self._caution, loop.pressed, *loop.arm.warnings())))
+        )
+
+    def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
+        """Hear a trajectory; the loop accepts or refuses it within a period."""
+        with self._loop.lock:
+            self._driver.on_trajectory(message, captured_ns)
+
+    def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
+        """Hear an arming request, to arm or disarm."""
+        with self._loop.lock:
+            self._driver.on_arm_request(message, captured_ns)
+
+    def on_stop(self, message: StopRequest, captured_ns: int) -> None:
+        """Hear a person's stop: what is played from the next period on is the stop ramp."""
+        with self._loop.lock:
+            self._driver.on_stop(message, captured_ns)
+        self._loop.tick()
+
+    def said(self) -> Iterator[tuple[Topic, Any, int]]:
+        """What is to be said since the last time: topic, message, and when what it tells of was so, ns."""
+        with contextlib.suppress(BlockingIOError):
+            os.read(self.readable, 4096)
+        says, now_ns = self._loop.take(), time.monotonic_ns()
+        states = [one.joint_states for one in says if one.joint_states is not None]
+        yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
+        yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in says for status in one.statuses)
+        due = now_ns - self._safety_ns >= SLOW_NS
+        if says and (due or self._driver.state is not self._state):
+            self._state, self._safety_ns = self._driver.state, now_ns
+            yield topics.ARM_SAFETY, says[-1].safety, now_ns
+        if states and now_ns - self._slow_ns >= SLOW_NS:
+            self._slow_ns = now_ns
+            yield topics.ARM_JOINT_STATES, states[-1], states[-1].timestamp.ToNanoseconds()
+        if now_ns - self._motors_ns >= MOTORS_NS:
+            self._motors_ns = now_ns
+            yield topics.ARM_MOTORS, motor_status(self._loop.arm, now_ns), now_ns
+
+    def _wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # a full pipe is readable already
+            os.write(self._written, b".")
+
+
+def self_collision(description: RobotDescription) -> SelfCollision:
+    """Distances between the parts of a described robot, as its model has them."""
+    model = mujoco.MjModel.from_xml_path(str(description.model_path))
+    d = description
+    return SelfCollision(model, d.joint_names, d.base_pose, d.soft_lower, d.soft_upper)
+
+
+def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:
+    """What the servos of an arm said of themselves, and how long ago they were heard."""
+    message = MotorStatus(warnings=arm.warnings())
+    message.captured.FromNanoseconds(now_ns)
+    for servo in arm.servos:
+        health = arm.health[servo.joint]
+        motor = message.motors.add(joint=servo.joint, id=servo.number, model=servo.model.name)
+        if health.answers is not None:
+            motor.heard, motor.age_s = True, 1e-9 * (now_ns - health.answers.at_ns)
+        motor.torque = bool(health.torque)
+        motor.voltage_v, motor.temperature_c = health.voltage or 0.0, health.temperature or 0.0
+        motor.hardware_error = health.hardware_error
+    return message

@@ -1,0 +1,137 @@
+"""An arm of Dynamixel servos whose currents carry its own weight, so that a hand leads it without lifting it."""
+
+from __future__ import annotations
+
+import time
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.input_error import InputError
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
+from paramove.robots.dynamixel.bus.servo_memory import CURRENT_MODE
+from paramove.robots.dynamixel.bus.servo_models import model_named
+from paramove.robots.dynamixel.bus.servo_port import PortLostError
+
+WATCHDOG_S = 0.2
+"""A servo that hears nothing for so long gives up its current by itself."""
+SHARE = 1.0 / 3.0
+"""Of a servo's current limit: more is never asked for."""
+
+
+class ArmWeight:
+    """What the joints of an arm's chain bear at rest, as its model has it; nothing that the arm holds is in it."""
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._model = mujoco.MjModel.from_xml_path(str(description.model_path))
+        self._data = mujoco.MjData(self._model)
+        joints = [self._model.joint(name) for name in description.joint_names]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
+        self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
+
+    def torques(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """That hold the arm still: [J] of all joints for their angles [J], rad; N m."""
+        self._data.qpos[self._qpos] = angles
+        mujoco.mj_forward(self._model, self._data)
+        return np.array(self._data.qfrc_bias[self._dof])
+
+
+class FloatingArm(LimpArm):
+    """As a limp arm, but every look at it renews the currents that carry its weight. The gripper is limp.
+
+    A servo's torque is taken as proportional to its current, as from 0 to stall; friction holds what that misses.
+
+    Args:
+        chain: At the arm's baud rate.
+        description: Of an arm with a chain; its units are those of this very arm.
+
+    Raises:
+        InputError: A servo of the chain has no current mode.
+    """
+
+    def __init__(self, chain: ServoChain, description: RobotDescription) -> None:
+        super().__init__(chain, description)
+        if description.chain is None:
+            raise InputError(f"{description.name} has no chain in its robot.yaml: it is not a servo arm")
+        self._carrying = description.chain.indices
+        self._weight = ArmWeight(description)
+        self._per_torque = np.zeros(description.n_joints)
+        for place in self._carrying:
+            model = model_named(description.motors[place])
+            if model.current_unit is None:
+                raise InputError(
+                    f"{description.joint_names[place]} has a {model.name}, which has no current mode: lead this arm "
+                    "without --float"
+                )
+            amperes = model.stall_amperes / model.stall_torque
+            sign = np.sign(description.units.counts_per_rad[place])
+            self._per_torque[place] = sign * amperes / model.current_unit
+        self._most: dict[int, int] = {}
+        self._modes: dict[int, int] = {}
+        self._commanded_s = 0.0
+
+    def release(self) -> None:
+        """Each servo in turn: torque off, current mode, and the current that carries its part of the arm."""
+        while (found := super().measured()) is None:
+            pass  # until it gives up
+        torques = self._weight.torques(found[1])
+        for place, number in enumerate(self._numbers):
+            registers = self._models[place].registers
+            if place in self._carrying:
+                self._modes[number] = self._chain.read(number, registers["Operating Mode"])
+                self._most[number] = int(SHARE * self._chain.read(number, registers["Current Limit"]))
+            self._chain.write(number, registers["Torque Enable"], 0)
+            if place in self._carrying:
+                self._chain.write(number, registers["Operating Mode"], CURRENT_MODE)
+                self._chain.write(number, registers["Torque Enable"], 1)
+                self._chain.write(number, registers["Goal Current"], self._current(place, torques))
+
+    def measured(self) -> tuple[int, NDArray[np.float64]] | None:
+        """As of a limp arm; where the arm is not known for 0.2 s, it carries nothing until it is."""
+        found = super().measured()
+        silent_s = time.monotonic() - self._commanded_s
+        if found is not None:
+            if silent_s > 0.5 * WATCHDOG_S:
+                self._renew_watchdogs()
+            self._carry(self._weight.torques(found[1]))
+            self._commanded_s = time.monotonic()
+        elif silent_s > WATCHDOG_S:
+            self._carry(np.zeros(len(self._numbers)))
+        return found
+
+    def put_down(self) -> tuple[str, ...]:
+        """As of a limp arm: torque off, and the mode that was; each servo on its own. The arm falls unless it is held.
+
+        A servo that does not hear it gives up its current by its watchdog.
+        """
+        failed = []
+        for place in self._carrying:
+            number, registers = self._numbers[place], self._models[place].registers
+            try:
+                self._chain.write(number, registers["Torque Enable"], 0)
+                self._chain.write(number, registers["Bus Watchdog"], 0)
+                if number in self._modes:
+                    self._chain.write(number, registers["Operating Mode"], self._modes[number])
+            except (ServoError, PortLostError) as error:
+                failed.append(f"{self._joints[place]}: {error}")
+        return tuple(failed)
+
+    def _carry(self, torques: NDArray[np.float64]) -> None:
+        goals = {self._numbers[place]: self._current(place, torques) for place in self._carrying}
+        self._chain.sync_write(self._models[self._carrying[0]].registers["Goal Current"], goals)
+
+    def _current(self, place: int, torques: NDArray[np.float64]) -> int:
+        """Of one servo, in its units."""
+        most = self._most[self._numbers[place]]
+        return max(-most, min(most, round(float(self._per_torque[place] * torques[place]))))
+
+    def _renew_watchdogs(self) -> None:
+        """One that has tripped keeps the goals locked until it is told 0."""
+        for place in self._carrying:
+            register = self._models[place].registers["Bus Watchdog"]
+            for value in (0, round(WATCHDOG_S / WATCHDOG_UNIT_S)):
+                self._chain.write(self._numbers[place], register, value)

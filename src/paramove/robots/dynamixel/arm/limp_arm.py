@@ -1,0 +1,69 @@
+"""An arm of Dynamixel servos without torque, which a person moves: where its joints are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
+
+GIVES_UP = 25
+"""Looks in a row without an answer from a servo."""
+
+
+class LimpArm:
+    """`release` its servos, then look where they are.
+
+    Args:
+        chain: At the arm's baud rate.
+        description: Of an arm with servos; its units are those of this very arm.
+
+    `release` and `measured` raise PortLostError and ServoError.
+    """
+
+    def __init__(self, chain: ServoChain, description: RobotDescription) -> None:
+        self._chain = chain
+        self._joints, self._numbers = description.joint_names, description.servo_ids
+        self._models = [model_named(motor) for motor in description.motors]
+        self._watch = PositionWatch(dict(zip(self._numbers, self._models, strict=True)))
+        self._units = description.units
+        middle = 0.5 * (description.units.lower + description.units.upper)
+        self._middle = self._units.zero_counts + self._units.counts_per_rad * middle
+        self._silent = 0
+
+    def release(self) -> None:
+        """Torque off; who holds the arm carries its weight from now on."""
+        for number, model in zip(self._numbers, self._models, strict=True):
+            self._chain.write(number, model.registers["Torque Enable"], 0)
+
+    def put_down(self) -> tuple[str, ...]:
+        """The last word to the servos; without torque there is none.
+
+        Returns:
+            What did not work, in words.
+        """
+        return ()
+
+    def measured(self) -> tuple[int, NDArray[np.float64]] | None:
+        """When, ns of the monotonic clock, and the angles of all joints, [J], rad.
+
+        None while an answer is missing, or says what cannot be true.
+
+        Raises:
+            ServoSilentError: A servo has not answered for long.
+        """
+        answers = self._watch.read(self._chain)
+        missing = [number for number in self._numbers if number not in answers]
+        self._silent = self._silent + 1 if missing else 0
+        if self._silent > GIVES_UP:
+            raise ServoSilentError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
+        if missing:
+            return None
+        positions = np.array([answers[number].values[POSITION] for number in self._numbers], dtype=np.float64)
+        # A servo in the extended mode may begin in another turn.
+        counts = positions - PULSES_PER_TURN * np.round((positions - self._middle) / PULSES_PER_TURN)
+        at_ns = max(answers[number].at_ns for number in self._numbers)
+        return at_ns, (counts - self._units.zero_counts) / self._units.counts_per_rad

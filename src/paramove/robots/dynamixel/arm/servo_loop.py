@@ -1,0 +1,335 @@
+"""The loop of a servo arm: one thread that owns the port, plays the rows that the safety gate lets pass, and reads.
+
+What HOAP-3 does on the robot is done here: a `StreamReader` holds the rows, which end in a stop ramp, and plays one a
+period. So an arm whose driver has nothing more to say comes to rest in the same way.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from paramove.input_error import InputError
+from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.robots.description import RobotDescription
+from paramove.robots.dynamixel.arm.exit_movement import LONGEST_S, MARGIN_S, movement_to
+from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_checks import JointServo
+from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain
+from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
+from paramove.robots.streaming.driver import ArmDriver, DriverSays
+from paramove.robots.streaming.stream import StreamReader
+from paramove.robots.this_launch import RESTARTED, ThisLaunch
+from paramove.safety.gate_io import Fault, State
+
+_log = logging.getLogger(__name__)
+
+MOVING = (State.ARMED, State.STOPPING)
+HOLDING = (*MOVING, State.HOLD, State.ESTOP)
+HEALTH_STEPS, SUPPLY_STEPS = 10, 100
+REOPEN_S = 0.5
+WATCHDOG_SHARE = 0.5
+"""After a silence of the loop of this part of what a servo bears, it is asked whether it has stopped by itself."""
+REST_S = 0.0002
+"""A loop that is late gives up its lock for so long each period: else it takes it again before whoever waits for it."""
+NOT_EMULATED = "its servos are not emulated by this launch"
+SETTLED_S, LONGEST_SETTLING_S = 0.1, 0.4
+"""Servos lag behind their goals: at the end an arm has come to rest if for so long none moves by more than a pulse."""
+TICK_S = 0.02
+"""The driver's logic is asked so often; at once where something is wrong."""
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """How a servo arm is driven.
+
+    Attributes:
+        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
+        patience: With silence.
+        standing_faults: That keep the arm from being armed, whatever its servos say.
+        stop_inputs: Files that press the emergency stop.
+        rest: Angles by joint, rad, to which the armed arm goes slowly at a normal end, and then goes limp; without time
+            or where anything is wrong it holds. None: at the end it is left as when it is disarmed.
+        emulated_by: The launch that was seen to emulate the servos, which is verified at every open of the port; None:
+            they count as real.
+        caution: What a person should know of this arm in any case.
+    """
+
+    torque_off: bool = False
+    patience: Patience = field(default_factory=Patience)
+    standing_faults: tuple[Fault, ...] = ()
+    stop_inputs: StopInputs = field(default_factory=StopInputs)
+    rest: Mapping[str, float] | None = None
+    emulated_by: ThisLaunch | None = None
+    caution: str = ""
+
+    def why_no_program(self) -> str:
+        """Why no program may arm the arm; "" if one may."""
+        if self.emulated_by is None:
+            return NOT_EMULATED
+        return RESTARTED if self.emulated_by.restarted else ""
+
+
+class ServoLoop:
+    """An arm that is driven while this is a context.
+
+    Args:
+        driver: Trajectories through the gate.
+        description: Of the arm.
+        servos: Its servos, in the order of the robot's joint vector.
+        port: Closed; it is opened here, and again after it was lost.
+        settings: How it is driven.
+        said: Called in the loop's thread when `take` has something.
+
+    Raises:
+        InputError: On entering: the port is missing, forbidden or in use.
+    """
+
+    def __init__(
+        self,
+        driver: ArmDriver,
+        description: RobotDescription,
+        servos: tuple[JointServo, ...],
+        port: ServoPort,
+        settings: LoopSettings,
+        said: Callable[[], None],
+    ) -> None:
+        self.driver = driver
+        self.lost = ""
+        """Why the port is not open; "" while it is."""
+        self.pressed = ""
+        """What presses the emergency stop, in words; "" if nothing does."""
+        self.lock = threading.Lock()
+        """Held while the loop uses the driver; hold it to tell the driver something."""
+        self._description = description
+        self._period_s = 1e-6 * description.stream.period_us
+        self._port = port
+        self._servos = servos
+        self._settings = settings
+        self._said = said
+        self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.patience)
+        self._reader: StreamReader | None = None
+        self._says: list[DriverSays] = []
+        self._step = 0
+        self._begun_s, self._silent_s = time.monotonic(), 0.0
+        self._urgent = self._ended = self._normal_end = False
+        self._tick_steps = max(1, round(TICK_S / self._period_s))
+        self._reopen_s = 0.0
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="servo_loop", daemon=True)
+
+    @property
+    def arm(self) -> ServoArm:
+        """The servos."""
+        return self._arm
+
+    def __enter__(self) -> Self:
+        self._open()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._normal_end = kind is None
+        self._stopped.set()
+        self._thread.join()
+        self._port.close()
+
+    def take(self) -> list[DriverSays]:
+        """What the driver said since the last time."""
+        with self.lock:
+            says, self._says = self._says, []
+        return says
+
+    def tick(self) -> None:
+        """The driver's next word at once: a stop does not wait for the next period."""
+        with self.lock:
+            self._tick(time.monotonic_ns())
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the loop has ended though nobody asked it to; its thread has written why."""
+        return self._ended and not self._stopped.is_set()
+
+    def _run(self) -> None:
+        try:
+            due_s = time.monotonic()
+            while not self._stopped.is_set():
+                # What is late is not made up for.
+                due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
+                with self.lock:
+                    self._one_period()
+                self._said()
+                self._stopped.wait(max(REST_S, due_s - time.monotonic()))
+            rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
+            with self.lock:
+                self._end(rests)
+        finally:
+            self._ended = True
+
+    def _one_period(self) -> None:
+        begun_s, self._begun_s = self._begun_s, time.monotonic()
+        self._silent_s = self._begun_s - begun_s
+        self._look_at_emergency_stop()
+        try:
+            if self.lost:
+                self._reopen()
+            if not self.lost:
+                self._move_and_read()
+        except PortLostError as error:
+            self.lost = str(error)
+            self._reopen_s = time.monotonic() + REOPEN_S
+            self._reader = None
+            self._tell(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
+        if self._urgent or self._step % self._tick_steps == 0:
+            self._tick(time.monotonic_ns())
+        self._step += 1
+
+    def _look_at_emergency_stop(self) -> None:
+        if not self._settings.stop_inputs.are_there:
+            return
+        self.pressed = self._settings.stop_inputs.pressed()
+        self.driver.on_emergency(bool(self.pressed))
+        self._urgent |= bool(self.pressed) and self.driver.state is not State.ESTOP
+
+    def _move_and_read(self) -> None:
+        reader = self._reader
+        if reader is not None and self._arm.holds:
+            self._arm.command(reader.play())
+        reading = self._arm.measured()
+        if reading is None:
+            return
+        if reader is None or not self._arm.holds:
+            reader = self._reader = StreamReader(self._description, reading.counts)
+        fault = self._fault(reading)
+        if fault is not None and self.driver.state in MOVING:  # else it is looked for before arming
+            self._tell(fault)
+        if self.driver.wants_to_arm and self.driver.state not in MOVING:
+            reading = self._prepare() or reading  # the checks took longer than a reading counts
+            self._urgent = True
+            reader = self._reader = StreamReader(self._description, reading.counts)
+        elif self._arm.holds and self.driver.state not in HOLDING and reader.at_rest:
+            self._let_go(self._settings.torque_off)  # not before the stop ramp is over
+        self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
+
+    def _prepare(self) -> ArmReading | None:
+        """Check the servos and let them hold where they are, before the gate hears the word to arm."""
+        began_ns = time.monotonic_ns()
+        faults = self._settings.standing_faults or self._arm.check() or self._arm.take_hold()
+        self.driver.on_arming_checks(faults, began_ns)
+        return self._arm.measured()
+
+    def _fault(self, reading: ArmReading) -> Fault | None:
+        fault = self._arm.fault_of_answers(reading)
+        if self._arm.holds and self._silent_s > WATCHDOG_SHARE * self._settings.patience.watchdog_s:
+            fault = self._arm.look_after_watchdogs() or fault
+        if self._step % HEALTH_STEPS == 0:
+            fault = self._arm.look_after() or fault
+        elif self._step % SUPPLY_STEPS == HEALTH_STEPS // 2:
+            fault = self._arm.look_after_supply() or fault
+        return fault
+
+    def _tell(self, fault: Fault) -> None:
+        self.driver.on_fault(fault)
+        self._urgent = True
+
+    def _tick(self, now_ns: int) -> None:
+        self._urgent = False
+        says = self.driver.tick(now_ns)
+        if says.stream is not None and self._reader is not None:
+            self._reader.offer(says.stream)
+        self._says.append(says)
+
+    def _open(self) -> None:
+        """Raises InputError also if what is driven as emulated is so no more."""
+        self._port.open()
+        reason = self._settings.emulated_by and self._settings.emulated_by.why_not_servos(self._port.device)
+        if reason:
+            self._port.close()
+            raise InputError(f"{self._port.name} does not lead to the servos of this launch: {reason}. Launch again")
+
+    def _reopen(self) -> None:
+        """Under the same name, which is that of the adapter and not of its place."""
+        if time.monotonic() < self._reopen_s:
+            return
+        try:
+            self._open()
+        except InputError as error:
+            self.lost = str(error)
+            self._reopen_s = time.monotonic() + REOPEN_S
+            return
+        self.lost = ""
+        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.patience)
+
+    def _let_go(self, torque_off: bool) -> None:
+        for failed in self._arm.let_go(torque_off):
+            _log.warning("a servo did not hear the last word: %s", failed)
+
+    def _goes_to(self, rest: Mapping[str, float]) -> bool:
+        """Go to rest, slowly and through the gate; whether the arm is there. It is not where anything is wrong."""
+        ends_s, name, sentence = time.monotonic() + LONGEST_S, "", "it is not armed"
+        reader = self._reader
+        if reader is not None and not reader.at_rest:
+            reader, sentence = None, "it was moving, and stops"
+        while reader is not None and not self.lost and self.driver.state is State.ARMED:
+            if not name:
+                start = self._description.units.to_radians(reader.target)
+                message, duration_s = movement_to(self._description, start, rest, f"rest {time.monotonic_ns()}")
+                sentence = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
+                if time.monotonic() + duration_s + MARGIN_S > ends_s:
+                    break
+                name, sentence = message.id, "it was stopped on its way"
+                with self.lock:
+                    self.driver.on_trajectory(message, time.monotonic_ns())
+            elif time.monotonic() > ends_s:
+                sentence = "it took too long"
+                break
+            self._stopped_period()
+            heard = [one for says in self.take() for one in says.statuses if one.trajectory_id == name]
+            if heard and heard[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
+                return True
+            if heard and heard[-1].code == "busy":  # the movement before has not settled yet
+                name = ""
+            elif heard and heard[-1].reason:
+                sentence = heard[-1].reason
+                break
+        _log.warning("the arm holds where it is and does not go to rest: %s", self.lost or sentence)
+        return False
+
+    def _stopped_period(self) -> None:
+        """One more period of a loop that was asked to end."""
+        begun_s = time.monotonic()
+        with self.lock:
+            self._one_period()
+        time.sleep(max(0.0, begun_s + self._period_s - time.monotonic()))
+
+    def _end(self, rests: bool) -> None:
+        """Come to rest by what the reader still holds, wait for the servos, then the last word to each of them."""
+        measured: deque[Counts] = deque(maxlen=1 + round(SETTLED_S / self._period_s))
+        stands_s = None
+        try:
+            while self._arm.holds and self._reader is not None:
+                self._arm.command(self._reader.play())
+                if self._reader.at_rest:
+                    stands_s = stands_s or time.monotonic()
+                    reading = self._arm.measured()
+                    if reading is not None:
+                        measured.append(reading.counts)
+                    settled = len(measured) == measured.maxlen and np.ptp(measured, axis=0).max() <= 1
+                    if settled or time.monotonic() - stands_s > LONGEST_SETTLING_S:
+                        break
+                time.sleep(self._period_s)
+        except PortLostError as error:
+            self.lost = str(error)
+        if not self.lost:
+            self._let_go(self._settings.torque_off if self._settings.rest is None else rests)

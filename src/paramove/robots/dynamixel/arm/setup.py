@@ -1,0 +1,167 @@
+"""A servo arm as a launch file names it: its description, port and calibration."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
+from paramove.robots.dynamixel.arm.servo_arm import Patience
+from paramove.robots.dynamixel.arm.servo_checks import JointServo
+from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
+from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
+from paramove.robots.dynamixel.bus.serial_adapters import serial_of
+from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, model_named
+from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+from paramove.robots.this_launch import ThisLaunch
+from paramove.safety.gate_io import Fault
+
+LATENCY_SHARE = 0.8
+"""Of the time for reading all servos: so long the loop may wait for one. A missing one costs periods, one that is late
+costs none."""
+
+
+class EmulatedLimits(BaseModel):
+    """What is allowed to servos that the launch itself emulates, and to no others.
+
+    Attributes:
+        patience: With silence: they share the processors with everything else, and may be late.
+        nominal: Whether they are even for an arm that everybody assembles differently.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    patience: Patience = Patience()
+    nominal: bool = False
+
+
+class ServoArmSetup(BaseModel):
+    """Parameters of a servo arm.
+
+    Attributes:
+        robot: Folder of the arm's description.
+        port: Of its bus, seen from the run's folder: a link in /dev/serial/by-id, whose name has the adapter's number.
+        torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
+        patience: With silence.
+        calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
+        stop_file: The emergency stop is pressed while there is a file of this name, for programs that watch a button.
+        stop_line: File in which the system shows the line of a stop button, such as /sys/class/gpio/gpio17/value; read
+            at every period of the loop.
+        stop_line_pressed: What it reads while the button is pressed, or its wire is cut; all but the other value is
+            pressed.
+        on_exit: At a normal end: left as when it is disarmed, or slowly to `rest_deg`, then limp.
+        rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
+        emulated: Takes the place of `patience` where the driver verifies, at every open of the port, that this very
+            launch emulates the servos; only then a program may arm them. None: they count as real in any case.
+    """
+
+    robot: Path
+    port: Path
+    torque_off: bool = False
+    patience: Patience = Patience()
+    calibration: Path | None = None
+    emulated: EmulatedLimits | None = None
+    on_exit: Literal["as_disarmed", "rest_then_off"] = "as_disarmed"
+    rest_deg: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
+    stop_file: Path | None = None
+    stop_line: Path | None = None
+    stop_line_pressed: Literal[0, 1] = 1
+
+    def driven_arm(self, run_folder: Path, launch: ThisLaunch | None = None) -> DrivenArm:
+        """The arm, not yet driven.
+
+        Args:
+            run_folder: That relative names start from.
+            launch: That may emulate the servos; None: none does.
+
+        Raises:
+            InputError: Its description or calibration is missing or wrong, or is another arm's.
+        """
+        description = RobotDescription.load(self.robot)
+        reason = (launch or ThisLaunch()).why_not_servos(run_folder / self.port)
+        emulated = None if reason else self.emulated
+        patience = self.patience if emulated is None else emulated.patience
+        port = servo_port(description, str(run_folder / self.port), patience.read_s)
+        calibration = None
+        if self.calibration is not None:
+            calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
+            description = calibrated(description, calibration)
+        is_even = emulated is not None and emulated.nominal
+        faults = () if is_even or calibration is not None else uncalibrated(description)
+        servos = joint_servos(description, calibration)
+        stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
+        settings = LoopSettings(self.torque_off, patience, faults, stop_inputs, self._rest(description))
+        if emulated is not None:
+            settings = replace(settings, emulated_by=launch)
+        elif self.emulated is not None:
+            settings = replace(settings, caution=f"{port.name} counts as a real arm, which a person arms: {reason}")
+        return DrivenArm(description, servos, port, settings)
+
+    def _rest(self, description: RobotDescription) -> dict[str, float] | None:
+        """Angles at which the arm goes limp, rad; None: it does not. Raises InputError."""
+        if self.on_exit != "rest_then_off":
+            return None
+        if not self.rest_deg:
+            raise DescriptionError("on_exit is rest_then_off, which needs `rest_deg`: where can the arm go limp?")
+        for joint in self.rest_deg:
+            description.index(joint)
+        return {joint: float(np.deg2rad(degrees)) for joint, degrees in self.rest_deg.items()}
+
+
+def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:
+    """The description with the units of one arm, and not beyond the travel that was shown. Raises CalibrationError."""
+    d = description
+    units = calibration.units(d.joint_names, d.lower, d.upper)
+    soft_lower, soft_upper = np.maximum(d.soft_lower, units.lower), np.minimum(d.soft_upper, units.upper)
+    return replace(d, units=units, lower=units.lower, upper=units.upper, soft_lower=soft_lower, soft_upper=soft_upper)
+
+
+def servo_port(description: RobotDescription, name: str, read_s: float | None = None) -> ServoPort:
+    """The port of a described arm, closed. Raises DescriptionError for a robot without a servo bus.
+
+    Args:
+        description: Of the arm.
+        name: Of the port.
+        read_s: That reading all servos may take; None: a period of the loop.
+    """
+    if description.bus is None:
+        raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
+    return ServoPort(name, description.bus.baud_rate, LATENCY_SHARE * (read_s or 1e-6 * description.stream.period_us))
+
+
+def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:
+    """Of an arm whose zeros every owner has to measure."""
+    if description.bus is None or not description.bus.calibrate:
+        return ()
+    sentence = (
+        f"{description.name} is assembled differently by everybody, and this one is not calibrated: run `paramove arm "
+        "calibrate`, then name its file as the driver's `calibration`"
+    )
+    return (Fault("not_calibrated", "", sentence),)
+
+
+def joint_servos(description: RobotDescription, calibration: ArmCalibration | None = None) -> tuple[JointServo, ...]:
+    """The servos of a described arm, in the order of its joint vector."""
+    d = description
+    calibrated = {} if calibration is None else calibration.joints
+    rows = zip(d.joint_names, d.servo_ids, d.motors, d.position_gains, d.velocity.tolist(), strict=True)
+    return tuple(
+        JointServo(
+            name, number, model_named(motor), calibrated.get(name), _grip_current(d, name, motor), gains, velocity
+        )
+        for name, number, motor, gains, velocity in rows
+    )
+
+
+def _grip_current(description: RobotDescription, joint: str, motor: str) -> int | None:
+    """In the servo's units."""
+    chain = description.chain
+    if chain is None or joint != chain.gripper or chain.grip_current_ma is None:
+        return None
+    return round(chain.grip_current_ma / CURRENT_UNIT_MA[motor])

@@ -1,0 +1,65 @@
+"""Reboots one servo, which clears its hardware error, and leaves the others as they are."""
+
+from __future__ import annotations
+
+import time
+
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
+from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+
+PATIENCE_S = 3.0
+LOADED_SHARE = 0.05
+"""Of the greatest load or current: more is a joint that carries something."""
+FULL_LOAD = 1000
+"""Present Load (126) in units of 0.1 %."""
+
+
+class ServoLoadedError(InputError):
+    """The servo holds its joint, which would fall."""
+
+
+def servo_before_reboot(chain: ServoChain, number: int) -> FoundServo:
+    """The servo as it is. Raises ServoSilentError if it does not answer."""
+    pinged = chain.ping(number)
+    if pinged is None:
+        raise ServoSilentError(number, f"servo {number} does not answer; `paramove arm scan` shows who is there")
+    return looked_at(chain, pinged)
+
+
+def sentences(servo: FoundServo) -> list[str]:
+    """Its hardware errors in words, each with what helps."""
+    if servo.hardware_error is None:
+        return [f"servo {servo.number}: its hardware error cannot be read"]
+    found = hardware_errors(servo.hardware_error)
+    told = [f"servo {servo.number}: {one.words}; {one.remedy}" for one in found]
+    return told or [f"servo {servo.number}: no hardware error"]
+
+
+def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
+    """Raises ServoLoadedError while the servo holds something up, and ServoError."""
+    model = servo.table
+    if model is None or not servo.torque:
+        return
+    if "Present Load" in model.registers:
+        share = abs(chain.read(servo.number, model.registers["Present Load"])) / FULL_LOAD
+    else:
+        most = chain.read(servo.number, model.registers["Current Limit"])
+        share = abs(chain.read(servo.number, model.registers["Present Current"])) / max(most, 1)
+    if share > LOADED_SHARE:
+        raise ServoLoadedError(
+            f"servo {servo.number} holds its joint with {100.0 * share:.0f} % of its force, which would fall: hold the "
+            "arm and say --yes"
+        )
+
+
+def reboot_servo(chain: ServoChain, number: int, patience_s: float = PATIENCE_S) -> FoundServo:
+    """Reboot it and wait until it answers again: torque off, errors cleared. Raises ServoError."""
+    chain.reboot(number)
+    end_s = time.monotonic() + patience_s
+    while time.monotonic() < end_s:
+        pinged = chain.ping(number, patient=False)
+        if pinged is not None:
+            return looked_at(chain, pinged)
+    raise ServoSilentError(number, f"servo {number} does not answer {patience_s:g} s after its reboot: check its power")

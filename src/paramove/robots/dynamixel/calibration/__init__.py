@@ -1,0 +1,1 @@
+"""From servos to joints of a robot: the calibration, and how a person makes one."""

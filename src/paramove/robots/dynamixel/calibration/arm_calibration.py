@@ -1,0 +1,233 @@
+"""Calibration of one arm: how its servos' counts become joint angles. A file that may be edited, one for each adapter.
+
+Present Position of a Dynamixel servo is the place of its encoder within one turn, plus Homing Offset (20), whenever
+torque is switched on in Position Control Mode, and after every start in the other modes (ROBOTIS e-Manual, "Present
+Position"). The seam of the encoder thus stays where it is whatever the offset, which is kept at 0. A joint whose travel
+crosses it works in Extended Position Control Mode, and `JointCalibration.turns` says how many turns its counts are off.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from ruamel.yaml import YAML
+
+from paramove.documents.atomic_writing import replacing
+from paramove.documents.findings import findings
+from paramove.documents.positions import read_document
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
+from paramove.robots.joint_units import JointUnits
+
+POSITION: Literal[3] = 3
+EXTENDED: Literal[4] = 4
+CURRENT_BASED: Literal[5] = 5
+"""Values of Operating Mode (11) with a goal position; the first keeps to one turn and to the servo's own limits."""
+SEAM_MARGIN = 64
+"""Counts that a travel must stay away from the encoder's seam, 5.6 degrees: joints sag, and stops give way."""
+LONGEST_TRAVEL = PULSES_PER_TURN - 2 * SEAM_MARGIN
+COUNTS_PER_RAD = PULSES_PER_TURN / (2.0 * math.pi)
+HEADER = """\
+# How the servos of one arm are mounted, written by `paramove arm calibrate`. It may be edited:
+# afterwards `paramove arm verify --sign` renews the line sha256, which tells damage from intent.
+# angle = sign * (counts - zero_counts) * 2 pi / 4096, for counts from min_counts to max_counts.
+"""
+
+
+class CalibrationError(InputError):
+    """A calibration that cannot be used or made; says what was found and what helps."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class JointCalibration(_Part):
+    """One joint's servo; what it is, how it is set, and what its counts mean.
+
+    Counts begin in the turn in which the servo starts at `min_counts`; where the travel crosses the encoder's seam they
+    go on beyond 4095.
+    """
+
+    id: int = Field(ge=0, le=252)
+    model: str
+    firmware: int = Field(ge=0, le=255)
+    sign: Literal[1, -1]
+    operating_mode: Literal[3, 4, 5]
+    homing_offset: Literal[0]
+    zero_counts: int = Field(ge=-4 * PULSES_PER_TURN, le=4 * PULSES_PER_TURN)
+    min_counts: int = Field(ge=0, lt=PULSES_PER_TURN)
+    max_counts: int = Field(ge=0, lt=2 * PULSES_PER_TURN)
+
+    def counts(self, position: int) -> int:
+        """A Present Position as counts of this file, whichever turn the servo began in."""
+        middle = (self.min_counts + self.max_counts) // 2
+        return middle + (position - middle + PULSES_PER_TURN // 2) % PULSES_PER_TURN - PULSES_PER_TURN // 2
+
+    def turns(self, position: int) -> int:
+        """Whole turns by which a servo that presents this position is beyond the counts of this file.
+
+        They stay the same until it is switched off, rebooted, or its mode or torque changes; add that many times 4096
+        to a goal.
+        """
+        return (position - self.counts(position)) // PULSES_PER_TURN
+
+    def angle(self, position: int) -> float:
+        """Of the joint at a Present Position, rad."""
+        return self.sign * (self.counts(position) - self.zero_counts) / COUNTS_PER_RAD
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Least and greatest angle, rad."""
+        ends = [self.sign * (end - self.zero_counts) / COUNTS_PER_RAD for end in (self.min_counts, self.max_counts)]
+        return min(ends), max(ends)
+
+
+class CalibratedBus(_Part):
+    """The adapter by its USB serial number, and the servos' baud rate, bit/s."""
+
+    serial: str = Field(min_length=1)
+    baud_rate: int = Field(gt=0)
+
+
+class ArmCalibration(_Part):
+    """All of the file. `created` is a time as ISO 8601 has it, `tool` what wrote it, `robot` the description's name."""
+
+    version: Literal[1] = 1
+    created: str
+    tool: str
+    robot: str
+    bus: CalibratedBus
+    joints: dict[str, JointCalibration]
+    sha256: str = ""
+
+    @classmethod
+    def load(cls, path: Path, serial: str) -> Self:
+        """Read and check a file.
+
+        Raises:
+            CalibrationError: It is missing, damaged, contradicts itself, is of another adapter than `serial`, or was
+                edited and not signed.
+        """
+        found = cls.read(path)
+        if found.bus.serial != serial:
+            raise CalibrationError(
+                f"{path} is of the arm behind adapter {found.bus.serial}, this one is {serial}: run `paramove arm "
+                "calibrate` for it; if only the adapter was exchanged, change bus.serial and run `paramove arm verify "
+                "--sign`"
+            )
+        if found.sha256 != found.content_sha256():
+            raise CalibrationError(
+                f"{path} is not as it was written (sha256 differs): if you edited it, run `paramove arm verify "
+                "--sign`; if not, it is damaged: run `paramove arm calibrate`"
+            )
+        return found
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """As `load`, but of whatever adapter and signature."""
+        try:
+            found = cls.model_validate(read_document(path, "calibration of an arm", CalibrationError, _REMEDY).data)
+        except ValidationError as error:
+            raise CalibrationError(f"{path}: {findings(error)}; {_REMEDY}") from error
+        found.check(str(path))
+        return found
+
+    def check(self, where: str) -> None:
+        """Raises CalibrationError, which begins with `where`, if the numbers contradict each other."""
+        if not self.joints:
+            raise CalibrationError(f"{where}: expected joints, found none; {_REMEDY}")
+        numbers = [joint.id for joint in self.joints.values()]
+        twice = sorted({number for number in numbers if numbers.count(number) > 1})
+        if twice:
+            raise CalibrationError(f"{where}: ID {twice[0]} is given twice; {_REMEDY}")
+        for name, joint in self.joints.items():
+            wrong = _contradiction(joint)
+            if wrong:
+                raise CalibrationError(f"{where}: joint {name}: {wrong}; {_REMEDY}")
+
+    def content_sha256(self) -> str:
+        """Of all numbers and names, but not of comments or layout."""
+        content = self.model_dump(exclude={"sha256"})
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def save(self, path: Path) -> None:
+        """Check, sign and write it; an existing file is replaced at once. Raises CalibrationError and OSError."""
+        self.check(str(path))
+        content = self.model_dump() | {"sha256": self.content_sha256()}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+            file.write(HEADER)
+            _writer().dump(content, file)
+
+    def units(self, joint_names: Sequence[str], lower: ArrayLike, upper: ArrayLike) -> JointUnits:
+        """Units of these joints, each within its described range and the travel that was shown, whichever is less.
+
+        Args:
+            joint_names: J of them.
+            lower, upper: Described range, shape [J], rad.
+
+        Raises:
+            CalibrationError: A joint is not in the file, or nothing is left of its range.
+        """
+        missing = [name for name in joint_names if name not in self.joints]
+        if missing:
+            raise CalibrationError(
+                f"joint {missing[0]} is not calibrated, found {', '.join(self.joints)}: run `paramove arm calibrate`"
+            )
+        joints = [self.joints[name] for name in joint_names]
+        travels = np.array([joint.travel for joint in joints], dtype=np.float64).reshape(-1, 2)
+        least, most = np.maximum(travels[:, 0], lower), np.minimum(travels[:, 1], upper)
+        for name, low, high in zip(joint_names, least, most, strict=True):
+            if not low < high:
+                raise CalibrationError(f"joint {name}: its calibrated travel lies outside of its range; {_REMEDY}")
+        return JointUnits(
+            names=tuple(joint_names),
+            counts_per_rad=np.array([joint.sign * COUNTS_PER_RAD for joint in joints]),
+            zero_counts=np.array([joint.zero_counts for joint in joints], dtype=np.float64),
+            lower=least,
+            upper=most,
+        )
+
+
+_REMEDY = "correct it and run `paramove arm verify --sign`, or run `paramove arm calibrate`"
+
+
+def sign_again(path: Path) -> ArmCalibration:
+    """Renew the signature of a file that was edited; comments and layout stay. Raises CalibrationError and OSError."""
+    found = ArmCalibration.read(path)
+    text, sha256 = path.read_text(encoding="utf-8"), found.content_sha256()
+    kept = re.sub(r"^sha256:.*\n?", "", text, flags=re.M)
+    with replacing(path) as unfinished:
+        unfinished.write_text(f"{kept.rstrip()}\nsha256: {sha256}\n", encoding="utf-8")
+    return found.model_copy(update={"sha256": sha256})
+
+
+def _contradiction(joint: JointCalibration) -> str:
+    """What is wrong, "" if nothing is."""
+    model_named(joint.model)
+    travel = joint.max_counts - joint.min_counts
+    if travel <= 0:
+        return f"expected min_counts below max_counts, found {joint.min_counts} and {joint.max_counts}"
+    if travel > LONGEST_TRAVEL:
+        return f"expected at most {LONGEST_TRAVEL} counts from min_counts to max_counts, found {travel}"
+    if joint.operating_mode == POSITION and joint.max_counts >= PULSES_PER_TURN:
+        return f"max_counts {joint.max_counts} is beyond the turn to which operating mode {POSITION} keeps"
+    if joint.operating_mode not in model_named(joint.model).modes:
+        return f"{joint.model} has no operating mode {joint.operating_mode}"
+    return ""
+
+
+def _writer() -> YAML:
+    yaml = YAML()
+    yaml.default_flow_style = False
+    return yaml

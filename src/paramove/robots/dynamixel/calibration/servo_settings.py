@@ -1,0 +1,176 @@
+"""What a calibrated arm's servos must be and how they must be set, compared with what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from paramove.robots.dynamixel.bus.scan import model_name
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, Register, model_named
+from paramove.robots.dynamixel.calibration.arm_calibration import (
+    CURRENT_BASED,
+    EXTENDED,
+    POSITION,
+    ArmCalibration,
+    CalibrationError,
+    JointCalibration,
+)
+from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan
+
+FILE, DESCRIPTION, SERVO = "file", "description", "servo"
+SETTINGS = (
+    "Return Delay Time",
+    "Drive Mode",
+    "Operating Mode",
+    "Homing Offset",
+    "Max Position Limit",
+    "Min Position Limit",
+)
+"""Kept without power; written while torque is off."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Something that is not as the calibration file has it.
+
+    Attributes:
+        joint: Name, "" for the arm as a whole.
+        what: Register or property.
+        expected: In the file. found: Elsewhere, None where there is nothing.
+        where: `DESCRIPTION` or `SERVO`.
+    """
+
+    joint: str
+    what: str
+    expected: str | int
+    found: str | int | None
+    where: str
+
+
+def settings(joint: JointCalibration) -> dict[str, int]:
+    """Values of `SETTINGS` that its servo must have. In the other modes a servo does not look at its limits."""
+    within_turn = joint.operating_mode == POSITION
+    return {
+        "Return Delay Time": 0,
+        "Drive Mode": 0,
+        "Operating Mode": joint.operating_mode,
+        "Homing Offset": joint.homing_offset,
+        "Max Position Limit": joint.max_counts if within_turn else PULSES_PER_TURN - 1,
+        "Min Position Limit": joint.min_counts if within_turn else 0,
+    }
+
+
+def read_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, int]:
+    """As `settings`, but those that the servo has. Raises ServoError."""
+    return {register.name: chain.read(joint.id, register) for register in _registers(joint)}
+
+
+def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tuple[int, int]]:
+    """Write what differs, with torque off, and read it back.
+
+    Returns:
+        By register, what stood there and what stands there now.
+
+    Raises:
+        CalibrationError: The servo is of another model, its torque is on, or a value does not stay.
+        ServoError: It does not answer, or refuses.
+    """
+    found, model = chain.ping(joint.id), model_named(joint.model)
+    if found is None:
+        raise ServoSilentError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
+    if found.model_number != model.number:
+        told = model_name(found.model_number) or found.model_number
+        raise CalibrationError(f"servo {joint.id} is a {told}, expected {joint.model}: nothing was written to it")
+    if chain.read(joint.id, model.registers["Torque Enable"]):
+        raise CalibrationError(
+            f"servo {joint.id} has torque, and its settings are locked: hold the arm and run `paramove arm reboot "
+            f"{joint.id}`"
+        )
+    before, wanted = read_settings(chain, joint), settings(joint)
+    changed = {name: (before[name], value) for name, value in wanted.items() if before[name] != value}
+    for name in changed:
+        chain.write(joint.id, model.registers[name], wanted[name])
+    after = read_settings(chain, joint)
+    for name, value in wanted.items():
+        if after[name] != value:
+            raise CalibrationError(f"servo {joint.id}: {name} was written as {value}, but reads {after[name]}")
+    return changed
+
+
+def compare(chain: ServoChain, calibration: ArmCalibration, plan: ArmPlan | None = None) -> list[Difference]:
+    """Everything in which description and servos differ from the file. Reads only. Raises PortLostError."""
+    found = [] if plan is None else _with_description(calibration, plan)
+    for name, joint in calibration.joints.items():
+        found += _with_servo(chain, name, joint)
+    return found
+
+
+def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
+    """The calibration with firmware, operating modes and limits as the servos have them.
+
+    Raises:
+        CalibrationError: A servo has a homing offset, is another model, or the numbers would contradict each other.
+        ServoError: A servo does not answer.
+    """
+    joints = {}
+    for name, joint in calibration.joints.items():
+        pinged = chain.ping(joint.id)
+        if pinged is None:
+            raise ServoSilentError(joint.id, f"joint {name}: servo {joint.id} does not answer")
+        if pinged.model_number != model_named(joint.model).number:
+            told = model_name(pinged.model_number) or pinged.model_number
+            raise CalibrationError(
+                f"joint {name}: servo {joint.id} is a {told}, not a {joint.model}: calibrate the arm"
+            )
+        read = read_settings(chain, joint)
+        if read["Homing Offset"] != 0:
+            raise CalibrationError(
+                f"joint {name}: servo {joint.id} has Homing Offset {read['Homing Offset']}, and a calibration has "
+                "none: `paramove arm verify --write` sets it to 0"
+            )
+        if read["Operating Mode"] not in (POSITION, EXTENDED, CURRENT_BASED):
+            raise CalibrationError(
+                f"joint {name}: servo {joint.id} has operating mode {read['Operating Mode']}, not 3 to 5"
+            )
+        values = {"firmware": pinged.firmware, "operating_mode": read["Operating Mode"]}
+        if read["Operating Mode"] == POSITION:
+            values |= {"min_counts": read["Min Position Limit"], "max_counts": read["Max Position Limit"]}
+        joints[name] = joint.model_copy(update=values)
+    result = calibration.model_copy(update={"joints": joints})
+    result.check("with the servos' values")
+    return result
+
+
+def _registers(joint: JointCalibration) -> Sequence[Register]:
+    return [model_named(joint.model).registers[name] for name in SETTINGS]
+
+
+def _with_description(calibration: ArmCalibration, plan: ArmPlan) -> list[Difference]:
+    pairs: list[tuple[str, str, str | int, str | int]] = [
+        ("", "robot", calibration.robot, plan.robot),
+        ("", "baud rate", calibration.bus.baud_rate, plan.baud_rate),
+    ]
+    planned = {servo.joint: servo for servo in plan.servos}
+    for name in dict.fromkeys([*calibration.joints, *planned]):
+        joint, servo = calibration.joints.get(name), planned.get(name)
+        if joint is None or servo is None:
+            pairs.append((name, "joint", "there" if joint else "not there", "there" if servo else "not there"))
+            continue
+        pairs += [(name, "ID", joint.id, servo.number), (name, "model", joint.model, servo.model)]
+    return [Difference(name, what, one, other, DESCRIPTION) for name, what, one, other in pairs if one != other]
+
+
+def _with_servo(chain: ServoChain, name: str, joint: JointCalibration) -> list[Difference]:
+    pinged = chain.ping(joint.id)
+    if pinged is None:
+        return [Difference(name, "servo", f"ID {joint.id}", None, SERVO)]
+    model = model_named(joint.model)
+    if pinged.model_number != model.number:
+        told = model_name(pinged.model_number) or pinged.model_number
+        return [Difference(name, "model", joint.model, told, SERVO)]
+    pairs = [("firmware", joint.firmware, pinged.firmware)]
+
+    found = read_settings(chain, joint)
+    pairs += [(register, value, found[register]) for register, value in settings(joint).items()]
+    return [Difference(name, what, one, other, SERVO) for what, one, other in pairs if one != other]

@@ -1,0 +1,88 @@
+"""The control socket: one line, one answer; its file is the user's own and no other one is touched."""
+
+import contextlib
+import socket
+import stat
+
+import pytest
+
+from paramove.input_error import InputError
+from paramove.robots.dynamixel.bus.servo_models import XL430_W250
+from paramove.robots.dynamixel.emulated.control import ControlSocket, tell
+from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.servo import EmulatedServo
+from paramove.robots.dynamixel.emulated.verbs import EmulatorVerbs
+
+
+def echoed(line):
+    if line == "bad":
+        raise InputError("that is bad: say good")
+    return line.upper()
+
+
+def test_a_line_is_answered_and_the_socket_is_gone_afterwards(tmp_path):
+    path = tmp_path / "control"
+    with ControlSocket(path, echoed):
+        assert tell(path, "good") == "GOOD"
+        assert tell(path, "") == ""
+        with pytest.raises(InputError, match="that is bad: say good"):
+            tell(path, "bad")
+        assert tell(path, "again") == "AGAIN"
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert not path.exists()
+    with pytest.raises(InputError, match="no emulator listens") as missing:
+        tell(path, "good")
+    assert missing.value.missing
+
+
+def test_several_lines_of_one_caller_in_any_pieces(tmp_path):
+    with ControlSocket(tmp_path / "control", echoed), socket.socket(socket.AF_UNIX) as caller:
+        caller.connect(str(tmp_path / "control"))
+        for piece in (b"on", b"e\ntwo\nba", b"d\n\xff\xfe\n"):
+            caller.sendall(piece)
+        answers = caller.makefile(encoding="utf-8")
+        assert [answers.readline() for _ in range(3)] == ["ok ONE\n", "ok TWO\n", "error: that is bad: say good\n"]
+        assert answers.readline().startswith("ok ")
+
+
+def test_an_endless_line_is_hung_up_on(tmp_path):
+    with ControlSocket(tmp_path / "control", echoed):
+        with socket.socket(socket.AF_UNIX) as caller:
+            caller.connect(str(tmp_path / "control"))
+            caller.sendall(b"x" * 5000)
+            caller.settimeout(60.0)
+            with contextlib.suppress(ConnectionResetError):
+                assert caller.recv(10) == b""
+        assert tell(tmp_path / "control", "good") == "GOOD"
+
+
+def test_what_a_killed_program_left_is_cleared_away_and_nothing_else(tmp_path):
+    left, file = tmp_path / "left", tmp_path / "file"
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(str(left))
+    file.write_text("mine")
+    with ControlSocket(left, echoed):
+        assert tell(left, "good") == "GOOD"
+        with pytest.raises(InputError, match="of a running program"):
+            ControlSocket(left, echoed).__enter__()
+        assert tell(left, "still") == "STILL"
+    with pytest.raises(InputError, match="no socket"):
+        ControlSocket(file, echoed).__enter__()
+    assert file.read_text() == "mine"
+    with pytest.raises(InputError, match="No such file") as missing:
+        ControlSocket(tmp_path / "none" / "control", echoed).__enter__()
+    assert missing.value.missing
+    with pytest.raises(InputError, match="too long"):
+        ControlSocket(tmp_path / ("x" * 120), echoed).__enter__()
+
+
+def test_verbs_come_through_it(tmp_path):
+    with (
+        DynamixelEmulator([EmulatedServo(XL430_W250, 1)]) as emulator,
+        ControlSocket(tmp_path / "control", EmulatorVerbs(emulator).do),
+    ):
+        assert tell(tmp_path / "control", "overload 1") == ""
+        assert emulator.bus.servos[0].memory["Hardware Error Status"] == 0x20
+        assert tell(tmp_path / "control", "state").startswith("{")
+        tell(tmp_path / "control", "unplug")
+        assert not emulator.plugged_in
