@@ -42,8 +42,8 @@ sys.path.insert(0, str(ROOT))  # run as a program, only this folder is known
 
 from benchmarks.fuzz_bus import mutate  # noqa: E402
 from paramove.cameras.frames import FrameError  # noqa: E402
-from paramove.documents.positions import LaunchFileError  # noqa: E402
-from paramove.input_error import InputError  # noqa: E402
+from paramove.documents.input_error import InputError  # noqa: E402
+from paramove.documents.positions import DocumentError  # noqa: E402
 
 MOST_S = 5.0
 HANGS_S = 30.0
@@ -53,7 +53,7 @@ MOST_MIB = 1024.0
 LIMIT_BYTES = 6 * 2**30
 """Of the reading process, so that the machine outlives it."""
 MOST_BYTES = 2**23
-REFUSALS = (InputError, LaunchFileError, FrameError)
+REFUSALS = (InputError, DocumentError, FrameError)
 COUNTS = ("rejected", "read", "traceback", "over 5 s", "over 1 GB")
 FAILURES = COUNTS[2:]
 

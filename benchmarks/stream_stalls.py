@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.stream import StreamReader, StreamWriter
-from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s, stop_ramp
 
 EPOCH = 3
@@ -50,7 +49,7 @@ class Swing:
 
     def __init__(self) -> None:
         self.robot = RobotDescription.load(Path(__file__).parent.parent / "robot_description" / "hoap3")
-        self.limits = MotionLimits.of(self.robot)
+        self.limits = self.robot.motion_limits
         u = np.linspace(0.0, 1.0, DURATION + 1)[1:, None]
         way = np.zeros(self.robot.n_joints)
         for joint, degrees in SWING_DEG.items():

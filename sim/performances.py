@@ -23,7 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.recorded_people import RecordingsError
 from paramove.demonstrations.synthetic import RESTING_STERNUM, SAMPLE_RATE_HZ
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from sim.camera import Eye, Image
 from sim.human import place_arm, place_torso
 from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px

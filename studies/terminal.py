@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from paramove.cli.evaluation_io import PROGRESS
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 _COLOURS = {"yes": "green", "in part": "yellow", "no": "red", "–": "bright_black"}
 

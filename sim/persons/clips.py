@@ -27,8 +27,8 @@ from ruamel.yaml import YAML
 from paramove.cameras.calibrated import CalibratedCamera, read_cameras, write_cameras
 from paramove.documents.arrays import read_arrays
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.input_error import InputError
 from paramove.documents.pictures import decoded
-from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.source_code import code_digest
 from sim.persons.performances import KINDS, Act, Split, split_of

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, seeds_in, write_numbers
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from studies.terminal import marked, stored_results
 
 FOLDER = Path("runs/evaluation/chapter4")

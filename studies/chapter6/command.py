@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, write_numbers
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from studies.terminal import marked, say_error, stored_results
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def chapter6(
 def _prepared(selection: Selection, clips: Path | None, data: Path | None, console: Console) -> list[Piece]:
     """All tracks, when their clips are there and what the trackers need is learned."""
     from paramove.demonstrations.recorded_people import RecordingsError
-    from paramove.input_error import InputError
+    from paramove.documents.input_error import InputError
     from studies.chapter6.experiments import pieces, train
 
     try:

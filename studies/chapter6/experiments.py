@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import cv2
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.options import Likelihood
 from paramove.source_code import code_digest
 from sim.persons.clips import (

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, workspace_here, write_numbers
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 RUNS = Path("runs/kills")
 WIDTH = 130

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from paramove.documents import exit_codes
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.description import RobotDescription
-from paramove.supervision import exit_codes
 from studies.faults import firmware_log
 from studies.faults.kill_cases import LAUNCHER, SIGNALS, Expected, KillCase
 from studies.faults.leftovers import left_over

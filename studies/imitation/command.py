@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.cli.evaluation_io import seeds_in, workspace_here
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from studies.imitation.thesis import Compared

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.cli.evaluation_io import JsonFileOption, workspace_here, write_numbers
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from studies.terminal import say_error, stored_results
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from paramove.demonstrations.recorded_people import RecordingsError, data_folder
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from studies.real_images import seated_person
 from studies.real_images.replay import RATE_HZ, RETARGETED, Said, replayed
 from studies.real_images.scores import GOAL_PX, Distances, distances, is_met, read_reference

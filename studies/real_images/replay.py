@@ -24,7 +24,7 @@ from paramove.action_space.vocabulary import Vocabulary
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.frame_sources import open_source
 from paramove.cameras.frames import EndOfFrames, FrameChecks, decode, encode
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.arm_observer import ArmObserver

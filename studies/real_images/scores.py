@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.documents.arrays import read_arrays
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import fitted_poses
 from studies.real_images.replay import Said
 from studies.real_images.seated_person import SIZES

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from paramove.action_space.placement import PersonPlacement
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.arm import unit
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 
 Floats = NDArray[np.float64]

@@ -6,7 +6,7 @@ import pytest
 from paramove.action_space.grammar import BASE, Grammar, Switching
 from paramove.action_space.grammar_file import parsed_grammar
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.action_space.toy import toy_action
 
 COMPLEX = """

@@ -13,7 +13,7 @@ from paramove.action_space.particle_filter import (
 )
 from paramove.action_space.propagation import Propagation
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.action_space.toy_kalman import KalmanToy
 
 

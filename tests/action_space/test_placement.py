@@ -6,7 +6,7 @@ import pytest
 from paramove.action_space.placement import PersonPlacement
 from paramove.demonstrations import ArmLengths
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 
 def test_the_default_person_is_the_demonstrator():

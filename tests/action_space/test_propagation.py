@@ -8,7 +8,7 @@ import pytest
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.propagation import Propagation, PropagationOptions, reflected
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.action_space.toy import toy_action
 
 N = 20_000

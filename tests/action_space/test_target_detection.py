@@ -6,7 +6,7 @@ import pytest
 from paramove.action_space.estimates import ThetaEstimate
 from paramove.action_space.target_detection import DetectionOptions, TargetDetector
 from paramove.demonstrations.synthetic import minimum_jerk
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 GOAL = np.array([0.4, 0.1, 0.07])
 BASE = np.array([0.0, -0.3, -0.3])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramove.action_space.track_health import HealthOptions, TrackHealth
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation import Presence
 
 

@@ -10,7 +10,7 @@ from paramove.action_space.propagation import PropagationOptions
 from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.vocabulary import Vocabulary
 from paramove.demonstrations import table_place
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.action_space.performances import arm_poses, gaussian, performed
 
 PLACES = np.array([[0.25, 0.7], [0.8, 0.3]])

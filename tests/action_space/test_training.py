@@ -5,7 +5,7 @@ import pytest
 
 from paramove.action_space.training import arm_poses, cached_action, table_action_demonstrations
 from paramove.demonstrations import POINT_NAMES, table_place
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 
 def shown():

@@ -8,7 +8,7 @@ import pytest
 from paramove.action_space.setup import Person, TrackingSetup, read_person
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.demonstrations import table_place
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.action_space.drawn_arm import RATE_HZ, camera, drawn, pointing, write_setup
 
 MS = 1_000_000

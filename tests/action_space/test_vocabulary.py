@@ -8,7 +8,7 @@ import pytest
 from paramove.action_space.training import train_action
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.demonstrations import Demonstrations, table_place
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.phmm import LinearPHMM
 from tests.action_space.toy import toy_action
 

@@ -10,7 +10,6 @@ import pytest
 from paramove.applications.relocator_options import RelocatorOptions
 from paramove.motion.clear_plans import LEAST_CLEARANCE, ClearPlans
 from paramove.msgs.relocation_pb2 import RelocationGoal
-from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.fake_driver import FAILED, OFFER, PLACE, REFUSED, SUCCEEDED, Cell, FakeDriver, goal
 from tests.motion.reaching import ARM, HOAP3, JOINTS, OPENINGS, at, checker, planner
@@ -95,7 +94,7 @@ def test_the_gate_lets_the_way_to_where_the_relocator_holds_it_pass(place: tuple
     motion = plans.hold(lifted, np.array(RelocatorOptions().hold), np.empty((0, 2)))
     pose = HOAP3.base_pose.copy()
     pose[JOINTS] = motion.angles[0]
-    names, limits = [*ARM.joints, ARM.fingers], MotionLimits.of(HOAP3)
+    names, limits = [*ARM.joints, ARM.fingers], HOAP3.motion_limits
     tolerance = np.deg2rad(HOAP3.stream.start_tolerance_deg)
     checked = check_trajectory(names, motion.times, motion.angles.tolist(), pose, limits, tolerance)
     np.testing.assert_allclose(checked.rows[-1, JOINTS], motion.angles[-1], rtol=0, atol=1e-12)

@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from pydantic import ValidationError
 
 from paramove.applications.reach_task import ReachStep, ReachTask
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import SafetyState

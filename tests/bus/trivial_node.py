@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from paramove.bus import topics
 from paramove.bus.node import Bus, NodeConfig, main
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.rule_pb2 import Speech
 
 HEARS = (topics.GESTURES,)

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.cameras.calibrated import CalibratedCamera, read_cameras, write_cameras
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.observation.views import camera_at
 
 LENS = np.array([-0.25, 0.08, 0.001, -0.002, 0.01])

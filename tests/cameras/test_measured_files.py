@@ -7,7 +7,7 @@ import pytest
 
 from paramove.cameras.calibrated import write_cameras
 from paramove.cameras.measured_files import measured_cameras, measured_file
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.observation.views import four_cameras
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from paramove.cameras.frame_sources import FrameSource, open_source
 from paramove.cameras.frames import EndOfFrames, Frame, FrameError, encode
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.recording.writer import RecordingWriter
 

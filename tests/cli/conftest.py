@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
-from tests.cli.arm_desk import Bench
+from tests.cli.arm.arm_desk import Bench
 
 
 class Trained(NamedTuple):

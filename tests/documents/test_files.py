@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from paramove.documents.files import read_bytes, read_text
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-from paramove.input_error import InputError
 
 
 class MapError(InputError):

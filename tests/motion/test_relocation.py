@@ -9,12 +9,11 @@ import pytest
 
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.planned_motion import PlannedMotion
-from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import check_trajectory
 from sim.places import STRIP_X, STRIP_Y
 from tests.motion.reaching import ARM, CORNERS, GRASP_Z, HOAP3, JOINTS, OPENINGS, at, movement, planner, solver
 
-LIMITS = MotionLimits.of(HOAP3)
+LIMITS = HOAP3.motion_limits
 BASE = HOAP3.base_pose[JOINTS]
 STRIP = [(x, y) for x in STRIP_X for y in (STRIP_Y[0], np.mean(STRIP_Y), STRIP_Y[1])]
 OFFERED = at((0.155, -0.02), -0.05)

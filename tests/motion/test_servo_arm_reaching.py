@@ -9,7 +9,6 @@ from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.robots.description import DescriptionError
 from paramove.robots.out_of_reach import OutOfReachError
-from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.reaching import HOAP3, reaching_model
 from tests.motion.servo_reaching import GRASP_Z, description, places, reaching
@@ -59,7 +58,7 @@ def assert_playable(name: str, motion: PlannedMotion, start: np.ndarray | None =
     """The driver's own check takes it, and the jerk is within the description's."""
     plan, robot = reaching(name), description(name)
     commanded = Oracle(name).whole(plan.base_angles if start is None else start)
-    limits = MotionLimits.of(robot)
+    limits = robot.motion_limits
     checked = check_trajectory(plan.joints, motion.times, motion.angles, commanded, limits, np.deg2rad(0.01))
     np.testing.assert_allclose(checked.duration_s, motion.times[-1], rtol=0, atol=0.011)
     jerk = np.abs(np.diff(motion.angles, 3, axis=0)).max(axis=0) / 0.01**3

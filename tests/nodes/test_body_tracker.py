@@ -12,7 +12,7 @@ from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
 from paramove.cameras.calibrated import write_cameras
 from paramove.cameras.frames import Frame, encode
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.nodes.recorded_bus import PERIOD_NS
 from tests.observation.test_markers import ARM, EYES, HUES, with_colours, with_markers
 

@@ -14,7 +14,7 @@ from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import Tick
 from paramove.cameras.frames import FrameError, decode
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard, bus_with_ticks
 
 

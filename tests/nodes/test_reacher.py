@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from nodes import reacher
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.phmm import ModelFileError
 from paramove.robots.description import DescriptionError

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from nodes import synthesizer
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from tests.motion.fake_driver import Cell, goal
 from tests.motion.reaching import OPENINGS, ROBOT_FOLDER, reaching_model

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from paramove.demonstrations import ArmLengths
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation import ArmSizes, fitted_poses
 
 SIZES = ArmSizes()

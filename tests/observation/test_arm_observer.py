@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation import ArmObserver, ArmSizes, ObservationOptions
 from tests.observation.scenes import cluttered, displaced, rendered_person
 from tests.observation.test_silhouette import drawn

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
 from paramove.observation.background import Background

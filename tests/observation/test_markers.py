@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from paramove.cameras.charuco_board import dictionary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.objects.colour_tracker import Colour
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, StereoBodyTracker
 from tests.cameras.board_scene import camera, looking

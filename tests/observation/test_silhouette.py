@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation import ArmObserver, ArmSizes, fitted_poses
 from paramove.observation.contour_kernels import new_contour, trace
 from paramove.observation.silhouette_kernels import Camera, draw_arm, new_canvas, project_ellipsoid, wipe

@@ -10,7 +10,6 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.operator.jogging import OVERDUE_S, Jogging
 from paramove.robots.description import RobotDescription
-from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import check_trajectory
 
 ROBOTS = Path(__file__).parents[2] / "robot_description"
@@ -36,7 +35,7 @@ def jogging():
 @pytest.mark.parametrize("degrees", [0.5, 2.0, 10.0])
 def test_every_step_keeps_to_the_limits(name, degrees):
     robot = RobotDescription.load(ROBOTS / name)
-    limits, step = MotionLimits.of(robot), float(np.deg2rad(degrees))
+    limits, step = robot.motion_limits, float(np.deg2rad(degrees))
     jogging = Jogging("jog", step)
     jogging.hear_states(states(dict(zip(robot.joint_names, robot.base_pose, strict=True))))
     for place, joint in enumerate(robot.joint_names):

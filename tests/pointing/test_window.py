@@ -7,7 +7,7 @@ import pytest
 
 from paramove.action_space.placement import PersonPlacement
 from paramove.demonstrations import POINT_NAMES, table_place
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.last_part_model import LastPartModel

@@ -52,7 +52,7 @@ def test_open_is_xi_one_and_the_hands_count_in_opposite_directions(side: str, cl
 
 
 def test_unknown_joint_names_the_nearest() -> None:
-    with pytest.raises(DescriptionError, match="nearest is 'right_elbow'"):
+    with pytest.raises(DescriptionError, match="'right_elbow'"):
         HOAP3.index("right_elbo")
 
 
@@ -189,3 +189,18 @@ def test_a_missing_model_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"the model file .*hoap3\.xml does not exist") as refusal:
         RobotDescription.load(tmp_path)
     assert refusal.value.missing
+
+
+def test_the_limits_are_those_of_the_description() -> None:
+    limits = HOAP3.motion_limits
+    assert (limits.names, limits.dt_s) == (HOAP3.joint_names, 0.001)
+    for ours, theirs in (
+        (limits.lower, HOAP3.soft_lower),
+        (limits.upper, HOAP3.soft_upper),
+        (limits.motor_velocity, HOAP3.velocity),
+        (limits.velocity, HOAP3.operating_velocity),
+        (limits.acceleration, HOAP3.operating_acceleration),
+        (limits.stop_acceleration, HOAP3.stop_acceleration),
+        (limits.jerk, HOAP3.jerk),
+    ):
+        np.testing.assert_array_equal(ours, theirs)

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import ArmWord, Fault, Inputs, Measured, Proposal, State
-from paramove.safety.limits import MotionLimits
 from tests.robots.hoap3.movements import HOAP3, swing
 
-LIMITS = MotionLimits.of(HOAP3)
+LIMITS = HOAP3.motion_limits
 PATH = swing(HOAP3, duration_s=1.2)
 MS = 1_000_000
 START_NS = 5_000 * MS

@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.safety_steps import NAMES, limits_at
 from paramove.safety.limits import JERK_SPAN_S, SPAN_S, MotionLimits
-from tests.robots.hoap3.movements import HOAP3
 
 LIMITS = limits_at(0.01)
 REST = np.zeros((1, 3))
@@ -197,18 +196,3 @@ def test_all_joints_are_judged() -> None:
         found = LIMITS.first_violation(rows, REST)
         assert found is not None
         assert (found.joint, found.row) == (name, 2)
-
-
-def test_the_limits_are_those_of_the_description() -> None:
-    limits = MotionLimits.of(HOAP3)
-    assert (limits.names, limits.dt_s) == (HOAP3.joint_names, 0.001)
-    for ours, theirs in (
-        (limits.lower, HOAP3.soft_lower),
-        (limits.upper, HOAP3.soft_upper),
-        (limits.motor_velocity, HOAP3.velocity),
-        (limits.velocity, HOAP3.operating_velocity),
-        (limits.acceleration, HOAP3.operating_acceleration),
-        (limits.stop_acceleration, HOAP3.stop_acceleration),
-        (limits.jerk, HOAP3.jerk),
-    ):
-        np.testing.assert_array_equal(ours, theirs)

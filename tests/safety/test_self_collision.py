@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.safety.self_collision import SelfCollision
 from tests.robots.hoap3.movements import HOAP3
 

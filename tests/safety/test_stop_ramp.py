@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s, stop_ramp, straight_move
 from tests.robots.hoap3.movements import HOAP3, swing
 
-LIMITS = MotionLimits.of(HOAP3)
+LIMITS = HOAP3.motion_limits
 PATH = swing(HOAP3, duration_s=1.1)
 
 

@@ -8,11 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.safety_steps import limits_at
-from paramove.safety.limits import MotionLimits
 from paramove.safety.trajectory_check import CheckedPath, TrajectoryRefusedError, check_trajectory
 from tests.robots.hoap3.movements import HOAP3
 
-LIMITS = MotionLimits.of(HOAP3)
+LIMITS = HOAP3.motion_limits
 JOINTS = ("right_shoulder_pitch", "right_elbow")
 PLACES = HOAP3.indices(JOINTS)
 START = HOAP3.base_pose[PLACES]

@@ -7,7 +7,7 @@ import pytest
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.turns import Tick
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from sim import dynamixel_emulator
 
 ROBOTS = Path(__file__).parents[2] / "robot_description"

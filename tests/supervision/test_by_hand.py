@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from paramove.supervision.control import ControlServer, NoRunError, ask
 
 THREE = """

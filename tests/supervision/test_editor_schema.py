@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.cli.main import build
-from paramove.documents.positions import LaunchFileError, read_mapping
+from paramove.documents.positions import DocumentError, read_mapping
 from paramove.supervision.editor_schema import FILES, as_text, editor_schema
 from paramove.supervision.launch_file import load, validated
 
@@ -122,7 +122,7 @@ BAD = [
 @pytest.mark.parametrize("text", BAD)
 def test_schema_refuses_what_the_launcher_refuses(text):
     document = read_mapping(text, "bad.yaml")
-    with pytest.raises(LaunchFileError):
+    with pytest.raises(DocumentError):
         validated(document)
     schema = editor_schema("launch")
     assert not conforms(document.data, schema, schema)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from paramove.documents.positions import MAX_CHARACTERS, LaunchFileError
+from paramove.documents.positions import MAX_CHARACTERS, DocumentError
 from paramove.supervision import application, wiring
 from paramove.supervision.launch_file import load
 
@@ -28,7 +28,7 @@ EXPECTED = expected()
 
 
 def refusal(folder, name):
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(DocumentError) as caught:
         application.check(load(folder, name), ROOT)
     return str(caught.value).replace(f"{folder}/", "").replace(str(ROOT), "WORKSPACE").splitlines()
 
@@ -83,7 +83,7 @@ def test_bytes_that_are_no_launch_file(tmp_path, content, message):
 
 def test_a_folder_is_no_launch_file(tmp_path):
     (tmp_path / "bad.yaml").mkdir()
-    with pytest.raises(LaunchFileError, match="there is no such launch file"):
+    with pytest.raises(DocumentError, match="there is no such launch file"):
         load(tmp_path, "bad")
 
 
@@ -153,7 +153,7 @@ def test_damaged_launch_file_raises_nothing_but_its_error(path, mutations, tmp_p
         launch = load(folder, "rule_learning", overlays, ["camera.width=640"], seed=1, headless=True)
         interfaces = wiring.read_interfaces(launch, ROOT)
         list(wiring.topic_findings(launch, interfaces))
-    except LaunchFileError as error:
+    except DocumentError as error:
         lines = str(error).splitlines()
         assert all(re.match(r"(/|--set|--seed|and \d+ more)", line) and line.isprintable() for line in lines)
 
@@ -161,5 +161,5 @@ def test_damaged_launch_file_raises_nothing_but_its_error(path, mutations, tmp_p
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(setting=st.text(max_size=30) | st.from_regex(r"\A[a-z]+\.[a-z]+=.{0,10}\Z"))
 def test_any_setting_is_taken_or_refused(setting):
-    with contextlib.suppress(LaunchFileError):  # any other exception fails the test
+    with contextlib.suppress(DocumentError):  # any other exception fails the test
         load(LAUNCH, "rule_learning", ["sim"], [setting])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.documents.positions import LaunchFileError, read_mapping
+from paramove.documents.positions import DocumentError, read_mapping
 from paramove.supervision.launch_file import LaunchFileMissingError, load, start_waves, validated
 from paramove.supervision.supervisor import stop_waves
 
@@ -72,18 +72,18 @@ def test_another_connection_needs_an_overlay_that_says_what_it_is(folder):
         (folder / "overlays" / f"{name}.yaml").write_text("nodes: {camera: {parameters: {port: /dev/one}}}")
     (folder / "overlays" / "view.yaml").write_text("nodes: {camera: {parameters: {size: 3}}}")
     for overlays in (None, ["view"], []):
-        with pytest.raises(LaunchFileError, match=r"--set camera\.port=/dev/two: .*--with real"):
+        with pytest.raises(DocumentError, match=r"--set camera\.port=/dev/two: .*--with real"):
             load(folder, "arm", overlays, ["camera.port=/dev/two"])
     assert parameters(load(folder, "arm", ["real"], ["camera.port=/dev/two"]))["port"] == "/dev/two"
     assert parameters(load(folder, "arm", None, ["camera.rate_hz=3"]))["port"] == "/dev/one"
     (folder / "wrong.yaml").write_text(f"connections: [camer.port]\n{GOOD}")
-    with pytest.raises(LaunchFileError, match=r"'camer\.port' is no node\.parameter; did you mean 'camera'"):
+    with pytest.raises(DocumentError, match=r"'camer\.port' is no node\.parameter; did you mean 'camera'"):
         load(folder, "wrong")
 
 
 def test_seed_without_a_taker_is_refused(folder):
     (folder / "plain.yaml").write_text("nodes: {a: {module: m}}")
-    with pytest.raises(LaunchFileError, match="has no 'seed_parameters'"):
+    with pytest.raises(DocumentError, match="has no 'seed_parameters'"):
         load(folder, "plain", seed=7)
 
 
@@ -98,7 +98,7 @@ def test_seed_without_a_taker_is_refused(folder):
     ],
 )
 def test_wrong_setting_is_named(folder, setting, message):
-    with pytest.raises(LaunchFileError, match=message) as caught:
+    with pytest.raises(DocumentError, match=message) as caught:
         load(folder, "good", None, [setting])
     assert setting in str(caught.value)
 
@@ -164,7 +164,7 @@ BAD = [
 def test_error_points_at_the_place(tmp_path, text, place, message):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(DocumentError) as caught:
         load(tmp_path, "bad")
     assert str(caught.value).startswith(f"{path}:{place}: ")
     assert message in str(caught.value)
@@ -172,19 +172,19 @@ def test_error_points_at_the_place(tmp_path, text, place, message):
 
 def test_error_in_an_overlay_points_into_the_overlay(folder):
     (folder / "overlays" / "slow.yaml").write_text("nodes:\n  camera: {requird: true}\n")
-    with pytest.raises(LaunchFileError, match=r"slow\.yaml:2:12: unknown key 'requird'; did you mean 'required'\?"):
+    with pytest.raises(DocumentError, match=r"slow\.yaml:2:12: unknown key 'requird'; did you mean 'required'\?"):
         load(folder, "good")
 
 
 def test_every_finding_is_told():
-    with pytest.raises(LaunchFileError, match=r"f:1:1: unknown key 'x'.*\nf:2:24: nodes.a.restart: ") as caught:
+    with pytest.raises(DocumentError, match=r"f:1:1: unknown key 'x'.*\nf:2:24: nodes.a.restart: ") as caught:
         validated(read_mapping("x: 1\nnodes: {a: {module: m, restart: 3}}", "f"))
     assert len(str(caught.value).splitlines()) == 2
 
 
 def test_unreadable_bytes_are_refused(tmp_path):
     (tmp_path / "bad.yaml").write_bytes(b"\xff\xfe\x00nodes")
-    with pytest.raises(LaunchFileError, match="cannot be read"):
+    with pytest.raises(DocumentError, match="cannot be read"):
         load(tmp_path, "bad")
 
 
@@ -198,7 +198,7 @@ def test_damaged_file_is_refused_or_read_but_never_crashes(data):
         text = (
             text[:at] + data.draw(st.text(":{}[]#&*!|>'\"%@`-?, \n\t0aé\x00\x85\udc00", max_size=4)) + text[at + cut :]
         )
-    with contextlib.suppress(LaunchFileError):  # any other exception fails the test
+    with contextlib.suppress(DocumentError):  # any other exception fails the test
         validated(read_mapping(text, "damaged.yaml"))
 
 

@@ -6,8 +6,8 @@ import resource
 
 import pytest
 
+from paramove.documents import exit_codes
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision import exit_codes
 from paramove.supervision.launch_schema import NodeSettings
 from paramove.supervision.supervised_node import State, SupervisedNode
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from paramove.supervision.processes import Guard, SupervisedProcess, last_lines, printable
+from paramove.documents.wording import printable
+from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
 from tests.supervision.conftest import until
 
 

@@ -10,7 +10,8 @@ import pytest
 from rich.console import Console
 from ruamel.yaml import YAML
 
-from paramove.supervision import application, exit_codes
+from paramove.documents import exit_codes
+from paramove.supervision import application
 from paramove.supervision.view import LineView
 from tests.recording.small_disk import fill, small_disk
 

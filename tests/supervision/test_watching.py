@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from paramove.supervision.events import EventLog, signal_name
 from tests.recording.small_disk import fill, small_disk
 

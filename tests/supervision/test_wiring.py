@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from paramove.bus import topics
-from paramove.documents.positions import LaunchFileError
+from paramove.documents.positions import DocumentError
 from paramove.supervision.interfaces import InterfaceError, read_interface
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
 
@@ -64,7 +64,7 @@ def test_topics_with_a_speaker_pass(workspace):
     ],
 )
 def test_misfit_is_told_with_its_place(workspace, text, place, message):
-    with pytest.raises(LaunchFileError) as caught:
+    with pytest.raises(DocumentError) as caught:
         checked(workspace, text)
     assert f"test.yaml:{place}: " in str(caught.value)
     assert message in str(caught.value)

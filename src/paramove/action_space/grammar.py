@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
-from paramove.input_error import InputError
-from paramove.supervision.names import nearest
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import nearest
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

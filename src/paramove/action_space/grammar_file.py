@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 from paramove.action_space.grammar import NEW, Follower, Grammar, Step, Switching
 from paramove.documents.files import read_text
-from paramove.documents.positions import MAX_CHARACTERS, Document, KeyPath, LaunchFileError, read_mapping
-from paramove.input_error import InputError
-from paramove.supervision.names import nearest
+from paramove.documents.input_error import InputError
+from paramove.documents.positions import MAX_CHARACTERS, Document, DocumentError, KeyPath, read_mapping
+from paramove.documents.wording import nearest
 
 EXAMPLE = "begin: point(a)"
 KEYS = ("description", "begin", "after", "actions", "switching")
@@ -48,12 +48,12 @@ def parsed_grammar(text: str, source: str = "grammar") -> Grammar:
     """The grammar in a YAML text. Raises GrammarError with position, what was found, and what would have worked."""
     try:
         return _Reading(read_mapping(text, source, example=EXAMPLE)).grammar()
-    except LaunchFileError as error:
+    except DocumentError as error:
         raise GrammarError(str(error)) from error
 
 
 class _Reading:
-    """One document being read; every error is raised as LaunchFileError with its position."""
+    """One document being read; every error is raised as DocumentError with its position."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -164,5 +164,5 @@ class _Reading:
             raise self._error((key,), f"{message}; it tells of each step what may follow, as 'point(a): withdraw(a)'")
         return found
 
-    def _error(self, path: KeyPath, message: str) -> LaunchFileError:
+    def _error(self, path: KeyPath, message: str) -> DocumentError:
         return self._document.error(path, message)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.propagation import Particles, Propagation
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.demonstrations.arm import ArmLengths
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from paramove.action_space.grammar import BASE, Grammar
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

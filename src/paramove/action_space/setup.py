@@ -19,8 +19,8 @@ from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
 from paramove.cameras.measured_files import measured_cameras, measured_file
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-from paramove.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
 from paramove.phmm import ParametricHMM, PolynomialPHMM

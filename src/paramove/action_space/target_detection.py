@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.estimates import ThetaEstimate
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 

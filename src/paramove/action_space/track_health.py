@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.presence import Presence
 
 KEPT_SHARE = 0.9

@@ -28,7 +28,7 @@ from paramove.action_space.reached_place import ReachedPlace, reached_place
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import HAND
 from paramove.observation.presence import Presence
 

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.action_space.vocabulary import POSE_SIZES, ActionModel, table_target
 from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
 from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
+from paramove.documents.input_error import InputError
 from paramove.hmm import TrainingOptions
-from paramove.input_error import InputError
 from paramove.observation.arm_body import BENT_POSE_POINTS
 from paramove.phmm import MovementDescription, PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.kept_model import kept_model

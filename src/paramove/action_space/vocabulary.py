@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.action_space.pose_kernels import write_polynomial_poses, write_tabled_poses
 from paramove.demonstrations import table_place
+from paramove.documents.input_error import InputError
 from paramove.hmm import LeftRightHMM
-from paramove.input_error import InputError
 from paramove.observation.arm_body import BENT_POSE_POINTS, HAND, POSE_POINTS
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 

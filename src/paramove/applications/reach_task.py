@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
 from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.settled_joints import SettledJoints
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.motion.hand_poses import FARTHEST_M, metres
 from paramove.motion.motion_message import motion_message
 from paramove.motion.planned_motion import PlannedMotion

@@ -31,17 +31,14 @@ from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-from paramove.input_error import InputError
 
 __all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "publish_each", "read_node_file"]
 
 _log = logging.getLogger(__name__)
 
-EXIT_OK = 0
-EXIT_FAILED = 70
-EXIT_TAKEN = 75
-EXIT_CONFIGURATION = 78
 LAST_WORD_S = 1.0
 """A node that has failed waits so long at most for somebody to hear why."""
 
@@ -110,19 +107,19 @@ def main(
         file, config = read_node_file(arguments.config, config_type)
     except ConfigurationError as error:
         sys.stderr.write(f"{error}\n")
-        sys.exit(EXIT_CONFIGURATION)
+        sys.exit(exit_codes.CONFIGURATION)
     log_to_stderr(file.node)
     try:
         bus = Bus(file.node, file.bus, hears, says, file.run_folder)
     except (TopicTakenError, BusFolderError) as error:
         _log.error("%s", error)
-        sys.exit(EXIT_TAKEN)
+        sys.exit(exit_codes.TEMPORARY)
     except ValueError as error:
         _log.error("%s", error)
-        sys.exit(EXIT_CONFIGURATION)
+        sys.exit(exit_codes.CONFIGURATION)
     with bus:
         code = _run(run, bus, config)
-        if code != EXIT_OK:
+        if code != exit_codes.OK:
             bus.wait_for_listener(LAST_WORD_S)
         sys.exit(code)
 
@@ -142,12 +139,12 @@ def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
         _log.exception("the node raised an exception")
         over = f" (over {bus.taken_up})" if bus.taken_up else ""
         bus.failed(f"{type(error).__name__}: {error}{over}")
-        return EXIT_FAILED
+        return exit_codes.NODE_FAILED
     if bus.has_failed:
-        return EXIT_FAILED
+        return exit_codes.NODE_FAILED
     if not bus.has_ended:
         bus.ended("stopped on request" if bus.stopped else "finished")
-    return EXIT_OK
+    return exit_codes.OK
 
 
 def _sentence(path: Path, error: ValidationError, prefix: str = "") -> str:

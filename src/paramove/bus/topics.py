@@ -5,7 +5,6 @@ A node names its topics from here (`topics.CAMERA_IMAGE`); nothing else spells a
 
 from __future__ import annotations
 
-import difflib
 import enum
 import re
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
+from paramove.documents.wording import nearest
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.clock_pb2 import Clock
@@ -185,6 +185,4 @@ def by_name(name: str) -> Topic:
     for topic in TOPICS:
         if topic.name == name:
             return topic
-    known = [topic.name for topic in TOPICS]
-    nearest = difflib.get_close_matches(name, known, n=3) or known
-    raise KeyError(f"no topic {name!r} in paramove.bus.topics; nearest: {', '.join(nearest)}")
+    raise KeyError(f"no topic {name!r} in paramove.bus.topics; {nearest(name, (topic.name for topic in TOPICS))}")

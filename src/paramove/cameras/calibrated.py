@@ -21,8 +21,8 @@ from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-from paramove.input_error import InputError
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]

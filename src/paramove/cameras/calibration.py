@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.cameras.charuco_board import Board, BoardView
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Matrix = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from paramove.cameras.calibration import GOOD_VIEWS, CalibrationError
 from paramove.cameras.charuco_board import BoardFinder, BoardView, Image
+from paramove.documents.input_error import InputError
 from paramove.documents.pictures import opened_video, read_picture
-from paramove.input_error import InputError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 TABLE_PREFIX = "table"

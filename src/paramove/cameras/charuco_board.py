@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Matrix = NDArray[np.float64]
 Image = NDArray[Any]  # uint8 [H, W] or [H, W, 3]

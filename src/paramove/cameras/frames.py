@@ -15,8 +15,8 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from numpy.typing import NDArray
 
+from paramove.documents.input_error import InputError
 from paramove.documents.pictures import JPEG, decoded
-from paramove.input_error import InputError
 
 Image = NDArray[Any]  # uint8 [H, W, 3], BGR
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from paramove.cameras.calibrated import CalibratedCamera, read_cameras
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 MOST_CAMERAS = 4
 

@@ -9,8 +9,8 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.cameras.frames import EndOfFrames, Frame, FrameError, decode
+from paramove.documents.input_error import InputError
 from paramove.documents.pictures import read_picture
-from paramove.input_error import InputError
 from paramove.recording.reader import Recorded, read
 
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")

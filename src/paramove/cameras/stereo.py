@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 

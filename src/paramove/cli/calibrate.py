@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.input_error import InputError
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.cameras.calibration import Lens

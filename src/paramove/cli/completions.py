@@ -120,11 +120,11 @@ def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Ite
 
 def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
-    from paramove.documents.positions import LaunchFileError, read_mapping
-    from paramove.supervision.names import overlay_folder
+    from paramove.documents.positions import DocumentError, read_mapping
+    from paramove.supervision.launch_file import overlay_folder
 
     modules: dict[str, str] = {}
-    with contextlib.suppress(OSError, LaunchFileError, UnicodeDecodeError):
+    with contextlib.suppress(OSError, DocumentError, UnicodeDecodeError):
         document = read_mapping((folder / f"{name}.yaml").read_text(encoding="utf-8-sig"), name)
         names = chosen or document.data.get("default_overlays", [])
         for overlay in names if isinstance(names, list | tuple) else []:

@@ -25,8 +25,8 @@ from paramove.cli.demos_options import (
     table_of,
     words,
 )
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
+from paramove.documents import exit_codes
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.demonstrations.demonstration_set import DemonstrationSet

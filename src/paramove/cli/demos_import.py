@@ -18,7 +18,7 @@ from paramove.cli.demos_options import (
     one_sentence,
     words,
 )
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.demonstrations.importing import Imported, ImportOptions

@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents import exit_codes
+from paramove.documents.wording import printable
 from paramove.recording.writer import RecordingExistsError
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
 
 SetArgument = Annotated[Path, typer.Argument(metavar="SET", help="folder of a demonstration set")]
 ActionOption = Annotated[str | None, typer.Option(help="only this action")]

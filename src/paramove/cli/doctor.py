@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from paramove.diagnosis.finding import Finding, Level, Machine, Part
-from paramove.input_error import InputError
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE
-from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -97,7 +97,7 @@ def _show(console: Console, findings: Sequence[Finding]) -> None:
     """A line each, and its remedies indented below."""
     from rich.text import Text
 
-    from paramove.supervision.processes import printable
+    from paramove.documents.wording import printable
 
     plain = not console.encoding.lower().startswith("utf")
 

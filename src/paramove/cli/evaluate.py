@@ -19,7 +19,7 @@ from paramove.cli.evaluation_io import (
     workspace_here,
     write_numbers,
 )
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
 STUDIES = ("kills", "faults", "imitation", "real", "peers", "chapter2", "chapter4", "chapter6", "real-images")

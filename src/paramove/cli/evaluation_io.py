@@ -11,7 +11,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-from paramove.supervision import application, exit_codes
+from paramove.documents import exit_codes
+from paramove.supervision import application
 
 JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the numbers to FILE too")]
 PROGRESS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())

@@ -68,8 +68,8 @@ def graph(
 
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
-    from paramove.documents.positions import LaunchFileError
-    from paramove.supervision import exit_codes
+    from paramove.documents import exit_codes
+    from paramove.documents.positions import DocumentError
     from paramove.supervision.application import NoWorkspaceError, check, find_workspace
     from paramove.supervision.graph import graph_of
     from paramove.supervision.launch_file import LaunchFileMissingError, load
@@ -81,7 +81,7 @@ def _launched(name: str, overlays: list[str] | None) -> Graph:
     except (LaunchFileMissingError, NoWorkspaceError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(exit_codes.INPUT_MISSING) from None
-    except LaunchFileError as error:
+    except DocumentError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(exit_codes.CONFIGURATION) from None
 

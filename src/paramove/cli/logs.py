@@ -16,8 +16,8 @@ from typing import Annotated
 import typer
 
 from paramove.cli import completions
+from paramove.documents.wording import printable
 from paramove.supervision.application import find_workspace
-from paramove.supervision.processes import printable
 from paramove.supervision.run_logs import LEVELS, SUPERVISOR, LogLine, RunLogs
 
 app = typer.Typer(add_completion=False)

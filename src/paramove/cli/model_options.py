@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ended
-from paramove.input_error import InputError
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
 from paramove.recording.writer import RecordingExistsError
-from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
     from paramove.phmm import MovementClassifier, ParametricHMM

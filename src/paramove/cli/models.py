@@ -11,9 +11,9 @@ import typer
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import PointOption, ended, table_of
 from paramove.cli.model_options import ModelArgument, loaded, model_files, one_sentence
-from paramove.input_error import InputError
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.phmm import ParametricHMM

@@ -12,8 +12,9 @@ from pathlib import Path
 from rich.console import Console
 
 from paramove.cli.live_view import AnnouncingView, with_page
-from paramove.documents.positions import LaunchFileError
-from paramove.supervision import application, exit_codes
+from paramove.documents import exit_codes
+from paramove.documents.positions import DocumentError
+from paramove.supervision import application
 from paramove.supervision.domain import DomainError, DomainNameError
 from paramove.supervision.environment import Environment, examined
 from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
@@ -67,7 +68,7 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
     except (LaunchFileMissingError, application.NoWorkspaceError) as error:
         errors.print(str(error))
         return exit_codes.INPUT_MISSING
-    except (LaunchFileError, DomainNameError) as error:
+    except (DocumentError, DomainNameError) as error:
         errors.print(str(error))
         if launch is not None and (left_out := _left_out(launch)):
             errors.print(f"note: --with leaves out what is laid over by default; name it too: --with {left_out}")

@@ -14,7 +14,7 @@ from paramove.cli import demos_import
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import ended, table_of
 from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_sentence
-from paramove.supervision.processes import printable
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.training.examining import Recognition

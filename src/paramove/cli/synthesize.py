@@ -10,7 +10,7 @@ import typer
 
 from paramove.cli.demos_options import ThetaOption, numbers
 from paramove.cli.model_options import ModelArgument, PlotOption, loaded, one_sentence
-from paramove.supervision.processes import printable
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.phmm import ParametricHMM
@@ -74,7 +74,7 @@ def _check(model: ParametricHMM, theta: object) -> None:
     """Ends the command for a wrong number of components; warns of values outside the training's bounds."""
     import numpy as np
 
-    from paramove.input_error import InputError
+    from paramove.documents.input_error import InputError
     from paramove.training.drawing import bounds, parameter_names, with_unit
 
     names, values = parameter_names(model), np.asarray(theta)

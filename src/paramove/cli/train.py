@@ -17,8 +17,8 @@ from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import SetArgument, ended, words
 from paramove.cli.evaluation_io import PROGRESS
 from paramove.cli.model_options import INTERRUPTED, one_sentence
-from paramove.input_error import InputError
-from paramove.supervision.processes import printable
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.training.examples import Examples

@@ -12,7 +12,7 @@ from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, appen
 from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
 from paramove.demonstrations.timing import FAST, FINGERTIP, SLOW, speeds
-from paramove.supervision.names import nearest
+from paramove.documents.wording import nearest
 
 
 def movements_by_speed(

@@ -19,8 +19,8 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.documents.atomic_writing import replacing
 from paramove.documents.files import read_text
-from paramove.documents.positions import Document, KeyPath, LaunchFileError, raise_any, read_mapping
-from paramove.supervision.names import closest, nearest
+from paramove.documents.positions import Document, DocumentError, KeyPath, raise_any, read_mapping
+from paramove.documents.wording import closest, nearest
 
 FILE_NAME = "labels.yaml"
 MAX_CHARACTERS = 4_000_000
@@ -34,7 +34,7 @@ HEAD = """\
 class LabelsError(DemonstrationError):
     """labels.yaml is wrong: one finding or several, a line each, that begin with file:line:column."""
 
-    def __init__(self, findings: LaunchFileError) -> None:
+    def __init__(self, findings: DocumentError) -> None:
         super().__init__(str(findings))
         self.findings = findings
 
@@ -93,7 +93,7 @@ class Labels:
     file: LabelsFile
     document: Document
 
-    def error(self, index: int, message: str, key: str = "") -> LaunchFileError:
+    def error(self, index: int, message: str, key: str = "") -> DocumentError:
         """A finding about segment number `index` from 0, at one of its keys or at its beginning."""
         path: KeyPath = ("segments", str(index), *([key] if key else []))
         return self.document.error(path, message)
@@ -118,7 +118,7 @@ def load_labels(path: Path) -> Labels:
         document = read_mapping(_text(path), str(path), max_characters=MAX_CHARACTERS, example=EXAMPLE)
         labels = Labels(path, _validated(document), document)
         raise_any(_contradictions(labels))
-    except LaunchFileError as error:
+    except DocumentError as error:
         raise LabelsError(error) from error
     return labels
 
@@ -135,7 +135,7 @@ def _validated(document: Document) -> LabelsFile:
         # A key that is missing only because it is mistyped is told once.
         mistyped = {(*loc[:-1], meant) for loc in unknown for meant in closest(str(loc[-1]), Segment.model_fields)}
         told = [one for one in error.errors() if one["type"] != "missing" or tuple(one["loc"]) not in mistyped]
-        raise LaunchFileError.of([_finding(document, found) for found in told]) from error
+        raise DocumentError.of([_finding(document, found) for found in told]) from error
 
 
 _EXPECTED = {
@@ -147,7 +147,7 @@ _EXPECTED = {
 }
 
 
-def _finding(document: Document, details: ErrorDetails) -> LaunchFileError:
+def _finding(document: Document, details: ErrorDetails) -> DocumentError:
     path = tuple(str(part) for part in details["loc"])
     keys = list((Segment if path[:1] == ("segments",) and len(path) > 2 else LabelsFile).model_fields)
     if details["type"] == "extra_forbidden":
@@ -158,9 +158,9 @@ def _finding(document: Document, details: ErrorDetails) -> LaunchFileError:
     return document.error(path, f"{'.'.join(path)}: {message}, found {details['input']!r:.80}")
 
 
-def _contradictions(labels: Labels) -> list[LaunchFileError]:
+def _contradictions(labels: Labels) -> list[DocumentError]:
     """Segments that contradict themselves or each other."""
-    findings: list[LaunchFileError] = []
+    findings: list[DocumentError] = []
     seen: dict[tuple[object, ...], int] = {}
     names = labels.file.parameters
     for kind, words in (("parameters", names), ("points", labels.file.points or [])):

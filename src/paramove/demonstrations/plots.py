@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.movement import DemonstrationError, Floats
 from paramove.documents.report_page import image, report_page
-from paramove.supervision.names import nearest
+from paramove.documents.wording import nearest
 
 DPI = 110
 FIGURE_IN = (13.0, 7.5)

@@ -9,8 +9,8 @@ from paramove.demonstrations.gaps import PointGap, fill_gaps
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
 from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
-from paramove.documents.positions import LaunchFileError, raise_any
-from paramove.supervision.names import nearest
+from paramove.documents.positions import DocumentError, raise_any
+from paramove.documents.wording import nearest
 
 
 def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:
@@ -22,7 +22,7 @@ def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:
     movements = [reader.movement(index, segment) for index, segment in enumerate(labels.file.segments)]
     try:
         raise_any(reader.findings)
-    except LaunchFileError as error:
+    except DocumentError as error:
         raise LabelsError(error) from error
     return [movement for movement in movements if movement is not None], reader.remarks
 
@@ -31,7 +31,7 @@ class _Reader:
     """Reads each recording once and collects what is wrong."""
 
     def __init__(self, labels: Labels) -> None:
-        self.findings: list[LaunchFileError] = []
+        self.findings: list[DocumentError] = []
         self.remarks: list[str] = []
         self._labels = labels
         self._recordings: dict[str, _Filled | None] = {}

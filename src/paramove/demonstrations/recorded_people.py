@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents.arrays import read_arrays
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from paramove.diagnosis.finding import Finding, Level, Machine
 from paramove.diagnosis.serial_ports import usable_ports
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors, in_words
 from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, BusScan, FoundServo, listed, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain

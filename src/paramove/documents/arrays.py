@@ -16,7 +16,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from paramove.documents.files import MEBIBYTE, size_of, unreadable
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 ARRAY_BYTES = 512 * MEBIBYTE
 """Of all arrays that are read: an hour of 40 points at 100 Hz has 350 MB."""

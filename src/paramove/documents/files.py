@@ -5,7 +5,7 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 MEBIBYTE = 2**20
 TEXT_BYTES = 512 * MEBIBYTE

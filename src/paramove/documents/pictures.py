@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents.files import MEBIBYTE, read_bytes, size_of, unreadable
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 MOST_PIXELS = 50_000_000
 """Of one picture, which may claim more than memory holds in a few bytes."""

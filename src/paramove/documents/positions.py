@@ -25,7 +25,8 @@ from ruamel.yaml.nodes import ScalarNode
 from ruamel.yaml.reader import ReaderError
 
 from paramove.documents.files import read_text
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import printable
 
 MAX_CHARACTERS = 100_000
 MAX_DEPTH = 20
@@ -50,7 +51,7 @@ class Position:
         return f"{source}:{self.line}:{self.column}" if self.line else source
 
 
-class LaunchFileError(ValueError):
+class DocumentError(ValueError):
     """Something in a launch file is wrong: one finding or several, a line each, that begin with their positions.
 
     Attributes:
@@ -59,7 +60,7 @@ class LaunchFileError(ValueError):
         others: Further findings.
     """
 
-    def __init__(self, position: Position, message: str, others: Sequence[LaunchFileError] = ()) -> None:
+    def __init__(self, position: Position, message: str, others: Sequence[DocumentError] = ()) -> None:
         self.position = position
         self.message = printable(message)
         self.others = tuple(others)
@@ -70,12 +71,12 @@ class LaunchFileError(ValueError):
         hidden = len(lines) - MAX_FINDINGS
         return "\n".join(lines[:MAX_FINDINGS] + ([f"and {hidden} more"] if hidden > 0 else []))
 
-    def __iter__(self) -> Iterator[LaunchFileError]:
+    def __iter__(self) -> Iterator[DocumentError]:
         """Each finding."""
         return iter((self, *self.others))
 
     @classmethod
-    def of(cls, findings: Sequence[LaunchFileError]) -> LaunchFileError:
+    def of(cls, findings: Sequence[DocumentError]) -> DocumentError:
         """One error that tells all findings, each once, from the top of each file down; at least one is needed."""
         flat = {(one.position, one.message): one for found in findings for one in found}
         sources = list(dict.fromkeys(position.source for position, _ in flat))
@@ -84,15 +85,10 @@ class LaunchFileError(ValueError):
         return cls(first.position, first.message, others)
 
 
-def raise_any(findings: Sequence[LaunchFileError]) -> None:
-    """Raises one LaunchFileError with all findings; nothing if there are none."""
+def raise_any(findings: Sequence[DocumentError]) -> None:
+    """Raises one DocumentError with all findings; nothing if there are none."""
     if findings:
-        raise LaunchFileError.of(findings)
-
-
-def printable(text: str) -> str:
-    """The text with control characters, which a terminal would obey, written as escapes."""
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
+        raise DocumentError.of(findings)
 
 
 @dataclass
@@ -109,9 +105,9 @@ class Document:
                 return self.positions[path[:length]]
         return Position("launch file")
 
-    def error(self, path: KeyPath, message: str) -> LaunchFileError:
+    def error(self, path: KeyPath, message: str) -> DocumentError:
         """An error at the place where `path` was written."""
-        return LaunchFileError(self.position(path), message)
+        return DocumentError(self.position(path), message)
 
     def overlaid(self, top: Document) -> Document:
         """This document with `top` laid over it: mappings merge, all else is replaced, null removes a key."""
@@ -145,15 +141,15 @@ def read_mapping(text: str, source: str, *, max_characters: int = MAX_CHARACTERS
     Tags, anchors, aliases, duplicate keys, keys that are no strings, numbers that are not finite, control characters,
     more than one document, more than `max_characters` and more than 20 levels are refused.
 
-    Raises LaunchFileError with the positions of all that is refused; what is no YAML ends the search.
+    Raises DocumentError with the positions of all that is refused; what is no YAML ends the search.
     """
     start = Position(source, 1, 1)
     data, positions = _read(text, source, max_characters)
     if data is None:
-        raise LaunchFileError(start, f"the file is empty; expected a mapping such as '{example}'")
+        raise DocumentError(start, f"the file is empty; expected a mapping such as '{example}'")
     if not isinstance(data, dict):
         kind = "list" if isinstance(data, list) else "single value"
-        raise LaunchFileError(start, f"expected a mapping at the top level, found a {kind}")
+        raise DocumentError(start, f"expected a mapping at the top level, found a {kind}")
     return Document(data, {(): start} | positions)
 
 
@@ -165,22 +161,22 @@ def read_document(path: Path, kind: str, raising: type[InputError] = InputError,
     text = read_text(path, kind, raising, 4 * MAX_CHARACTERS, remedy)
     try:
         return read_mapping(text, str(path), example="name: value")
-    except LaunchFileError as error:
+    except DocumentError as error:
         raise raising(f"{error}; expected a {kind} in YAML" + (f"; {remedy}" if remedy else "")) from error
 
 
 def read_value(text: str, source: str) -> Any:
-    """Reads one YAML value, such as the right side of `--set camera.rate_hz=15`; raises LaunchFileError."""
+    """Reads one YAML value, such as the right side of `--set camera.rate_hz=15`; raises DocumentError."""
     try:
         return _read(text, source, MAX_CHARACTERS)[0]
-    except LaunchFileError as error:  # lines and columns of an argument would only confuse
-        raise LaunchFileError.of([LaunchFileError(Position(source), one.message) for one in error]) from error
+    except DocumentError as error:  # lines and columns of an argument would only confuse
+        raise DocumentError.of([DocumentError(Position(source), one.message) for one in error]) from error
 
 
 def _read(text: str, source: str, max_characters: int) -> tuple[Any, dict[KeyPath, Position]]:
-    """The value of a text, None of an empty one, and where its keys and elements stood; raises LaunchFileError."""
+    """The value of a text, None of an empty one, and where its keys and elements stood; raises DocumentError."""
     if len(text) > max_characters:
-        raise LaunchFileError(Position(source), f"{len(text)} characters; at most {max_characters} are read")
+        raise DocumentError(Position(source), f"{len(text)} characters; at most {max_characters} are read")
     reader = _Reader(text, source)
     try:
         data = reader.document()
@@ -188,15 +184,15 @@ def _read(text: str, source: str, max_characters: int) -> tuple[Any, dict[KeyPat
         before = text[: error.position]
         where = Position(source, before.count("\n") + 1, len(before) - before.rfind("\n"))
         letter = text[error.position : error.position + 1]
-        raise LaunchFileError.of([*reader.refused, LaunchFileError(where, f"control character {letter!r}")]) from error
+        raise DocumentError.of([*reader.refused, DocumentError(where, f"control character {letter!r}")]) from error
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = Position(source, mark.line + 1, mark.column + 1) if mark else Position(source)
-        raise LaunchFileError.of([*reader.refused, LaunchFileError(where, _explained(error))]) from error
+        raise DocumentError.of([*reader.refused, DocumentError(where, _explained(error))]) from error
     except (YAMLError, RecursionError, ValueError, LookupError) as error:
-        if isinstance(error, LaunchFileError):
+        if isinstance(error, DocumentError):
             raise
-        raise LaunchFileError(Position(source), f"cannot be read as YAML: {' '.join(str(error).split())}") from error
+        raise DocumentError(Position(source), f"cannot be read as YAML: {' '.join(str(error).split())}") from error
     raise_any(reader.refused or reader.findings)
     return data, reader.positions
 
@@ -245,8 +241,8 @@ class _Reader:
 
     def __init__(self, text: str, source: str) -> None:
         self.positions: dict[KeyPath, Position] = {}
-        self.refused: list[LaunchFileError] = []
-        self.findings: list[LaunchFileError] = []
+        self.refused: list[DocumentError] = []
+        self.findings: list[DocumentError] = []
         self._source = source
         self._yaml = YAML(typ="safe", pure=True)
         self._yaml.version = (1, 2)
@@ -260,7 +256,7 @@ class _Reader:
             if isinstance(event, DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    raise LaunchFileError.of([*self.refused, LaunchFileError(self._at(event), _SECOND)])
+                    raise DocumentError.of([*self.refused, DocumentError(self._at(event), _SECOND)])
                 self._refuse_unwanted(event)
             elif isinstance(event, NodeEvent):
                 value = self._value(event, ())
@@ -273,7 +269,7 @@ class _Reader:
             return self._scalar(event) if isinstance(event, ScalarEvent) else None
         self._depth += 1
         if self._depth > MAX_DEPTH:
-            raise LaunchFileError(self._at(event), f"more than {MAX_DEPTH} levels of nesting")
+            raise DocumentError(self._at(event), f"more than {MAX_DEPTH} levels of nesting")
         value = self._mapping(path) if isinstance(event, MappingStartEvent) else self._list(path)
         self._depth -= 1
         return value
@@ -297,12 +293,12 @@ class _Reader:
                     self._value(event, place)
                 kind = "a mapping" if isinstance(event, MappingStartEvent) else "a list"
                 shown = f"'{key}'" if isinstance(event, ScalarEvent) else kind
-                self.findings.append(LaunchFileError(where, f"key {shown} is no string; write it in quotes"))
+                self.findings.append(DocumentError(where, f"key {shown} is no string; write it in quotes"))
             elif _CONTROL.search(key):
-                self.findings.append(LaunchFileError(where, f"control characters in the key {key[:80]!r}"))
+                self.findings.append(DocumentError(where, f"control characters in the key {key[:80]!r}"))
             elif key in result:
                 first = self.positions[place]
-                self.findings.append(LaunchFileError(where, f"duplicate key '{key}': it is in line {first.line} too"))
+                self.findings.append(DocumentError(where, f"duplicate key '{key}': it is in line {first.line} too"))
             else:
                 self.positions[place] = where
             value = self._value(next(self._events), place)
@@ -312,7 +308,7 @@ class _Reader:
     def _refuse_unwanted(self, event: Event) -> None:
         message = _refusal(event)
         if message:
-            self.refused.append(LaunchFileError(self._at(event), message))
+            self.refused.append(DocumentError(self._at(event), message))
 
     def _scalar(self, event: ScalarEvent) -> Any:
         tag = self._tag(event)
@@ -341,7 +337,7 @@ class _Reader:
         return str(tag).rpartition(":")[2]
 
     def _find(self, event: Event, message: str) -> None:
-        self.findings.append(LaunchFileError(self._at(event), message[:300]))
+        self.findings.append(DocumentError(self._at(event), message[:300]))
 
     def _at(self, event: Event) -> Position:
         return Position(self._source, event.start_mark.line + 1, event.start_mark.column + 1)

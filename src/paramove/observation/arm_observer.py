@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
 from paramove.observation.background_kernels import FULL

@@ -14,7 +14,7 @@ from paramove.cameras.aligned_views import AlignedViews, Views
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.measured_files import measured_cameras
 from paramove.cameras.watch import CameraWatch
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.objects.colour_tracker import Colour
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint, StereoBodyTracker
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from paramove.cameras.calibrated import WORLD_FRAME, CalibratedCamera
 from paramove.cameras.charuco_board import MARKERS, SIZE_UNTOLD_ID, Image, dictionary
 from paramove.cameras.stereo import StereoRig
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects.colour_tracker import Colour, ColourTracker
 

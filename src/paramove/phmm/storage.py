@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from paramove.documents.arrays import read_arrays
 from paramove.documents.atomic_writing import replacing
+from paramove.documents.input_error import InputError
 from paramove.hmm import TrainingOptions, TrainingSummary
-from paramove.input_error import InputError
 from paramove.phmm.description import MovementDescription
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 
 @dataclass(frozen=True)

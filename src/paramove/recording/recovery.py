@@ -13,7 +13,7 @@ from mcap.records import Schema
 
 from paramove.bus import topics
 from paramove.documents.atomic_writing import rename_durably
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.recording.damage import Content, Damage, Sound, Survey, messages_of, survey
 from paramove.recording.writer import RecordingExistsError, RecordingWriter, schema_of
 

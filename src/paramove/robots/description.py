@@ -5,7 +5,6 @@ The file speaks of degrees because the manuals do; everything that leaves this m
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.wording import nearest
 from paramove.robots.arm_kinematics import ArmKinematics
 from paramove.robots.description_file import (
     ArmPart,
@@ -29,6 +29,7 @@ from paramove.robots.description_file import (
 )
 from paramove.robots.joint_units import JointUnits
 from paramove.robots.planar_arm import PlanarArm
+from paramove.safety.limits import MotionLimits
 
 __all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
 
@@ -128,6 +129,21 @@ class RobotDescription:
         """Number of joints."""
         return len(self.joint_names)
 
+    @property
+    def motion_limits(self) -> MotionLimits:
+        """The soft position range and the operating limits, at the stream's period."""
+        return MotionLimits(
+            names=self.joint_names,
+            lower=self.soft_lower,
+            upper=self.soft_upper,
+            motor_velocity=self.velocity,
+            velocity=self.operating_velocity,
+            acceleration=self.operating_acceleration,
+            stop_acceleration=self.stop_acceleration,
+            jerk=self.jerk,
+            dt_s=self.stream.period_us * 1e-6,
+        )
+
     @cached_property
     def _places(self) -> dict[str, int]:
         return {name: place for place, name in enumerate(self.joint_names)}
@@ -140,9 +156,7 @@ class RobotDescription:
         """
         place = self._places.get(joint)
         if place is None:
-            near = difflib.get_close_matches(joint, self.joint_names, n=1)
-            hint = f"; nearest is {near[0]!r}" if near else ""
-            raise DescriptionError(f"{self.name} has no joint {joint!r}{hint}")
+            raise DescriptionError(f"{self.name} has no joint {joint!r}; {nearest(joint, self.joint_names)}")
         return place
 
     def indices(self, joints: Iterable[str]) -> NDArray[np.intp]:

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from paramove.documents.atomic_writing import replacing
 from paramove.runs.recorded_run import RunFolderError, gaps_in
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 from paramove.supervision.queued_output import QueuedOutput
 
 Evaluate = Callable[[argparse.Namespace, Console], bool | None]

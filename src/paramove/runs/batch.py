@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from paramove.documents.atomic_writing import replacing
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 APPLICATION = "rule_learning"
 EVALUATOR = "paramove.runs.rule_learning"

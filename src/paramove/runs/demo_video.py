@@ -19,7 +19,7 @@ from paramove.runs.run_summary import RunEvaluation
 from paramove.runs.story import Story
 from paramove.runs.video_frame import SIZE, VideoFrame
 from paramove.runs.video_writer import VideoError, VideoWriter
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 Picture = NDArray[np.uint8]
 

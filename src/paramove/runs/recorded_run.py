@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.documents.positions import read_document
 from paramove.runs.traffic import Traffic
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import Recorded

@@ -21,7 +21,7 @@ from paramove.bus import topics
 from paramove.documents.positions import read_document
 from paramove.runs.after_a_run import evaluated, write_run_json
 from paramove.runs.recorded_run import RunFolderError
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import PartedRecording
 

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.robots.description import RobotDescription
-
 FloatArray = NDArray[np.float64]
 
 # Accelerations are taken over two spans of this length; a span is at least one row. A single 1 ms difference of angles
@@ -78,21 +76,6 @@ class MotionLimits:
     stop_acceleration: FloatArray
     jerk: FloatArray
     dt_s: float
-
-    @classmethod
-    def of(cls, description: RobotDescription) -> MotionLimits:
-        """The soft position range and the operating limits of a robot, at its stream's period."""
-        return cls(
-            names=description.joint_names,
-            lower=description.soft_lower,
-            upper=description.soft_upper,
-            motor_velocity=description.velocity,
-            velocity=description.operating_velocity,
-            acceleration=description.operating_acceleration,
-            stop_acceleration=description.stop_acceleration,
-            jerk=description.jerk,
-            dt_s=description.stream.period_us * 1e-6,
-        )
 
     @property
     def span(self) -> int:

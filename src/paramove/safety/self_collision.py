@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 
 FloatArray = NDArray[np.float64]
 

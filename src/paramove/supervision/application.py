@@ -39,7 +39,7 @@ def find_workspace(start: Path) -> Path:
 
 
 def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
-    """Checks all that can be known before a process starts; returns the interfaces; raises LaunchFileError."""
+    """Checks all that can be known before a process starts; returns the interfaces; raises DocumentError."""
     interfaces = read_interfaces(launch, workspace)
     check_wiring(launch, interfaces, workspace)
     return interfaces
@@ -56,7 +56,7 @@ def run(
         make_view: Gets the run folder, so that it can be shown.
         runs: Where the run folder is made; default `runs` in the workspace.
 
-    Raises LaunchFileError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
+    Raises DocumentError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
     """
     interfaces = check(launch, workspace)
     allow_open_files()

@@ -11,8 +11,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from paramove.documents.wording import nearest
 from paramove.supervision.control import Answer
-from paramove.supervision.names import nearest
 from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 
 

@@ -12,25 +12,25 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from paramove.documents.files import read_text
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import (
     MAX_CHARACTERS,
     Document,
+    DocumentError,
     KeyPath,
-    LaunchFileError,
     Position,
     raise_any,
     read_mapping,
 )
-from paramove.input_error import InputError
+from paramove.documents.wording import closest, nearest
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
-from paramove.supervision.names import closest, nearest, overlay_folder
 from paramove.supervision.references import with_values, wrong_references
 
 _QUOTED = re.compile(r"'([^']*)'")
 _PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
-class LaunchFileMissingError(LaunchFileError):
+class LaunchFileMissingError(DocumentError):
     """There is no launch file or overlay of that name."""
 
 
@@ -45,7 +45,7 @@ class Launch:
     seed: int | None = None
     headless: bool = False
 
-    def error(self, path: KeyPath, message: str) -> LaunchFileError:
+    def error(self, path: KeyPath, message: str) -> DocumentError:
         """An error at the place where `path` was written."""
         return self.document.error(path, message)
 
@@ -69,14 +69,14 @@ def load(
         seed: Written into each of the file's `seed_parameters`.
         headless: Sets the parameters that the file names under `headless`, before `settings`.
 
-    Raises LaunchFileMissingError, or LaunchFileError with all that is wrong.
+    Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
     path = path_of(folder, name, "launch file")
     document, chosen = _with_overlays(folder, path.stem, _read(path), overlays)
     document, findings = with_values(document, settings, seed, headless, overlays is not None)
     try:
         file = validated(document)
-    except LaunchFileError as error:
+    except DocumentError as error:
         findings.append(error)
     findings += wrong_references(document)
     raise_any(findings)
@@ -86,7 +86,7 @@ def load(
 def _with_overlays(
     folder: Path, name: str, document: Document, overlays: Sequence[str] | None
 ) -> tuple[Document, list[str]]:
-    """The document with its overlays, and their names; raises LaunchFileError with what is wrong in any of them."""
+    """The document with its overlays, and their names; raises DocumentError with what is wrong in any of them."""
     paths, findings = [], []
     if overlays is None:
         chosen = document.data.get("default_overlays", [])
@@ -109,7 +109,7 @@ def _with_overlays(
     for path in paths:
         try:
             top = _read(path)
-        except LaunchFileError as error:
+        except DocumentError as error:
             findings.append(error)
             continue
         if "default_overlays" in top.data:
@@ -121,11 +121,11 @@ def _with_overlays(
 
 
 def validated(document: Document) -> LaunchFile:
-    """The document as a `LaunchFile`; raises LaunchFileError with every finding, one per line."""
+    """The document as a `LaunchFile`; raises DocumentError with every finding, one per line."""
     try:
         return LaunchFile.model_validate(document.data)
     except ValidationError as error:
-        raise LaunchFileError.of([_finding(document, found) for found in _causes(error.errors())]) from error
+        raise DocumentError.of([_finding(document, found) for found in _causes(error.errors())]) from error
 
 
 def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
@@ -136,6 +136,12 @@ def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
             *above, key = (str(part) for part in found["loc"])
             mistyped |= {(*above, meant) for meant in closest(key, _keys_at(tuple(above)))}
     return [found for found in details if found["type"] != "missing" or tuple(map(str, found["loc"])) not in mistyped]
+
+
+def overlay_folder(folder: Path, launch: str, overlay: str) -> Path:
+    """Where an overlay lies: made for this launch file alone in `overlays/<launch file>`, else in `overlays`."""
+    own = folder / "overlays" / launch
+    return own if (own / f"{overlay}.yaml").is_file() else folder / "overlays"
 
 
 def names_in(folder: Path) -> list[str]:
@@ -170,11 +176,11 @@ def _read(path: Path) -> Document:
     try:
         text = read_text(path, "launch file", most_bytes=4 * MAX_CHARACTERS)
     except InputError as error:
-        raise LaunchFileError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
+        raise DocumentError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
     return read_mapping(text, str(path))
 
 
-def _finding(document: Document, details: ErrorDetails) -> LaunchFileError:
+def _finding(document: Document, details: ErrorDetails) -> DocumentError:
     """One finding of pydantic with the position in the file and the nearest valid key."""
     path = tuple(str(part) for part in details["loc"] if part != "[key]")
     name = ".".join(path) or "the launch file"
@@ -221,7 +227,7 @@ def _keys_at(path: KeyPath) -> list[str]:
 def start_waves(file: LaunchFile) -> list[list[str]]:
     """Nodes in the order of their start: each wave needs only nodes of earlier waves.
 
-    Raises LaunchFileError if nodes wait for each other in a circle, which `load` has refused before.
+    Raises DocumentError if nodes wait for each other in a circle, which `load` has refused before.
     """
     waves: list[list[str]] = []
     placed: set[str] = set()
@@ -229,7 +235,7 @@ def start_waves(file: LaunchFile) -> list[list[str]]:
         wave = [name for name, node in file.nodes.items() if name not in placed and placed.issuperset(node.after)]
         if not wave:
             left = [name for name in file.nodes if name not in placed]
-            raise LaunchFileError(Position("launch file"), f"these nodes can never start: {', '.join(left)}")
+            raise DocumentError(Position("launch file"), f"these nodes can never start: {', '.join(left)}")
         waves.append(wave)
         placed.update(wave)
     return waves

@@ -17,16 +17,16 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from paramove.documents.positions import LaunchFileError
+from paramove.documents.positions import DocumentError
+from paramove.documents.wording import nearest
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.names import nearest
 
 PATIENCE_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
 
 
-def wrong_parameters(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> Iterator[LaunchFileError]:
+def wrong_parameters(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> Iterator[DocumentError]:
     """What the nodes' own Config refuses of their parameters, and modules that cannot be imported."""
     asked = {
         name: (launch.file.nodes[name].module, launch.file.nodes[name].parameters)

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
+from paramove.documents.wording import printable
+
 _HERE = Path(__file__).parent
 _NO_SITE = ("-I", "-S")  # these two files need the standard library only, and start faster so
 
@@ -170,8 +172,3 @@ def _decoded(opened: IO[bytes]) -> list[str]:
     opened.seek(0, os.SEEK_END)
     opened.seek(max(0, opened.tell() - 100_000))
     return opened.read().decode("utf-8", errors="replace").splitlines()
-
-
-def printable(text: str) -> str:
-    """The text without characters that could steer a terminal: they are written as escapes."""
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

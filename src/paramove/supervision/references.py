@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from paramove.documents.positions import Document, LaunchFileError, Position, read_value
-from paramove.supervision.names import nearest
+from paramove.documents.positions import Document, DocumentError, Position, read_value
+from paramove.documents.wording import nearest
 
-Findings = list[LaunchFileError]
+Findings = list[DocumentError]
 
 
 def with_values(
@@ -32,31 +32,31 @@ def with_values(
         where = Position(f"--set {setting}")
         target, equals, text = setting.partition("=")
         if not equals or not all(target.strip().split(".")) or "." not in target:
-            findings.append(LaunchFileError(where, "expected node.parameter=value, such as simulator.seed=7"))
+            findings.append(DocumentError(where, "expected node.parameter=value, such as simulator.seed=7"))
             continue
         try:
             values.append((target.strip(), read_value(text, str(where)), where))
-        except LaunchFileError as error:
+        except DocumentError as error:
             findings.append(error)
     if seed is not None:
         where = Position(f"--seed {seed}")
         targets = document.data.get("seed_parameters")
         if not targets or not isinstance(targets, list):
             message = "this launch file has no 'seed_parameters', so nothing in it takes a seed"
-            findings.append(LaunchFileError(where, message))
+            findings.append(DocumentError(where, message))
             targets = []
         values += [(str(target), seed, where) for target in targets]
     for target, value, where in values:
         node, *parameters = target.split(".")
         if node not in _nodes(document):
-            findings.append(LaunchFileError(where, f"there is no node '{node}'; {nearest(node, _nodes(document))}"))
+            findings.append(DocumentError(where, f"there is no node '{node}'; {nearest(node, _nodes(document))}"))
         elif (
             where.source.startswith("--set")
             and _is_connection(document, target)
             and not (named and _value_at(document, node, parameters))
         ):
             message = f"say with an overlay what is connected there, such as --with real --set {target}=..."
-            findings.append(LaunchFileError(where, message))
+            findings.append(DocumentError(where, message))
         elif all(parameters) and parameters:  # else `wrong_references` tells of it
             document = document.overlaid(_parameter(node, parameters, value, where))
     return document, findings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from paramove.supervision.exit_codes import NEVER_RESTARTED, OK
+from paramove.documents.exit_codes import NEVER_RESTARTED, OK
 from paramove.supervision.launch_schema import NodeSettings
 
 LONGEST_BACKOFF_S = 30.0

@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 import psutil
 
+from paramove.documents.exit_codes import FAILURE, OK, describe
+from paramove.documents.wording import printable
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision.exit_codes import FAILURE, OK, describe
 from paramove.supervision.launch_schema import NodeSettings
-from paramove.supervision.processes import SupervisedProcess, printable
+from paramove.supervision.processes import SupervisedProcess
 from paramove.supervision.restarts import RestartPolicy, Verdict
 
 

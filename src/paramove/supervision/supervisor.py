@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from paramove.documents import exit_codes
 from paramove.linear_algebra_threads import ONE_THREAD
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision import by_hand, exit_codes
+from paramove.supervision import by_hand
 from paramove.supervision.control import Answer, ControlServer
 from paramove.supervision.domain import Domain
 from paramove.supervision.events import EventLog, signal_name

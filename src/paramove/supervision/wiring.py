@@ -7,17 +7,17 @@ from pathlib import Path
 
 from paramove.bus import topics
 from paramove.bus.topics import CLOCK, Topic
-from paramove.documents.positions import LaunchFileError, raise_any
+from paramove.documents.positions import DocumentError, raise_any
+from paramove.documents.wording import nearest
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.names import nearest
 from paramove.supervision.parameters import wrong_parameters
 
 
 def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:
     """Interface of every node.
 
-    Raises LaunchFileError with every `module` and `after_run` that does not exist, and with the wrong parameters of
+    Raises DocumentError with every `module` and `after_run` that does not exist, and with the wrong parameters of
     the nodes that do.
     """
     interfaces: dict[str, Interface] = {}
@@ -43,12 +43,12 @@ def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace:
     Every topic that is heard has a speaker, no topic has two, only nodes with `truth: true` know a truth topic, topics
     that the file names exist, and each node's own Config takes its parameters.
 
-    Raises LaunchFileError with all that is wrong, each at its place in the launch file.
+    Raises DocumentError with all that is wrong, each at its place in the launch file.
     """
     raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
 
 
-def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     """What is wrong with the clock and the topics."""
     yield from _clock(launch, interfaces)
     yield from _speakers(launch, interfaces)
@@ -76,7 +76,7 @@ def unsaid(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tupl
                 yield name, topic
 
 
-def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     bus = launch.file.bus
     if bus.clock == "simulated" and clock_speaker(interfaces) is None:
         yield launch.error(("bus", "clock"), "the clock is simulated, but no node of this launch file says it")
@@ -84,7 +84,7 @@ def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[Laun
         yield launch.error(("bus", "lockstep"), "lockstep needs 'clock: simulated'")
 
 
-def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     speakers: dict[str, str] = {}
     for name, interface in interfaces.items():
         for topic in interface.says:
@@ -97,7 +97,7 @@ def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[L
                 )
 
 
-def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     for name, interface in interfaces.items():
         for topic in (*interface.hears, *interface.says):
             if topic.truth and not launch.file.nodes[name].truth:
@@ -112,7 +112,7 @@ def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[La
             )
 
 
-def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[LaunchFileError]:
+def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     """Topics that `remaps` and `optional_topics` name and that are not there, or are of another kind."""
     for name, interface in interfaces.items():
         node = launch.file.nodes[name]

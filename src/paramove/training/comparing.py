@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.phmm import MovementClassifier, ParametricHMM
 from paramove.training.drawing import bounds, dimension, parameter_names, point_names, raster
 from paramove.training.examining import Examiner

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from paramove.demonstrations.plots import POINTS_FIRST
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import nearest
 from paramove.phmm import ParametricHMM
-from paramove.supervision.names import nearest
 from paramove.training.examples import is_place
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from paramove.demonstrations import DemonstrationError, Movement
 from paramove.demonstrations.body_frame import BODY, in_body_frame, mirrored
 from paramove.demonstrations.timing import resampled
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of

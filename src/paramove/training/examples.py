@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.movement import AXIS_ENDINGS
+from paramove.documents.wording import nearest
 from paramove.phmm import MovementDescription
 from paramove.robots.arm_points import ARM_BASE
-from paramove.supervision.names import nearest
 
 Floats = NDArray[np.float64]
 

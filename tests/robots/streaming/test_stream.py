@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.robots.joint_units import JointRangeError
 from paramove.robots.streaming.stream import StreamReader, StreamWriter
-from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import stop_ramp
 from tests.robots.hoap3.movements import HOAP3, swing
 
 EPOCH = 7
-LIMITS = MotionLimits.of(HOAP3)
+LIMITS = HOAP3.motion_limits
 PATH = swing(HOAP3, duration_s=1.2)
 
 

@@ -7,7 +7,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from sim.persons import clips
 from sim.persons.clips import Clip, Truth, pack, read_clip, read_clips, unpacked, write_clip

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from paramove.supervision.exit_codes import JUDGED_A_FAILURE
+from paramove.documents.exit_codes import JUDGED_A_FAILURE
 from studies.__main__ import app
 from studies.chapter4.experiments import QUICK, experiments
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from paramove.supervision.exit_codes import JUDGED_A_FAILURE
+from paramove.documents.exit_codes import JUDGED_A_FAILURE
 from sim.persons import clips
 from studies.__main__ import app
 from studies.chapter6 import experiments, report

@@ -9,7 +9,7 @@ import pytest
 from paramove.action_space.placement import PersonPlacement
 from paramove.cameras.calibrated import CalibratedCamera, write_cameras
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes
 from paramove.observation.arm_observer import ArmObserver
 from sim.persons.actions import EYE, FAR_ORIGIN, far_place

@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from paramove.demonstrations.reaching import reaching_grid_demonstrations
+from paramove.documents import exit_codes
 from paramove.hmm import TrainingOptions
 from paramove.hmm.sequences import resample
 from paramove.phmm.synchronisation import synchronised
-from paramove.supervision import exit_codes
 from studies.__main__ import app
 from studies.imitation.experiment import (
     CENTRE,

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from studies.real_images import replay
 from studies.real_images.experiment import (
     JUDGED,

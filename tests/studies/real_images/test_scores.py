@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from studies.real_images.replay import Said
 from studies.real_images.scores import (
     GOAL_PX,

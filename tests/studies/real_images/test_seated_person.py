@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from studies.real_images import seated_person
 from tests.studies.real_images.made_up import write_lens
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +15,7 @@ from paramove.demonstrations.importing.raw import RawTake
 from paramove.demonstrations.movement import DemonstrationError, Floats, place_of_theta
 from paramove.demonstrations.writing import Take, recording_name
 from paramove.documents.positions import read_document
-from paramove.supervision.names import nearest
+from paramove.documents.wording import closest, nearest
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"
@@ -140,8 +139,7 @@ def chosen_points(
     for point, sources in wanted.items():
         unknown = [source for source in sources if source not in full and source not in short]
         if unknown:
-            close = difflib.get_close_matches(unknown[0], [*short], n=1)
-            hint = f"; did you mean '{close[0]}'?" if close else ""
+            hint = "".join(f"; did you mean '{one}'?" for one in closest(unknown[0], short))
             raise DemonstrationError(f"{file} has no point '{unknown[0]}' for {point}{hint} It has {', '.join(names)}")
         numbers = [full.get(source, short.get(source, 0)) for source in sources]
         columns.append(positions[:, numbers].mean(axis=1) if len(numbers) > 1 else positions[:, numbers[0]])

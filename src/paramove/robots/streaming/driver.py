@@ -24,7 +24,6 @@ from paramove.robots.streaming.robot_report import RobotReport
 from paramove.robots.streaming.stream import StreamWriter
 from paramove.safety.core import TOUCHED, SafetyCore
 from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
-from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s
 from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
 
@@ -88,7 +87,7 @@ class ArmDriver:
         self._no_program = no_program
         self._settings = settings
         self._clearance = clearance
-        self._limits = MotionLimits.of(description)
+        self._limits = description.motion_limits
         self._ahead_rows = int(np.ceil(longest_path_s(self._limits) / self._limits.dt_s))
         self._start_tolerance = _start_tolerance(description)
         self._begin_at(0)

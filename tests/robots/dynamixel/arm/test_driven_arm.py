@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from paramove.bus import topics
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import SLOW_NS, DrivenArm

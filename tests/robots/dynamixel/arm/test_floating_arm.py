@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.arm.floating_arm import ArmWeight, FloatingArm
 from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import Patience
@@ -187,7 +187,7 @@ def test_the_line_of_a_stop_button_that_is_not_there_is_pressed_from_the_start(t
 def test_where_an_arm_may_go_limp_must_be_told_for_joints_that_it_has(tmp_path):
     with pytest.raises(DescriptionError, match="needs `rest_deg`: where can the arm go limp"):
         setup(tmp_path / "port", on_exit="rest_then_off").driven_arm(tmp_path)
-    with pytest.raises(DescriptionError, match=r"'shoulder_pam'.*nearest is 'shoulder_pan'"):
+    with pytest.raises(DescriptionError, match=r"'shoulder_pam'.*'shoulder_pan'"):
         setup(tmp_path / "port", on_exit="rest_then_off", rest_deg={"shoulder_pam": 3.0}).driven_arm(tmp_path)
     with pytest.raises(ValidationError, match="finite"):
         setup(tmp_path / "port", on_exit="rest_then_off", rest_deg={"shoulder_pan": float("nan")})

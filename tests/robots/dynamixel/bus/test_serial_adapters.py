@@ -2,7 +2,7 @@
 
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE, serial_adapter, serial_adapters, serial_of
 
 

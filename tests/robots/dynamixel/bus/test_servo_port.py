@@ -9,7 +9,7 @@ import sys
 import pytest
 from dynamixel_sdk import COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import LATENCY_S, PortLostError, ServoPort
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator

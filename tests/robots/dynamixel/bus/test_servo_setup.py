@@ -2,7 +2,7 @@
 
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import ServoPort

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.calibration.arm_plan import PITCH, ROLL, ROOM, YAW, load_plan
 

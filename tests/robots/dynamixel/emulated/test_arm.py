@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.emulated.arm import EmulatedArm
 from paramove.robots.dynamixel.emulated.control import tell

@@ -6,7 +6,7 @@ import stat
 
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
 from paramove.robots.dynamixel.emulated.control import ControlSocket, tell
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator

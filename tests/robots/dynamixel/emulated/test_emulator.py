@@ -18,7 +18,7 @@ from dynamixel_sdk import (
     port_handler,
 )
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.packets import Instruction, Packet, StatusError, encoded
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, XL330_M288, XL430_W250, XM430_W350
 from paramove.robots.dynamixel.emulated import servo as emulated_servo

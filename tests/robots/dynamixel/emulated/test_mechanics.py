@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.packets import ALERT, Instruction, StatusError
 from paramove.robots.dynamixel.bus.servo_models import (
     MODELS,

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.packets import ALERT, BROADCAST, Instruction, Packet, PacketReader, encoded
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.emulated.body import HardwareError
@@ -232,7 +232,7 @@ def test_the_state_and_what_was_found_are_told(bench):
         ("voltage -3", "0 to 60 V"),
         ("torque 1 up", "torque is on or off"),
         ("eeprom 1 3", "eeprom ID ITEM VALUE"),
-        ("eeprom 1 Max Position Limitt 3", "nearest is 'Max Position Limit'"),
+        ("eeprom 1 Max Position Limitt 3", "'Max Position Limit'"),
         ("eeprom 1 Max Position Limit 1.5", "whole numbers"),
         ("eeprom 1 ID 300", "1 bytes, which cannot hold 300"),
         ("dup 1 xl999", "servo model 'xl999' is not known"),

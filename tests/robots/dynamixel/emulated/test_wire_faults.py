@@ -2,7 +2,7 @@
 
 import pytest
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.packets import DamagedPacket, Instruction, Packet, PacketReader, encoded
 from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 

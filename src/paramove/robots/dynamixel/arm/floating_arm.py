@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S

@@ -17,7 +17,7 @@ from typing import Self
 
 import numpy as np
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.exit_movement import LONGEST_S, MARGIN_S, movement_to

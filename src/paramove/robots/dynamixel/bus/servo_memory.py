@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import nearest
 from paramove.robots.dynamixel.bus.packets import StatusError
 from paramove.robots.dynamixel.bus.servo_models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
 
@@ -99,8 +99,7 @@ class ServoMemory:
     def register(self, name: str) -> Register:
         """Raises InputError, with the nearest name, if the model has none of this name."""
         if name not in self.model.registers:
-            near = difflib.get_close_matches(name, self.model.registers, n=1) or list(self.model.registers)
-            raise InputError(f"{self.model.name} has no register {name!r}; nearest is {near[0]!r}")
+            raise InputError(f"{self.model.name} has no register {name!r}; {nearest(name, self.model.registers)}")
         return self.model.registers[name]
 
     def __contains__(self, name: str) -> bool:

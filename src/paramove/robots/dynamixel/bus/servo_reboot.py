@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError

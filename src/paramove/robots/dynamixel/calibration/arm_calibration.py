@@ -23,8 +23,8 @@ from ruamel.yaml import YAML
 
 from paramove.documents.atomic_writing import replacing
 from paramove.documents.findings import findings
+from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-from paramove.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.robots.description import Chain, RobotDescription
 from paramove.robots.dynamixel.bus.servo_models import model_named
 

@@ -11,7 +11,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from paramove.input_error import InputError
+from paramove.documents.input_error import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.bus.servo_memory import CURRENT_BASED_POSITION_MODE

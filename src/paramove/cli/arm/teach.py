@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm_options import (
+from paramove.cli.arm.options import (
     ByIdOption,
     DataOption,
     OpenArm,
@@ -22,9 +22,9 @@ from paramove.cli.arm_options import (
     explained,
     open_arm,
 )
-from paramove.cli.terminal_person import QuitError, TerminalPerson
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
+from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.documents import exit_codes
+from paramove.documents.wording import printable
 from paramove.supervision.queued_output import QueuedOutput
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from typer.testing import CliRunner
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
+from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
-from paramove.cli.terminal_person import TerminalPerson
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.operator.jogging import Jogging
@@ -131,7 +131,7 @@ def jogged(monkeypatch, arm, first):
 
     monkeypatch.setattr(Jogging, "hear_status", hear_and_press)
     with os.fdopen(read) as source:
-        monkeypatch.setattr("paramove.cli.arm_jog.TerminalPerson", lambda: TerminalPerson(source))
+        monkeypatch.setattr("paramove.cli.arm.jog.TerminalPerson", lambda: TerminalPerson(source))
         done = CliRunner().invoke(build("arm"), ["arm", "jog", "--step", "3"])
     os.close(write)
     return done
@@ -172,7 +172,7 @@ def test_a_terminal_that_takes_nothing_keeps_no_key_from_the_arm(folder):
 
 
 def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
-    monkeypatch.setattr("paramove.cli.arm_jog.SILENT_S", 0.0)
+    monkeypatch.setattr("paramove.cli.arm.jog.SILENT_S", 0.0)
     with running(folder, ["q"]) as arm:
         done = jogged(monkeypatch, arm, "a")
     assert "not heard" in done.stdout
@@ -180,10 +180,10 @@ def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
 
 
 def test_without_an_arm_it_says_so(folder, monkeypatch):
-    monkeypatch.setattr("paramove.cli.arm_jog.PATIENCE_S", 0.2)
+    monkeypatch.setattr("paramove.cli.arm.jog.PATIENCE_S", 0.2)
     read, write = os.pipe()
     with os.fdopen(read) as source:
-        monkeypatch.setattr("paramove.cli.arm_jog.TerminalPerson", lambda: TerminalPerson(source))
+        monkeypatch.setattr("paramove.cli.arm.jog.TerminalPerson", lambda: TerminalPerson(source))
         done = CliRunner().invoke(build("arm"), ["arm", "jog"])
     os.close(write)
     assert done.exit_code == 69
@@ -199,8 +199,8 @@ def test_beside_another_speaker_it_does_not_begin(folder):
 
 
 def test_in_a_narrow_terminal_the_line_is_written_anew_and_ended(folder, monkeypatch):
-    monkeypatch.setattr("paramove.cli.arm_jog.sys", SimpleNamespace(stdout=SimpleNamespace(isatty=lambda: True)))
-    monkeypatch.setattr("paramove.cli.arm_jog.shutil.get_terminal_size", lambda: os.terminal_size((20, 2)))
+    monkeypatch.setattr("paramove.cli.arm.jog.sys", SimpleNamespace(stdout=SimpleNamespace(isatty=lambda: True)))
+    monkeypatch.setattr("paramove.cli.arm.jog.shutil.get_terminal_size", lambda: os.terminal_size((20, 2)))
     with running(folder, ["1+", "q"]) as arm:
         done = jogged(monkeypatch, arm, "a")
     shown = [piece for piece in done.stdout.split("\r")[1:] if not piece.endswith("\n")]

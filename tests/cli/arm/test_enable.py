@@ -9,9 +9,9 @@ import typer
 from typer.testing import CliRunner
 
 from paramove.bus.endpoint import TopicTakenError
-from paramove.cli.arm_enable import enable
+from paramove.cli.arm.enable import enable
+from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
-from paramove.cli.terminal_person import TerminalPerson
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 
 FAULTS = [SafetyFault(code=str(number), sentence=f"reason {number}") for number in (1, 2)]

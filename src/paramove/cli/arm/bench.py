@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm_options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
+from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
 from paramove.cli.bus_options import JsonOption
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.bus.bench import BusBench

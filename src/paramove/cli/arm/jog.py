@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.cli.arm_options import ended
+from paramove.cli.arm.options import ended
+from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
 from paramove.cli.bus_options import DomainOption, bus_folder
-from paramove.cli.terminal_person import QuitError, TerminalPerson
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
+from paramove.documents import exit_codes
+from paramove.documents.wording import printable
 from paramove.supervision.queued_output import QueuedOutput
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from paramove.cli.arm_options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
-from paramove.supervision import exit_codes
+from paramove.cli.arm.options import BaudOption, ByIdOption, DataOption, SerialOption, ended, open_arm
+from paramove.documents import exit_codes
 
 
 def reboot(

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.cli.arm_options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
+from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
 from paramove.cli.bus_options import JsonOption, show
+from paramove.documents import exit_codes
 from paramove.robots.dynamixel.bus.hardware_error import in_words
 from paramove.robots.dynamixel.bus.serial_adapters import serial_adapters
-from paramove.supervision import exit_codes
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.bus.scan import FoundServo

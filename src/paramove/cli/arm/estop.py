@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import typer
 
-from paramove.cli.arm_options import ended
+from paramove.cli.arm.options import ended
 from paramove.cli.bus_options import DomainOption
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 PATIENCE_S = 1.0
 REAL_ONE = "use the switch of the motors' power: that one is the real emergency stop"

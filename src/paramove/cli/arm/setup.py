@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
-from paramove.cli.terminal_person import QuitError, TerminalPerson
-from paramove.input_error import InputError
-from paramove.supervision import exit_codes
+from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.bus.scan import FoundServo

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.input_error import InputError
+from paramove.documents import exit_codes
+from paramove.documents.input_error import InputError
+from paramove.documents.wording import printable
 from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE as BY_ID_VARIABLE
 from paramove.robots.dynamixel.bus.serial_adapters import SerialAdapter, serial_adapter
 from paramove.robots.dynamixel.calibration.path import VARIABLE as DATA_VARIABLE
 from paramove.robots.dynamixel.calibration.path import calibration_path
-from paramove.supervision import exit_codes
-from paramove.supervision.processes import printable
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.bus.servo_chain import ServoChain

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.cli.arm_options import ended
+from paramove.cli.arm.options import ended
+from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.bus_options import DomainOption
-from paramove.cli.terminal_person import TerminalPerson
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
     from paramove.msgs.safety_state_pb2 import SafetyState

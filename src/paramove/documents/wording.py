@@ -1,10 +1,9 @@
-"""Names of launch files and their keys: which were probably meant, and where the files lie."""
+"""Words in messages: which name was probably meant, and text that no terminal obeys."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from pathlib import Path
 
 
 def closest(word: str, known: Iterable[str]) -> list[str]:
@@ -21,7 +20,6 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"there are: {', '.join(choices)}" if choices else "there are none"
 
 
-def overlay_folder(folder: Path, launch: str, overlay: str) -> Path:
-    """Where an overlay lies: made for this launch file alone in `overlays/<launch file>`, else in `overlays`."""
-    own = folder / "overlays" / launch
-    return own if (own / f"{overlay}.yaml").is_file() else folder / "overlays"
+def printable(text: str) -> str:
+    """The text with control characters, which a terminal would obey, written as escapes."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

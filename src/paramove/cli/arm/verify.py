@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from paramove.cli.arm_options import (
+from paramove.cli.arm.options import (
     BaudOption,
     ByIdOption,
     DataOption,
@@ -20,7 +20,7 @@ from paramove.cli.arm_options import (
     open_arm,
 )
 from paramove.cli.bus_options import JsonOption, show
-from paramove.supervision import exit_codes
+from paramove.documents import exit_codes
 
 FINDING = 3
 CHOICE = (

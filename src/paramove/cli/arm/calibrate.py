@@ -8,9 +8,9 @@ from importlib.metadata import version
 
 import typer
 
-from paramove.cli.arm_options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
-from paramove.cli.terminal_person import QuitError, TerminalPerson
-from paramove.supervision import exit_codes
+from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
+from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
+from paramove.documents import exit_codes
 
 
 def calibrate(

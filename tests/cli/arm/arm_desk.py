@@ -7,8 +7,8 @@ import contextlib
 import pytest
 from typer.testing import CliRunner
 
+from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
-from paramove.cli.terminal_person import TerminalPerson
 from paramove.robots.dynamixel.bus.servo_setup import only_servo
 from paramove.robots.dynamixel.calibration.path import calibration_path
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
@@ -73,8 +73,8 @@ class Bench:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("paramove.robots.dynamixel.bus.servo_setup.only_servo", few_rates)
             patch.setattr("paramove.robots.dynamixel.bus.servo_chain.TURN_S", 0.0)  # emulated servos answer at once
-            for module in ("arm_setup", "arm_calibrate"):
-                patch.setattr(f"paramove.cli.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
+            for module in ("setup", "calibrate"):
+                patch.setattr(f"paramove.cli.arm.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
             return CliRunner().invoke(app, texts)
 
     def calibrated(self):

@@ -8,7 +8,7 @@ import termios
 
 import pytest
 
-from paramove.cli.terminal_person import QuitError, TerminalPerson
+from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from paramove.cli import arm_teach
+from paramove.cli.arm import teach as arm_teach
+from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
-from paramove.cli.terminal_person import TerminalPerson
 from paramove.demonstrations import DemonstrationSet
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.limp_arm import LimpArm

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-EXIT_MISSING = 66
-EXIT_WRONG = 78
+from paramove.documents import exit_codes
 
 
 class InputError(ValueError):
@@ -22,4 +21,4 @@ class InputError(ValueError):
     @property
     def exit_code(self) -> int:
         """Of a process that ends because of it: 66 for a missing input, 78 for a wrong one."""
-        return EXIT_MISSING if self.missing else EXIT_WRONG
+        return exit_codes.INPUT_MISSING if self.missing else exit_codes.CONFIGURATION
