@@ -24,11 +24,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
 from paramove.cameras.frames import Frame, decode, encode
+from paramove.documents.array_types import Floats
 from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
 from paramove.motion.setup import MovementSource, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
@@ -48,7 +48,6 @@ from sim.simulation import CAMERA_HZ
 from sim.tool_box import NOMINAL, Measures
 from sim.world import OPENINGS_UP, World
 
-FloatArray = NDArray[np.float64]
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 GRASP_Z = -0.098
 RESTS = 10
@@ -85,7 +84,7 @@ class View:
             self.gestures += self._recognizer.update(tracked, self.calibration)
         return {found.name: found for found in tracked.objects}
 
-    def calibrate(self, error: Callable[[], FloatArray]) -> list[str]:
+    def calibrate(self, error: Callable[[], Floats]) -> list[str]:
         """A cylinder at the corners gives the calibration, its places off by `error`, [2], m; what was seen wrongly."""
         faults, image = [], []
         for corner in CORNERS:
@@ -100,7 +99,7 @@ class View:
         self.calibration = PlaneHomography.fit(image, CORNERS, GRASP_Z).to_message()
         return faults
 
-    def show_rule(self, name: str, start: FloatArray) -> FloatArray | None:
+    def show_rule(self, name: str, start: Floats) -> Floats | None:
         """A hand takes a cylinder from `start`, [2], and lets it fall into its opening.
 
         Returns:
@@ -149,7 +148,7 @@ class View:
         self._eye.close()
 
 
-def _line(start: FloatArray, end: FloatArray, images: int) -> Iterator[FloatArray]:
+def _line(start: Floats, end: Floats, images: int) -> Iterator[Floats]:
     for image in range(1, images + 1):
         yield start + minimum_jerk(image / images) * (end - start)
 

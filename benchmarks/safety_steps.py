@@ -19,12 +19,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import ArmWord, Fault, Inputs, Measured, Proposal, SafetySettings, State, Targets
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import longest_path_s, straight_move
-
-FloatArray = NDArray[np.float64]
 
 STEPS_PER_EPISODE = 200
 EPOCH = 5
@@ -56,7 +55,7 @@ class NotAllowedError(AssertionError):
 class Checker:
     """Judges all rows given in one episode. Knows the limits' numbers and nothing of how the gate judges."""
 
-    def __init__(self, limits: MotionLimits, start: FloatArray) -> None:
+    def __init__(self, limits: MotionLimits, start: Floats) -> None:
         self.limits = limits
         self.reach = 3 * max(1, round(0.012 / limits.dt_s))
         self.rows = start[None].repeat(self.reach, axis=0)  # row i of the stream is rows[reach + i]
@@ -78,7 +77,7 @@ class Checker:
         stops = np.concatenate([self.stops[place - self.reach :], np.ones(self.reach, dtype=bool)])
         self._judge(rows, stops, bool(targets.ramp_rows))
 
-    def _judge(self, rows: FloatArray, stops: NDArray[np.bool_], ramped: bool) -> None:
+    def _judge(self, rows: Floats, stops: NDArray[np.bool_], ramped: bool) -> None:
         limits, dt = self.limits, self.limits.dt_s
         low, high = np.minimum(rows[:-1], limits.lower), np.maximum(rows[:-1], limits.upper)
         self._within("position", np.maximum(low - rows[1:], rows[1:] - high), np.full(3, 1e-9))
@@ -99,7 +98,7 @@ class Checker:
             allowed = np.where(touched[:, None], stopping, usual) * 1.002 + 8e-6 / (span * dt) ** order
             self._within(what, np.abs(np.asarray(total)) / (span * dt) ** order, allowed)
 
-    def _within(self, what: str, found: FloatArray, allowed: FloatArray) -> None:
+    def _within(self, what: str, found: Floats, allowed: Floats) -> None:
         if not (found <= allowed).all():
             row, joint = (int(i) for i in np.argwhere(~(found <= allowed))[0])
             limit = np.broadcast_to(allowed, found.shape)[row, joint]
@@ -126,7 +125,7 @@ class Episode:
         mechanical = (np.full(3, -MECHANICAL), np.full(3, MECHANICAL))
         self.core = SafetyCore(self.limits, mechanical, EPOCH, self.now, settings)
         self.played_s = 0.0
-        self.plan: tuple[int, FloatArray] | None = None
+        self.plan: tuple[int, Floats] | None = None
         self.said: list[Proposal] = []
         self.pushed_until = 0
         self.forbidden_until = self.now  # arm words up to here must not arm
@@ -247,7 +246,7 @@ class Episode:
         self.said = [*self.said[-20:], good]
         return good if random() < 0.9 else self.odd(good)
 
-    def planned(self) -> FloatArray:
+    def planned(self) -> Floats:
         """A movement from where the last ended, within the limits or a little beyond."""
         start = self.checker.rows[-1]
         reach = 1.45 if self.random.random() < 0.8 else 1.65

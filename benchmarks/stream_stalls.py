@@ -19,8 +19,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.stream import StreamReader, StreamWriter
@@ -78,7 +78,7 @@ def swing() -> Swing:
     return Swing()
 
 
-def run(random: np.random.Generator) -> tuple[NDArray[np.float64], Counter[str]]:
+def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
     """One pattern: what the robot played until it rests, [N, J] counts, its past included, and what happened."""
     stage, seen = swing(), Counter[str]()
     reader = copy.copy(stage.begun[random.integers(len(stage.begun))])
@@ -109,7 +109,7 @@ def run(random: np.random.Generator) -> tuple[NDArray[np.float64], Counter[str]]
     return np.array(frames, dtype=np.float64), seen
 
 
-def judge(frames: NDArray[np.float64]) -> None:
+def judge(frames: Floats) -> None:
     """Velocity, acceleration and jerk of counts that were rounded, held at both ends.
 
     Raises:

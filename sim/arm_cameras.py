@@ -9,10 +9,10 @@ import cv2
 import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
-from sim.camera import Eye, Image
+from paramove.documents.array_types import Floats, Image
+from sim.camera import Eye
 from sim.human import camera_frame
 from sim.performances import Lens
 from sim.performances_scene import (
@@ -23,8 +23,6 @@ from sim.performances_scene import (
     draw_camera,
 )
 from sim.small_person import SCALE, shoulder_from_table, turn_of_table
-
-FloatArray = NDArray[np.float64]
 
 PLACES = (  # eye and target in the human frame: from the right, and from above over the robot's left shoulder
     ((0.30, -1.80, 0.85), (-0.03, -0.16, 0.12)),
@@ -59,9 +57,7 @@ def calibrated(cameras: tuple[CalibratedCamera, ...], draw: np.random.Generator)
     return tuple(found)
 
 
-def add_arm_cameras(
-    spec: mujoco.MjSpec, world_from_shoulder: FloatArray, cameras: tuple[CalibratedCamera, ...]
-) -> None:
+def add_arm_cameras(spec: mujoco.MjSpec, world_from_shoulder: Floats, cameras: tuple[CalibratedCamera, ...]) -> None:
     """Adds them to a world, and room to render their pictures."""
     view = spec.visual.global_
     view.offwidth = max(view.offwidth, RENDERED_PX[0])

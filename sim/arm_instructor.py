@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.hand_path import minimum_jerk
 from sim.instructor import Instructor, Script, Step
 from sim.sights import Table
 from sim.small_person import POINTED_ABOVE_PLANE, PointingMovement, SmallPerson
-
-FloatArray = NDArray[np.float64]
 
 SHOULDER, ELBOW, WRIST, TIP = range(4)
 SEATED_S = 4.0
@@ -44,17 +43,17 @@ class ArmInstructor(Instructor):
     ) -> None:
         self.person = person
         self._draw = draw
-        self.target: FloatArray | None = None
+        self.target: Floats | None = None
         self.pointings = 0
         self.at_target = False
         self._has_pointed = False
-        self._posture: FloatArray | None = None
-        self._elbow_towards: FloatArray | None = None
+        self._posture: Floats | None = None
+        self._elbow_towards: Floats | None = None
         super().__init__(table, rules, draws)
         self._script = self._begin_seated()
 
     @property
-    def posture(self) -> FloatArray:
+    def posture(self) -> Floats:
         """Shoulder, elbow, wrist, tip of the index finger, (4, 3), m, in the robot's shoulder frame."""
         if self._posture is not None:
             return self._posture
@@ -96,7 +95,7 @@ class ArmInstructor(Instructor):
         x, y, _ = self._table.position(name)
         yield from self.point_at_place((x, y, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE))
 
-    def _hang(self, posture: FloatArray) -> Script:
+    def _hang(self, posture: Floats) -> Script:
         """The arm goes to a posture (4, 3) and rests there."""
         backward = (posture[WRIST] - posture[TIP]) / np.linalg.norm(posture[WRIST] - posture[TIP])
         bend = posture[ELBOW] - 0.5 * (posture[SHOULDER] + posture[WRIST])
@@ -120,7 +119,7 @@ class ArmInstructor(Instructor):
         self.at_target = movement.arrives_s <= time_s <= movement.leaves_s
         self._has_pointed = time_s >= movement.arrives_s
 
-    def _take(self, posture: FloatArray) -> None:
+    def _take(self, posture: Floats) -> None:
         self._posture = posture
         backward = posture[WRIST] - posture[TIP]
         self._fingertip, self._backward = posture[TIP], backward / np.linalg.norm(backward)

@@ -9,9 +9,9 @@ from typing import BinaryIO
 import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import write_cameras
+from paramove.documents.array_types import Floats
 from paramove.msgs.truth_pb2 import TruthArm
 from paramove.robots.description import RobotDescription
 from sim import scene
@@ -23,8 +23,6 @@ from sim.simulation import Simulation
 from sim.small_person import SmallPerson, shoulder_from_table, table_from_shoulder, turn_of_table
 from sim.tool_box import NOMINAL, Measures
 from sim.world import World
-
-FloatArray = NDArray[np.float64]
 
 SEED_SPACE = 4200
 PERSON, POINTING, LOOK, CAMERAS, NOISE, CALIBRATION = range(6)
@@ -60,7 +58,7 @@ class ArmSimulation(Simulation):
         self._arm_cameras = ArmCameras(self.world.model, self.cameras, level, noise) if camera else None
 
     @property
-    def world_from_table(self) -> FloatArray:
+    def world_from_table(self) -> Floats:
         """Pose [4, 4] of the table frame, in which cameras and person are measured."""
         pose = np.eye(4)
         pose[:3, :3] = turn_of_table()
@@ -126,7 +124,7 @@ class ArmSimulation(Simulation):
     def _new_instructor(self, draws: dict[str, np.random.Generator]) -> ArmInstructor:
         return ArmInstructor(self.world, self.looks.rules, draws, self.person, self._stream(POINTING))
 
-    def _furnish(self, spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
+    def _furnish(self, spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
         """The arm and its cameras; the hand alone, which holds objects, is not seen any more."""
         for geom in spec.body("hand").geoms:
             geom.group = scene.HIDDEN_GROUP

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.diagnosis.graphics import graphics_backend
+from paramove.documents.array_types import Image
 from sim import looks, scene
 from sim.looks import Camera
 
-Image = NDArray[np.uint8]
 NOISE_IMAGES = 8
 
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import tool_box
 
 PAUSE_STEPS = 50  # a pair that parts for less than this is one contact
@@ -81,7 +82,7 @@ class ContactWatch:
         """ "a - b", the robot's part first."""
         return f"{self._names[pair[0]]} - {self._names[pair[1]]}"
 
-    def _take(self, pairs: NDArray[np.int32], kinds: NDArray[np.int_], dists: NDArray[np.float64]) -> None:
+    def _take(self, pairs: NDArray[np.int32], kinds: NDArray[np.int_], dists: Floats) -> None:
         record = self.record
         present: set[tuple[int, int]] = set()
         sides: dict[str, set[str]] = {}

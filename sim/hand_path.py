@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 def minimum_jerk(share: float) -> float:
@@ -27,14 +26,14 @@ class HandPath:
         duration_s: Of the whole path.
     """
 
-    start: FloatArray
-    goal: FloatArray
-    backward_start: FloatArray
-    backward_goal: FloatArray
-    bulge: FloatArray
+    start: Floats
+    goal: Floats
+    backward_start: Floats
+    backward_goal: Floats
+    bulge: Floats
     duration_s: float
 
-    def at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+    def at(self, time_s: float) -> tuple[Floats, Floats]:
         """Fingertip [3] and backward direction [3] (not normalised) after `time_s`."""
         share = minimum_jerk(time_s / self.duration_s)
         fingertip = self.start + share * (self.goal - self.start) + 4 * share * (1 - share) * self.bulge
@@ -42,7 +41,7 @@ class HandPath:
         return fingertip, backward
 
 
-def natural_bulge(draw: np.random.Generator, start: FloatArray, goal: FloatArray) -> FloatArray:
+def natural_bulge(draw: np.random.Generator, start: Floats, goal: Floats) -> Floats:
     """A random sideways and upward bulge, [3], m: people's reaching paths bend by about a twentieth of their length."""
     way = goal - start
     length = float(np.hypot(way[0], way[1]))

@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import ArmSizes
 from sim.camera import Eye
 from sim.scene import quaternion_of
 
-FloatArray = NDArray[np.float64]
 HandShape = Literal["ellipsoid", "pointing"]
 
 ARM_PARTS = ("upper_arm", "forearm", "hand")
@@ -176,14 +176,14 @@ class _SegmentEye(Eye):
         self._scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = 1
 
 
-def camera_frame(camera_from_world: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def camera_frame(camera_from_world: ArrayLike) -> tuple[Floats, Floats]:
     """Position (3,) and quaternion (4,) of MuJoCo's camera, which looks along -z with y up, from a pose (4, 4)."""
     pose = np.asarray(camera_from_world, dtype=np.float64)
     world_from_camera = pose[:3, :3].T
     return -world_from_camera @ pose[:3, 3], quaternion_of(world_from_camera @ np.diag((1.0, -1.0, -1.0)))
 
 
-def tapered_capsule(length: float, near: float, far: float) -> tuple[FloatArray, NDArray[np.int32], FloatArray]:
+def tapered_capsule(length: float, near: float, far: float) -> tuple[Floats, NDArray[np.int32], Floats]:
     """The convex hull of a sphere of radius `near` about the origin and one of radius `far` about (0, 0, length), m.
 
     Vertices (n, 3), triangles (m, 3), texture coordinates (n, 2). Raises ValueError where one sphere holds the other.
@@ -256,7 +256,7 @@ def add_cloth(spec: mujoco.MjSpec, look: PersonLook) -> None:
 def cloth_texture(look: PersonLook) -> NDArray[np.uint8]:
     """The pattern of shirt and sleeves, RGB [TEXTURE_PX, TEXTURE_PX, 3]."""
     row, column = np.mgrid[:TEXTURE_PX, :TEXTURE_PX]
-    share: FloatArray
+    share: Floats
     if look.pattern == "stripes":
         share = (row // 8 % 2).astype(np.float64)
     elif look.pattern == "checks":
@@ -269,7 +269,7 @@ def cloth_texture(look: PersonLook) -> NDArray[np.uint8]:
     return np.asarray((255.0 * mixed).round(), dtype=np.uint8)
 
 
-def _add_hips(spec: mujoco.MjSpec, look: PersonLook, shoulder: FloatArray, build: float) -> None:
+def _add_hips(spec: mujoco.MjSpec, look: PersonLook, shoulder: Floats, build: float) -> None:
     """Pelvis, thighs and shins, which stay where they are."""
     body = spec.worldbody.add_body(name="hips", pos=shoulder)
     trousers = (*look.trousers, 1.0)
@@ -282,7 +282,7 @@ def _add_hips(spec: mujoco.MjSpec, look: PersonLook, shoulder: FloatArray, build
         _add_capsule(body, f"{name}_shin", knee, foot, 0.05, build, rgba=trousers)
 
 
-def _add_torso(spec: mujoco.MjSpec, look: PersonLook, shoulder: FloatArray, build: float) -> None:
+def _add_torso(spec: mujoco.MjSpec, look: PersonLook, shoulder: Floats, build: float) -> None:
     body = spec.worldbody.add_body(name="torso", mocap=True, pos=shoulder)
     skin, hair = (*look.skin, 1.0), (*look.hair, 1.0)
     middle = HALF_SHOULDER_WIDTH
@@ -315,11 +315,11 @@ def _add_ellipsoid(
     body.add_geom(name=name, type=ELLIPSOID, pos=build * np.array(place), size=size, **more, **LOOKS_ONLY)
 
 
-def _unit(vector: FloatArray) -> FloatArray:
+def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def _bend_direction(shoulder: FloatArray, elbow: FloatArray, tip: FloatArray) -> FloatArray:
+def _bend_direction(shoulder: Floats, elbow: Floats, tip: Floats) -> Floats:
     """In the arm's plane, from the elbow towards the line of shoulder and fingertip; any if the arm is straight."""
     bend = 0.5 * (shoulder + tip) - elbow
     axis = _unit(tip - elbow)
@@ -329,7 +329,7 @@ def _bend_direction(shoulder: FloatArray, elbow: FloatArray, tip: FloatArray) ->
     return _unit(across)
 
 
-def _rotation(axis: FloatArray, across: FloatArray) -> FloatArray:
+def _rotation(axis: Floats, across: Floats) -> Floats:
     """Rotation (3, 3) with z along `axis` and x as near to `across` as that allows."""
     z = _unit(axis)
     x = across - (across @ z) * z

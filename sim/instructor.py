@@ -11,14 +11,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.hand_path import HandPath, minimum_jerk, natural_bulge
 from sim.sights import Sights, Table
-
-FloatArray = NDArray[np.float64]
 
 FROM_ABOVE = np.array((0.20, -0.50, 0.84))  # backward direction of the hand that holds something by its top
 AT_REST = np.array((0.20, -0.80, 0.55))
@@ -250,7 +248,7 @@ class Instructor:
         yield from self._withdraw()
         yield Step(1.5)
 
-    def _bring(self, name: str, place: FloatArray) -> Script:
+    def _bring(self, name: str, place: Floats) -> Script:
         """Fetch a cylinder from wherever it is and stand it at `place` [2] on the working plane."""
         yield from self._pick_up(name)
         centre = tool_box.standing_centre(*place)
@@ -301,7 +299,7 @@ class Instructor:
         yield Step(3.2, during=lambda time_s: self._carry_box(front, time_s / 3.2))
         yield from self._withdraw()
 
-    def _carry_box(self, front: FloatArray, share: float) -> None:
+    def _carry_box(self, front: Floats, share: float) -> None:
         away = minimum_jerk(share / 0.35) - minimum_jerk((share - 0.65) / 0.35)
         up = minimum_jerk((share - 0.15) / 0.25) - minimum_jerk((share - 0.60) / 0.25)
         angle = np.pi * (1 - minimum_jerk((share - 0.30) / 0.40))
@@ -322,8 +320,8 @@ class Instructor:
 
     def _move(
         self,
-        goal: FloatArray,
-        backward: FloatArray | None = None,
+        goal: Floats,
+        backward: Floats | None = None,
         seconds: tuple[float, float] = (1.0, 3.0),
         straight: bool = False,
         upright: bool = False,
@@ -345,11 +343,11 @@ class Instructor:
 
         return Step(duration_s, during)
 
-    def _tip_over(self, point: FloatArray, height: float) -> FloatArray:
+    def _tip_over(self, point: Floats, height: float) -> Floats:
         """Fingertip when the held cylinder's centre is `height` over `point`."""
         return _raised(point, height + tool_box.CYLINDER_HALF_HEIGHT)
 
-    def _into_hand(self, above: float) -> FloatArray:
+    def _into_hand(self, above: float) -> Floats:
         """Fingertip when the held cylinder stands in the robot's open hand, or `above` it."""
         gripper, rotation = self._table.gripper()
         centre = gripper + ASIDE_IN_HAND * rotation[:, 1] + AHEAD_IN_HAND * rotation[:, 0]
@@ -377,5 +375,5 @@ class Instructor:
         return self._to_point.pop(0) if self._to_point else None
 
 
-def _raised(point: FloatArray, height: float) -> FloatArray:
+def _raised(point: Floats, height: float) -> Floats:
     return np.asarray(point + np.array((0.0, 0.0, height)))

@@ -8,11 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import tool_box
-
-FloatArray = NDArray[np.float64]
 
 PURPOSES = ("camera", "light", "noise", "rules", "places", "order", "paths", "gaps")
 WIDTH_PX, HEIGHT_PX = 480, 360
@@ -43,12 +41,12 @@ class Camera:
         moved: Offset from the nominal position, [3], m; `turned_deg` [3] and `focal_scale` likewise.
     """
 
-    position: FloatArray
-    shoulder_from_optical: FloatArray
+    position: Floats
+    shoulder_from_optical: Floats
     focal_px: float
     k1: float
-    moved: FloatArray
-    turned_deg: FloatArray
+    moved: Floats
+    turned_deg: Floats
     focal_scale: float
 
     @property
@@ -56,7 +54,7 @@ class Camera:
         """Middle of the image; the middle of the first pixel is 0."""
         return (WIDTH_PX - 1) / 2, (HEIGHT_PX - 1) / 2
 
-    def project(self, points: FloatArray) -> FloatArray:
+    def project(self, points: Floats) -> Floats:
         """Image points [n, 2], px, of points [n, 3] in the shoulder frame; NaN behind the camera."""
         seen = (np.asarray(points, dtype=np.float64) - self.position) @ self.shoulder_from_optical
         depth = np.where(seen[:, 2] > 1e-3, seen[:, 2], np.nan)
@@ -125,7 +123,7 @@ def sees_enough(camera: Camera) -> bool:
     return not bool(visible.any())
 
 
-def _camera(elevation_deg: float, moved: FloatArray, turned_deg: FloatArray, scale: float, k1: float) -> Camera:
+def _camera(elevation_deg: float, moved: Floats, turned_deg: Floats, scale: float, k1: float) -> Camera:
     elevation, azimuth = np.deg2rad((elevation_deg, AZIMUTH_DEG))
     backward = np.array((np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)))
     right = np.cross((0.0, 0.0, 1.0), backward)
@@ -143,7 +141,7 @@ def _camera(elevation_deg: float, moved: FloatArray, turned_deg: FloatArray, sca
     )
 
 
-def rotation_of(vector: FloatArray) -> FloatArray:
+def rotation_of(vector: Floats) -> Floats:
     """Rotation matrix [3, 3] of a rotation vector [3], rad (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
     if angle < 1e-12:
@@ -153,7 +151,7 @@ def rotation_of(vector: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
-def _must_be_seen() -> FloatArray:
+def _must_be_seen() -> Floats:
     """The openings with a margin, the strip, tall cylinders on both, and the corners of the calibration."""
     floor, top = tool_box.SURFACE_Z, tool_box.SURFACE_Z + 0.085
     plane = [(x, y, floor) for x in (0.105, 0.215) for y in (-0.145, 0.115)]
@@ -161,7 +159,7 @@ def _must_be_seen() -> FloatArray:
     return np.array(plane + above)
 
 
-def _must_not_be_seen() -> FloatArray:
+def _must_not_be_seen() -> Floats:
     from sim import places
 
     around = [

@@ -8,11 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
+
 TILE_HALF = 0.027  # of the square around an opening that the wedges fill, m
 
 
-def wedges(radius: float, chamfer: float, depth: float, count: int = 16) -> list[FloatArray]:
+def wedges(radius: float, chamfer: float, depth: float, count: int = 16) -> list[Floats]:
     """Corners of the convex pieces around one round opening with a 45 degree chamfer.
 
     The inner faces are circumscribed about the opening, so a cylinder of `radius` just passes.
@@ -38,7 +39,7 @@ def wedges(radius: float, chamfer: float, depth: float, count: int = 16) -> list
     return pieces
 
 
-def lining(radius: float, chamfer: float, depth: float, count: int = 16) -> tuple[FloatArray, NDArray[np.int32]]:
+def lining(radius: float, chamfer: float, depth: float, count: int = 16) -> tuple[Floats, NDArray[np.int32]]:
     """Visible inside of one opening: chamfer, wall, floor. Vertices [n, 3] and triangles [m, 3], seen from inside."""
     rings = np.array([_profile(2 * np.pi * k / count, radius, chamfer, depth, count) for k in range(count)])
     vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -depth]]])
@@ -53,14 +54,14 @@ def lining(radius: float, chamfer: float, depth: float, count: int = 16) -> tupl
 
 
 def cover(
-    half_size: tuple[float, float, float], centres: FloatArray, radius: float, chamfer: float, count: int = 16
-) -> tuple[FloatArray, NDArray[np.int32]]:
+    half_size: tuple[float, float, float], centres: Floats, radius: float, chamfer: float, count: int = 16
+) -> tuple[Floats, NDArray[np.int32]]:
     """Visible outside of the box, its upper face pierced at `centres` [k, 2]. Vertices [n, 3], triangles [m, 3].
 
     Origin in the middle of the box. All openings lie in one row along y.
     """
     hx, hy, hz = half_size
-    quads: list[FloatArray] = []
+    quads: list[Floats] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             if (axis, sign) != (2, 1.0):
@@ -93,11 +94,11 @@ def _on_square(angle: float) -> tuple[float, float]:
     return scale * x, scale * y
 
 
-def _flat(x0: float, x1: float, y0: float, y1: float, z: float) -> FloatArray:
+def _flat(x0: float, x1: float, y0: float, y1: float, z: float) -> Floats:
     return np.array([(x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)])
 
 
-def _face(half_size: tuple[float, float, float], axis: int, sign: float) -> FloatArray:
+def _face(half_size: tuple[float, float, float], axis: int, sign: float) -> Floats:
     """Corners of one side of a box, anticlockwise from outside."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     corners = np.zeros((4, 3))
@@ -107,7 +108,7 @@ def _face(half_size: tuple[float, float, float], axis: int, sign: float) -> Floa
     return corners if sign > 0 else corners[::-1]
 
 
-def _pierced_tile(x: float, y: float, z: float, radius: float, count: int) -> list[FloatArray]:
+def _pierced_tile(x: float, y: float, z: float, radius: float, count: int) -> list[Floats]:
     """Quads between a circle of `radius` and the square tile around it."""
     outside = radius / np.cos(np.pi / count)
     quads = []

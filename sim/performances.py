@@ -17,14 +17,14 @@ from pathlib import Path
 import cv2
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.recorded_people import RecordingsError
 from paramove.demonstrations.synthetic import RESTING_STERNUM, SAMPLE_RATE_HZ
+from paramove.documents.array_types import Floats, Image
 from paramove.documents.input_error import InputError
-from sim.camera import Eye, Image
+from sim.camera import Eye
 from sim.human import place_arm, place_torso
 from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px
 from sim.persons.clips import (
@@ -39,8 +39,6 @@ from sim.persons.clips import (
 from sim.persons.performances import KINDS, Kind, Performance, kind_named, perform, stream
 from sim.persons.performers import WRIST
 from sim.worn_markers import place_markers
-
-FloatArray = NDArray[np.float64]
 
 SHEET_COLUMNS = 8
 
@@ -83,10 +81,10 @@ class Lens:
 class Frame:
     """The body at one moment: pose (9,), wrist (3,), displacement of the torso (3,), objects (acts, 3); m."""
 
-    pose: FloatArray
-    wrist: FloatArray
-    shift: FloatArray
-    objects: FloatArray
+    pose: Floats
+    wrist: Floats
+    shift: Floats
+    objects: Floats
 
 
 class Studio:
@@ -110,7 +108,7 @@ class Studio:
         self._lenses = [Lens(camera) for camera in self.cameras]
 
     @property
-    def times_s(self) -> FloatArray:
+    def times_s(self) -> Floats:
         """Of the frames, (T,)."""
         last = (len(self.performance.motion.points) - 1) / SAMPLE_RATE_HZ
         rate = self.performance.kind.rate_hz
@@ -128,7 +126,7 @@ class Studio:
         first = min(int(position), len(motion.points) - 2)
         share = position - first
 
-        def between(track: FloatArray) -> FloatArray:
+        def between(track: Floats) -> Floats:
             return np.asarray((1.0 - share) * track[first] + share * track[first + 1])
 
         points = between(motion.points)

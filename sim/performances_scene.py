@@ -10,14 +10,12 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats
 from sim.human import Pattern, PersonLook, add_person, camera_frame
 from sim.persons.performances import Performance
 from sim.worn_markers import add_markers, mute
-
-FloatArray = NDArray[np.float64]
 
 WIDTH_PX, HEIGHT_PX = 320, 240
 MARGIN_PX = 16  # on each side, rendered beyond the image, which the lens may pull in
@@ -114,7 +112,7 @@ def draw_camera(
     return CalibratedCamera(name, WIDTH_PX, HEIGHT_PX, matrix, lens, pose)
 
 
-def looking(forward: FloatArray, roll: float = 0.0) -> FloatArray:
+def looking(forward: Floats, roll: float = 0.0) -> Floats:
     """Rotation (3, 3) from the world to a camera that looks `forward`, its x axis level but for a roll, rad."""
     z = forward / np.linalg.norm(forward)
     x = np.cross(z, (0.0, 0.0, 1.0))
@@ -197,7 +195,7 @@ def _add_lights(spec: mujoco.MjSpec, brightness: tuple[float, float]) -> None:
         )
 
 
-def _texture(spec: mujoco.MjSpec, name: str, picture: FloatArray) -> str:
+def _texture(spec: mujoco.MjSpec, name: str, picture: Floats) -> str:
     """A material with a picture RGB [h, w, 3], 0 to 1."""
     height, width = picture.shape[:2]
     pixels = (255.0 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)
@@ -208,7 +206,7 @@ def _texture(spec: mujoco.MjSpec, name: str, picture: FloatArray) -> str:
     return name
 
 
-def _picture(rng: np.random.Generator, kind: str, base: tuple[float, ...], second: tuple[float, ...]) -> FloatArray:
+def _picture(rng: np.random.Generator, kind: str, base: tuple[float, ...], second: tuple[float, ...]) -> Floats:
     """A texture: boards, stripes, tiles, blots or posters."""
     row, column = np.mgrid[:TEXTURE_PX, :TEXTURE_PX]
     if kind == "boards":
@@ -259,7 +257,7 @@ def _add_room(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
         )  # fmt: skip
 
 
-def _upright(rng: np.random.Generator) -> FloatArray:
+def _upright(rng: np.random.Generator) -> Floats:
     angle = float(rng.uniform(0.0, np.pi))
     return np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
 

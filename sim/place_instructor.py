@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.reaching import table_place
+from paramove.documents.array_types import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import tool_box
 from sim.arm_instructor import ELBOW, SHOULDER, WRIST, ArmInstructor
 from sim.instructor import Script, Step
 from sim.small_person import POINTED_ABOVE_PLANE, SCALE, table_from_shoulder
-
-FloatArray = NDArray[np.float64]
 
 OBJECT = "yellow"
 START = (0.165, -0.02)
@@ -33,7 +31,7 @@ WITHIN_SHARE = 0.04
 class PlaceInstructor(ArmInstructor):
     """See `ArmInstructor`. Who is not understood points at the same place once more, then at another one."""
 
-    _place: FloatArray | None = None
+    _place: Floats | None = None
     _shown = 0
     _stood = np.array(START)
 
@@ -66,7 +64,7 @@ class PlaceInstructor(ArmInstructor):
         self.doing = "points at ({:.1f}, {:.1f}) cm".format(*(100 * self._place))
         yield from self._point_above(self._place)
 
-    def _point_above(self, place: FloatArray) -> Script:
+    def _point_above(self, place: Floats) -> Script:
         """Point at a place (2,) and let the arm hang again."""
         self._has_pointed = False
         for step in self.point_at_place((*place, tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)):
@@ -87,7 +85,7 @@ class PlaceInstructor(ArmInstructor):
     def _withdraw(self) -> Script:
         yield from self._hang(self._resting)
 
-    def _free_place(self) -> FloatArray:
+    def _free_place(self) -> Floats:
         """Another place in the working area, where the person can point and the robot's hand is not."""
         gripper = self._table.gripper()[0][:2]
         for _ in range(10_000):
@@ -107,7 +105,7 @@ class PlaceInstructor(ArmInstructor):
         yield from self._withdraw()
 
 
-def where_people_point(place: FloatArray) -> bool:
+def where_people_point(place: Floats) -> bool:
     """Whether a place (2,), m, shoulder frame, lies on the part of the table where people show how they point."""
     x, y, _ = table_from_shoulder([*place, tool_box.SURFACE_Z]) / SCALE
     (low_x, high_y, _), (high_x, low_y, _) = table_place([[0.0, 0.0], [1.0, 1.0]])

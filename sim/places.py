@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import tool_box
-
-FloatArray = NDArray[np.float64]
 
 STRIP_X = (0.168, 0.186)
 STRIP_Y = (-0.100, 0.065)
@@ -27,7 +25,7 @@ PARKED = tuple(
 )
 
 
-def draw_layout(draw: np.random.Generator, count: int = 3) -> tuple[FloatArray, int]:
+def draw_layout(draw: np.random.Generator, count: int = 3) -> tuple[Floats, int]:
     """Places of `count` cylinders on the strip, [count, 2], and how many layouts were drawn again because the swept
     open hand would touch another cylinder. Layouts with too small gaps are not counted: they are no layouts."""
     redrawn = 0
@@ -41,7 +39,7 @@ def draw_layout(draw: np.random.Generator, count: int = 3) -> tuple[FloatArray, 
     raise RuntimeError(f"no layout of {count} cylinders on the strip {STRIP_X} x {STRIP_Y} found in 10000 draws")
 
 
-def draw_place(draw: np.random.Generator, standing: Sequence[FloatArray]) -> FloatArray:
+def draw_place(draw: np.random.Generator, standing: Sequence[Floats]) -> Floats:
     """One more place [2] on the strip beside the cylinders that stand at `standing`, each [2].
 
     If the strip is too full for the open hand, the place with the largest gap of 200 draws is taken.
@@ -65,7 +63,7 @@ def redraw_rate(seed: int = 0, count: int = 1000) -> float:
     return redrawn / (redrawn + count)
 
 
-def hand_has_room(layout: FloatArray) -> bool:
+def hand_has_room(layout: Floats) -> bool:
     """Whether the open hand reaches each cylinder of `layout` [n, 2] without touching another one.
 
     The swept hand: a corridor from `APPROACH` before the object to `FINGERS_BEYOND` it, along the forearm's direction.
@@ -83,7 +81,7 @@ def hand_has_room(layout: FloatArray) -> bool:
     return True
 
 
-def _least_gap(layout: FloatArray) -> float:
+def _least_gap(layout: Floats) -> float:
     if len(layout) < 2:
         return np.inf
     apart = np.linalg.norm(layout[:, None] - layout[None], axis=2)

@@ -8,18 +8,15 @@ from typing import Any
 import cv2
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 from paramove.cameras.calibrated import write_cameras
 from paramove.demonstrations.reaching import table_place
+from paramove.documents.array_types import Image
 from paramove.msgs.truth_pb2 import TruthArm
 from sim.performances import Studio
 from sim.persons.performances import Performance, assembled, kind_named, pointed_once
 from sim.persons.performers import draw_performer
-
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 SEED_SPACE = 1000
 """Numbers of performances from here on are runs; those below are the clips of chapter 6."""

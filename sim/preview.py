@@ -13,8 +13,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Image
 from paramove.msgs.rule_pb2 import Speech
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.firmware import Firmware
@@ -24,7 +24,6 @@ from sim.instructor import Instructor
 from sim.looks import Looks
 from sim.world import World
 
-Image = NDArray[np.uint8]
 ROBOT = scene.ROBOT_MODEL.parent
 
 

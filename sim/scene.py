@@ -13,10 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import looks, opening, places, tool_box
 from sim.looks import Looks
-
-FloatArray = NDArray[np.float64]
 
 ROBOT_MODEL = Path(__file__).resolve().parent.parent / "robot_description" / "hoap3" / "hoap3.xml"
 
@@ -50,7 +49,7 @@ AMBIENT_SHARE = 0.35
 LIGHT_PLACES = ((0.5, 0.9, 1.4), (0.7, -1.0, 1.3))
 
 
-Furnish = Callable[[mujoco.MjSpec, FloatArray], None]
+Furnish = Callable[[mujoco.MjSpec, Floats], None]
 """Adds more to a world, which it is given with the place of the right shoulder in it, [3], m."""
 
 
@@ -70,7 +69,7 @@ def build(world_looks: Looks, furnish: Furnish | None = None) -> mujoco.MjModel:
     return spec.compile()
 
 
-def shoulder_in_world(spec: mujoco.MjSpec) -> FloatArray:
+def shoulder_in_world(spec: mujoco.MjSpec) -> Floats:
     """Origin of the right shoulder's frame in the world, [3], m. The axes are parallel."""
     site = spec.site("right_shoulder")
     return np.array(site.pos, dtype=np.float64)
@@ -129,7 +128,7 @@ def _touchable(**more: Any) -> dict[str, Any]:
     }
 
 
-def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
+def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
     near_edge = world_from_shoulder[0] + tool_box.X_RANGE[0] - 0.005
     thickness, depth, half_width = 0.02, 0.46, 0.80
     table_z = world_from_shoulder[2] + tool_box.TABLE_Z
@@ -160,7 +159,7 @@ def _add_surroundings(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> N
     )
 
 
-def _add_box(spec: mujoco.MjSpec, world_from_shoulder: FloatArray, measures: tool_box.Measures) -> None:
+def _add_box(spec: mujoco.MjSpec, world_from_shoulder: Floats, measures: tool_box.Measures) -> None:
     """The tool box, openings up. The instructor turns it, so it is moved from outside (mocap)."""
     body = spec.worldbody.add_body(name="box", mocap=True, pos=world_from_shoulder + tool_box.CENTRE)
     centre = np.array(tool_box.CENTRE)
@@ -204,9 +203,7 @@ def _add_block(body: Any, name: str, x: tuple[float, float], y: tuple[float, flo
     )
 
 
-def _add_box_surfaces(
-    spec: mujoco.MjSpec, body: Any, places_in_box: list[FloatArray], shape: tuple[float, float]
-) -> None:
+def _add_box_surfaces(spec: mujoco.MjSpec, body: Any, places_in_box: list[Floats], shape: tuple[float, float]) -> None:
     centres = np.array(places_in_box)[:, :2]
     vertices, triangles = opening.cover(tool_box.HALF_SIZE, centres, *shape)
     _add_surface(spec, body, "box_cover", vertices, triangles, (0.0, 0.0, 0.0), "box")
@@ -216,7 +213,7 @@ def _add_box_surfaces(
 
 
 def _add_surface(
-    spec: mujoco.MjSpec, body: Any, name: str, vertices: FloatArray, triangles: NDArray[np.int32], place: Any, look: str
+    spec: mujoco.MjSpec, body: Any, name: str, vertices: Floats, triangles: NDArray[np.int32], place: Any, look: str
 ) -> None:
     """Something that is seen and cannot be touched."""
     spec.add_mesh(
@@ -237,7 +234,7 @@ def _add_surface(
     )
 
 
-def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
+def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
     for colour, place in zip(tool_box.COLOURS, places.PARKED, strict=True):
         body = spec.worldbody.add_body(name=colour, pos=world_from_shoulder + place)
         body.add_freejoint(name=colour)
@@ -254,7 +251,7 @@ def _add_cylinders(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None
         )
 
 
-def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
+def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
     """The instructor's hand, which touches nothing. Origin: tip of the pointing finger; z from there to the wrist."""
     body = spec.worldbody.add_body(name="hand", mocap=True, pos=world_from_shoulder + places.IDLE_FINGERTIP)
     capsule, ellipsoid = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID
@@ -291,7 +288,7 @@ def _add_hand(spec: mujoco.MjSpec, world_from_shoulder: FloatArray) -> None:
         weld.data[10] = 1.0  # torque scale
 
 
-def _add_cameras(spec: mujoco.MjSpec, world_looks: Looks, world_from_shoulder: FloatArray) -> None:
+def _add_cameras(spec: mujoco.MjSpec, world_looks: Looks, world_from_shoulder: Floats) -> None:
     camera = world_looks.camera
     flip = np.diag((1.0, -1.0, -1.0))  # MuJoCo's camera looks along -z with y up
     spec.worldbody.add_camera(
@@ -315,7 +312,7 @@ def place_view(spec: mujoco.MjSpec, eye: Any, target: Any) -> None:
     view.pos, view.quat = eye, turned
 
 
-def quaternion_of(rotation: FloatArray) -> FloatArray:
+def quaternion_of(rotation: Floats) -> Floats:
     """Unit quaternion (w, x, y, z) of a rotation matrix [3, 3]."""
     quaternion = np.zeros(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())

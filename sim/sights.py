@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import places, tool_box
 from sim.tool_box import Opening
-
-FloatArray = NDArray[np.float64]
 
 POINTING = np.array((0.84, -0.38, 0.38))  # backward direction of the pointing hand: its owner sits at the far side
 
@@ -20,11 +18,11 @@ class Table(Protocol):
 
     held_by_instructor: str | None
 
-    def position(self, name: str) -> FloatArray: ...
-    def gripper(self) -> tuple[FloatArray, FloatArray]: ...
+    def position(self, name: str) -> Floats: ...
+    def gripper(self) -> tuple[Floats, Floats]: ...
     def openings_up(self) -> bool: ...
-    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None: ...
-    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None: ...
+    def move_hand(self, fingertip: Floats, backward: Floats) -> None: ...
+    def move_box(self, offset: Floats, quaternion: tuple[float, ...] | Floats) -> None: ...
     def grasp(self, name: str) -> None: ...
     def straighten(self, share: float) -> None: ...
     def release(self) -> None: ...
@@ -42,7 +40,7 @@ class Sights:
         self._table = table
         self._opening = openings
 
-    def _height_over(self, centre: FloatArray) -> float:
+    def _height_over(self, centre: Floats) -> float:
         """How far a centre lies over that of a cylinder that stands on the working plane."""
         return float(centre[2] - tool_box.SURFACE_Z - tool_box.CYLINDER_HALF_HEIGHT)
 
@@ -73,14 +71,14 @@ class Sights:
         near = np.hypot(centre[0] - opening.x, centre[1] - opening.y) < tool_box.OPENING_RADIUS
         return bool(near and centre[2] + tool_box.CYLINDER_HALF_HEIGHT < tool_box.SURFACE_Z)
 
-    def top_of(self, name: str) -> FloatArray:
+    def top_of(self, name: str) -> Floats:
         """Fingertip on top of a cylinder, standing or lying."""
         centre = self._table.position(name)
         standing = abs(self._height_over(centre)) < 0.004 or self.is_parked(name) or self.in_compartment(name)
         over = tool_box.CYLINDER_HALF_HEIGHT if standing else tool_box.CYLINDER_RADIUS
         return np.asarray(centre + np.array((0.0, 0.0, over)))
 
-    def pointing_pose(self, name: str, draw: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    def pointing_pose(self, name: str, draw: np.random.Generator) -> tuple[Floats, Floats]:
         """Fingertip beside the upper third of a cylinder, on the camera's side, as far as may be from the others."""
         centre = self._table.position(name)
         distance = tool_box.CYLINDER_RADIUS + 0.0075 + draw.uniform(0.008, 0.012)

@@ -9,16 +9,16 @@ from typing import BinaryIO
 
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from numpy.typing import NDArray
 
 from paramove.bus import topics
 from paramove.bus.subscriber import Heard
+from paramove.documents.array_types import Floats, Image
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots.description import RobotDescription
 from paramove.robots.hoap3.firmware import Firmware
 from paramove.robots.streaming.stream import StreamReader
 from sim import looks, scene
-from sim.camera import Eye, Image, Sensor
+from sim.camera import Eye, Sensor
 from sim.instructor import Instructor
 from sim.looks import Looks
 from sim.tool_box import NOMINAL, Measures
@@ -90,7 +90,7 @@ class Simulation:
         return self.world.steps * CAMERA_HZ // 1000
 
     @property
-    def world_from_table(self) -> NDArray[np.float64] | None:
+    def world_from_table(self) -> Floats | None:
         """Pose [4, 4] of the table frame of a tracked arm; None where there is none."""
         return None
 

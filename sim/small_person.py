@@ -14,16 +14,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 
 from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import ArmSizes
 from sim import tool_box
 from sim.persons.performances import pointed_once
 from sim.persons.performers import ELBOW, INDEX, SHOULDER, WRIST, Performer, draw_performer, in_person
-
-FloatArray = NDArray[np.float64]
 
 SCALE = 0.42
 """Of the table scene: the 80 x 30 cm where people point become 34 x 13 cm, which hold the strip of the objects."""
@@ -36,31 +35,31 @@ REACH_SHARE, FOLD_SHARE = 0.96, 0.40
 """Of upper arm and forearm: farthest and nearest wrist without the shoulder moving."""
 
 
-def shoulder_from_table(points: ArrayLike) -> FloatArray:
+def shoulder_from_table(points: ArrayLike) -> Floats:
     """Points (..., 3), m, of the table frame in the robot's shoulder frame."""
     x, y, _ = TABLE_IN_SHOULDER
     turned = np.asarray(points, dtype=np.float64) @ turn_of_table().T
     return np.asarray(turned + np.array([x, y, tool_box.SURFACE_Z]))
 
 
-def table_from_shoulder(points: ArrayLike) -> FloatArray:
+def table_from_shoulder(points: ArrayLike) -> Floats:
     """Points (..., 3), m, of the robot's shoulder frame in the table frame."""
     x, y, _ = TABLE_IN_SHOULDER
     moved = np.asarray(points, dtype=np.float64) - np.array([x, y, tool_box.SURFACE_Z])
     return np.asarray(moved @ turn_of_table())
 
 
-def turn_of_table() -> FloatArray:
+def turn_of_table() -> Floats:
     """Rotation (3, 3) from the table frame to the shoulder frame."""
     cos, sin = np.cos(TABLE_IN_SHOULDER[2]), np.sin(TABLE_IN_SHOULDER[2])
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _table_from_human(points: FloatArray) -> FloatArray:
+def _table_from_human(points: Floats) -> Floats:
     return np.asarray(SCALE * points + np.array([0.0, 0.0, POINTED_ABOVE_PLANE - SCALE * HUMAN_PLANE_Z]))
 
 
-def _human_from_table(points: FloatArray) -> FloatArray:
+def _human_from_table(points: Floats) -> Floats:
     return np.asarray((points - np.array([0.0, 0.0, POINTED_ABOVE_PLANE - SCALE * HUMAN_PLANE_Z])) / SCALE)
 
 
@@ -73,7 +72,7 @@ class PointingMovement:
         arrives_s, leaves_s: when the fingertip is at the place.
     """
 
-    postures: FloatArray
+    postures: Floats
     arrives_s: float
     leaves_s: float
 
@@ -82,7 +81,7 @@ class PointingMovement:
         """Of the whole movement."""
         return (len(self.postures) - 1) / SAMPLE_RATE_HZ
 
-    def at(self, time_s: float) -> FloatArray:
+    def at(self, time_s: float) -> Floats:
         """The posture (4, 3) at a time, between the frames by straight lines."""
         position = float(np.clip(time_s * SAMPLE_RATE_HZ, 0.0, len(self.postures) - 1))
         first = min(int(position), len(self.postures) - 2)
@@ -127,9 +126,7 @@ class SmallPerson:
         postures = shoulder_from_table(_table_from_human(body))
         return PointingMovement(postures, float(moved.arrives_s[0]), float(moved.leaves_s[0]))
 
-    def holding(
-        self, fingertip: FloatArray, backward: FloatArray, elbow_towards: FloatArray | None = None
-    ) -> FloatArray:
+    def holding(self, fingertip: Floats, backward: Floats, elbow_towards: Floats | None = None) -> Floats:
         """The posture (4, 3) with the fingertip (3,) there and the wrist from it in direction `backward` (3,).
 
         The shoulder stays at its seat; where the wrist is too far or too near for that, the person leans. The elbow

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import opening
 
 SURFACE_Z = -0.134  # the working plane
@@ -75,7 +75,7 @@ class Opening:
     y: float
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def centre(self) -> Floats:
         """Centre on the working plane, [3], shoulder frame."""
         return np.array((self.x, self.y, SURFACE_Z))
 
@@ -83,6 +83,6 @@ class Opening:
 OPENINGS = tuple(Opening(f"opening_{place}", OPENING_X, y) for place, y in enumerate(OPENING_Y))
 
 
-def standing_centre(x: float, y: float) -> NDArray[np.float64]:
+def standing_centre(x: float, y: float) -> Floats:
     """Centre of a cylinder that stands on the working plane at (x, y), [3], shoulder frame."""
     return np.array((x, y, SURFACE_Z + CYLINDER_HALF_HEIGHT))

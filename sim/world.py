@@ -8,15 +8,14 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import RobotDescription
 from sim import places, scene, tool_box
 from sim.contact_watch import ContactRecord, ContactWatch
 from sim.looks import Looks
 
 _log = logging.getLogger(__name__)
-FloatArray = NDArray[np.float64]
 
 STEP_S = 0.001
 CLOSED_UP = (0.0, 1.0, 0.0, 0.0)  # quaternion w x y z: half a turn about x
@@ -43,7 +42,7 @@ class World:
         self.data = mujoco.MjData(self.model)
         self.description = description
         model = self.model
-        self.world_from_shoulder: FloatArray = np.array(model.site("right_shoulder").pos, dtype=np.float64)
+        self.world_from_shoulder: Floats = np.array(model.site("right_shoulder").pos, dtype=np.float64)
         joints = [model.joint(name) for name in description.joint_names]
         self._qpos_index = np.array([joint.qposadr[0] for joint in joints])
         self._dof_index = np.array([joint.dofadr[0] for joint in joints])
@@ -56,7 +55,7 @@ class World:
         self._warnings = self.data.warning
         self.held_by_instructor: str | None = None
         self.last_touched_by: dict[str, str] = dict.fromkeys(tool_box.COLOURS, "")
-        self._grasped: tuple[FloatArray, FloatArray] | None = None
+        self._grasped: tuple[Floats, Floats] | None = None
         self.steps = 0
         self.reset()
 
@@ -77,15 +76,15 @@ class World:
         """Simulated time since the start."""
         return self.steps * STEP_S
 
-    def joint_positions(self) -> FloatArray:
+    def joint_positions(self) -> Floats:
         """[J], rad, in the order of the description."""
         return np.asarray(self.data.qpos[self._qpos_index])
 
-    def joint_velocities(self) -> FloatArray:
+    def joint_velocities(self) -> Floats:
         """[J], rad/s."""
         return np.asarray(self.data.qvel[self._dof_index])
 
-    def step(self, torques: FloatArray) -> None:
+    def step(self, torques: Floats) -> None:
         """One millisecond with the given torques of the motors, [J], N m.
 
         Raises:
@@ -111,18 +110,18 @@ class World:
         """Pairs that the robot is part of, in the newest step."""
         return [self._watch.name_of(pair) for pair in self.contacts.present]
 
-    def gripper(self) -> tuple[FloatArray, FloatArray]:
+    def gripper(self) -> tuple[Floats, Floats]:
         """Where the gripper is: position [3], rotation [3, 3] (x along the forearm, y from the pads to the thumb)."""
         position = self.data.site_xpos[self._gripper] - self.world_from_shoulder
         return np.asarray(position), self.data.site_xmat[self._gripper].reshape(3, 3).copy()
 
     # -- objects ----------------------------------------------------------------------------------------------------
 
-    def position(self, name: str) -> FloatArray:
+    def position(self, name: str) -> Floats:
         """Centre of a cylinder, [3]."""
         return np.asarray(self.data.xpos[self._body[name]] - self.world_from_shoulder)
 
-    def axis(self, name: str) -> FloatArray:
+    def axis(self, name: str) -> Floats:
         """Direction of a cylinder's axis, [3], pointing up."""
         axis = self.data.xmat[self._body[name]].reshape(3, 3)[:, 2]
         return np.asarray(axis * (1.0 if axis[2] >= 0 else -1.0))
@@ -132,11 +131,11 @@ class World:
         first = self.model.joint(name).dofadr[0]
         return float(np.linalg.norm(self.data.qvel[first : first + 3]))
 
-    def quaternion(self, name: str) -> FloatArray:
+    def quaternion(self, name: str) -> Floats:
         """Of a body, (w, x, y, z)."""
         return np.asarray(self.data.xquat[self._body[name]].copy())
 
-    def place(self, name: str, centre: FloatArray) -> None:
+    def place(self, name: str, centre: Floats) -> None:
         """Put a cylinder upright at `centre`, at rest: to set a scene, not part of any story."""
         joint = self.model.joint(name)
         self.data.qpos[joint.qposadr[0] : joint.qposadr[0] + 7] = (*(centre + self.world_from_shoulder), 1, 0, 0, 0)
@@ -144,12 +143,12 @@ class World:
 
     # -- instructor -------------------------------------------------------------------------------------------------
 
-    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None:
+    def move_hand(self, fingertip: Floats, backward: Floats) -> None:
         """Bring the instructor's hand: its fingertip [3], and the direction [3] from there to the wrist."""
         self.data.mocap_pos[self._mocap["hand"]] = fingertip + self.world_from_shoulder
         self.data.mocap_quat[self._mocap["hand"]] = hand_quaternion(backward)
 
-    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None:
+    def move_box(self, offset: Floats, quaternion: tuple[float, ...] | Floats) -> None:
         """Bring the box to `offset` [3] from its place, turned by the quaternion (w, x, y, z)."""
         self.data.mocap_pos[self._mocap["box"]] = self.world_from_shoulder + tool_box.CENTRE + offset
         self.data.mocap_quat[self._mocap["box"]] = quaternion
@@ -190,7 +189,7 @@ class World:
             self.data.eq_active[self._weld[self.held_by_instructor]] = 0
         self.held_by_instructor = self._grasped = None
 
-    def _hold(self, name: str, offset: FloatArray, turn: FloatArray) -> None:
+    def _hold(self, name: str, offset: Floats, turn: Floats) -> None:
         """MuJoCo's weld data: anchor on the object, its position and rotation in the hand, torque scale."""
         row = self.model.eq_data[self._weld[name]]
         row[0:3] = 0.0
@@ -232,7 +231,7 @@ def log_warnings_of_mujoco(say: Callable[[str], None] = _log.warning) -> None:
     mujoco.set_mju_user_warning(say)
 
 
-def hand_quaternion(backward: FloatArray) -> tuple[float, float, float, float]:
+def hand_quaternion(backward: Floats) -> tuple[float, float, float, float]:
     """Rotation (w, x, y, z) of the hand whose z axis is `backward` and whose back, the x axis, looks up.
 
     Plain floats: it is called every millisecond, and numpy takes longer for three numbers than the physics step.
@@ -254,7 +253,7 @@ def hand_quaternion(backward: FloatArray) -> tuple[float, float, float, float]:
     return -k, j, -i, w
 
 
-def _upright_near(turn: FloatArray) -> FloatArray:
+def _upright_near(turn: Floats) -> Floats:
     """The upright rotation (either end up) that is reached from `turn` by the smallest one."""
     axis = _rotate(turn, np.array((0.0, 0.0, 1.0)))
     goal = np.array((0.0, 0.0, 1.0 if axis[2] >= 0 else -1.0))
@@ -263,17 +262,17 @@ def _upright_near(turn: FloatArray) -> FloatArray:
     return _multiply(swing / np.linalg.norm(swing), turn)
 
 
-def _multiply(a: FloatArray, b: FloatArray) -> FloatArray:
+def _multiply(a: Floats, b: Floats) -> Floats:
     product = np.zeros(4)
     mujoco.mju_mulQuat(product, a, b)
     return product
 
 
-def _conjugate(quaternion: FloatArray) -> FloatArray:
+def _conjugate(quaternion: Floats) -> Floats:
     return np.asarray(quaternion * (1.0, -1.0, -1.0, -1.0))
 
 
-def _rotate(quaternion: FloatArray, vector: FloatArray) -> FloatArray:
+def _rotate(quaternion: Floats, vector: Floats) -> Floats:
     turned = np.zeros(3)
     mujoco.mju_rotVecQuat(turned, vector, quaternion)
     return turned

@@ -9,12 +9,11 @@ from collections.abc import Iterable
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import ArmSizes
 from sim.human import LOOKS_ONLY
-
-FloatArray = NDArray[np.float64]
 
 COLOURS = {
     "shoulder": (0.86, 0.82, 0.10),
@@ -41,7 +40,7 @@ def mute(spec: mujoco.MjSpec) -> None:
         texture.data = muted(pixels).round().astype(np.uint8).tobytes()
 
 
-def muted(colours: ArrayLike) -> FloatArray:
+def muted(colours: ArrayLike) -> Floats:
     """RGB (..., 3) with their brightest channel kept and their saturation cut to `MOST_SATURATION`."""
     rgb = np.asarray(colours, dtype=np.float64)
     most = rgb.max(axis=-1, keepdims=True)
@@ -62,7 +61,7 @@ def add_markers(spec: mujoco.MjSpec, sizes: ArmSizes, names: Iterable[str]) -> N
         )  # fmt: skip
 
 
-def place_markers(model: mujoco.MjModel, data: mujoco.MjData, pose: FloatArray, wrist: FloatArray) -> None:
+def place_markers(model: mujoco.MjModel, data: mujoco.MjData, pose: Floats, wrist: Floats) -> None:
     """Puts the balls where the joints of a pose (9,) and the wrist (3,) are, m."""
     shoulder, elbow, tip = pose.reshape(3, 3)
     for name, place in {"shoulder": shoulder, "elbow": elbow, "wrist": wrist, "index": tip}.items():

@@ -23,12 +23,11 @@ from paramove.demonstrations.synthetic import (
     Demonstrator,
     minimum_jerk,
 )
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import resample
 from paramove.observation.arm_body import POSE_POINTS, ArmSizes, fitted_poses
 from paramove.phmm import MovementDescription
 from sim.persons.staging import Stop, staged
-
-Floats = NDArray[np.float64]
 
 PLACE_NAMES = ("u", "v")
 PAIR_NAMES = ("a_u", "a_v", "b_u", "b_v")

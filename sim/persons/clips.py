@@ -25,6 +25,7 @@ from platformdirs import user_cache_path
 from ruamel.yaml import YAML
 
 from paramove.cameras.calibrated import CalibratedCamera, read_cameras, write_cameras
+from paramove.documents.array_types import Floats, Image, Ints
 from paramove.documents.arrays import read_arrays
 from paramove.documents.atomic_writing import replacing
 from paramove.documents.input_error import InputError
@@ -32,9 +33,6 @@ from paramove.documents.pictures import decoded
 from paramove.observation.arm_body import ArmSizes
 from paramove.source_code import code_digest
 from sim.persons.performances import KINDS, Act, Split, split_of
-
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 FORMAT_VERSION, NOISE_SEED = 1, 1
 TABLE = ((-0.085, -0.66), (0.72, -0.66), (0.72, 0.72), (-0.085, 0.72))
@@ -241,7 +239,7 @@ def write_manifest(folder: Path) -> Path:
     return path
 
 
-def pack(images: Sequence[Image]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+def pack(images: Sequence[Image]) -> tuple[NDArray[np.uint8], Ints]:
     """PNG files of the differences from image to image, joined, and where each begins and the last ends."""
     before = np.zeros_like(images[0])
     files = []
@@ -254,7 +252,7 @@ def pack(images: Sequence[Image]) -> tuple[NDArray[np.uint8], NDArray[np.int64]]
     return np.concatenate(files), np.cumsum([0, *(len(file) for file in files)])
 
 
-def unpacked(packed: NDArray[np.uint8], offsets: NDArray[np.int64]) -> Iterator[Image]:
+def unpacked(packed: NDArray[np.uint8], offsets: Ints) -> Iterator[Image]:
     """The images again."""
     image: Image | None = None
     for begin, end in pairwise(offsets):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from paramove.demonstrations.reaching import table_place
 from paramove.demonstrations.synthetic import RESTING_SHOULDER, RESTING_STERNUM, SAMPLE_RATE_HZ
+from paramove.documents.array_types import Floats
 from sim.persons import actions
 from sim.persons.performers import (
     FIRST_SEED,
@@ -27,7 +28,6 @@ from sim.persons.performers import (
 from sim.persons.recorded import RATE_HZ, RecordedPointing, direction_place, recorded_pointing
 from sim.persons.staging import StagedMovement, Stop, staged
 
-Floats = NDArray[np.float64]
 Split = Literal["tuning", "held_out"]
 
 REST = "rest"

@@ -23,9 +23,8 @@ from paramove.demonstrations.synthetic import (
     Variation,
     minimum_jerk,
 )
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import ArmSizes
-
-Floats = NDArray[np.float64]
 
 FIRST_SEED = 20_600
 """Models are trained with seeds 0 to 7."""

@@ -10,17 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.demonstrations import Demonstrations
 from paramove.demonstrations.recorded_people import RecordedMovement, data_folder, load_recordings
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER
+from paramove.documents.array_types import Floats
 from paramove.documents.arrays import read_arrays
 from paramove.hmm.sequences import resample
 from paramove.observation.arm_body import BENT_POSE_POINTS, ArmSizes
 from paramove.phmm import MovementDescription
-
-Floats = NDArray[np.float64]
 
 DATA_SET = "pointing27"
 RATE_HZ = 50.0

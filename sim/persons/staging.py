@@ -30,8 +30,7 @@ from paramove.demonstrations.synthetic import (
     overreach,
     usual_elbow,
 )
-
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 SWIVEL_AT_REST = 0.25
 USUAL_DURATION_S = 3.2

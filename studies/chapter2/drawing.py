@@ -9,13 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.runs.plots import STYLE
 from studies.chapter2.movement import PARAMETER_SHARES, performance, prototype
 from studies.chapter2.training import Moment
-
-Floats = NDArray[np.float64]
 
 RED, BLUE, GREY, GREEN = "#c8372d", "#2f6fc4", "#8b95a1", "#1f7a45"
 LEAST_SHOWN = 0.01

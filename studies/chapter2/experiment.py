@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import ChainParameters, LeftRightHMM, Parameters
 from studies.chapter2.figures import (
     ERGODIC_10,
@@ -26,8 +26,6 @@ from studies.chapter2.figures import (
 )
 from studies.chapter2.movement import PARAMETER_SETS, ParameterSet
 from studies.chapter2.training import Moment, Trained, chain_model, trained
-
-Floats = NDArray[np.float64]
 
 BRANCHING = (ERGODIC_10, ERGODIC_20, SKIPS_20)
 COMPARED = (ERGODIC_10, PLAIN_5, PLAIN_7, PLAIN_7_NARROW, PLAIN_20_NARROW, TIMED_5, TIMED_10, TIMED_20)

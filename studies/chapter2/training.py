@@ -3,15 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import ChainParameters, GaussianHMM, Parameters, Topology, TrainingOptions, TrainingSummary
 from paramove.hmm.chain import TopologyName
 from paramove.hmm.training import equal_segments, train
 from studies.chapter2.figures import LAST, Setting
 from studies.chapter2.movement import ParameterSet, training_set
-
-Floats = NDArray[np.float64]
 
 FLOOR = 0.002
 """Least standard deviation of an output distribution: below that of the movement's noise, 0.005/√3."""

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import Demonstrator, demonstrations_at, table_targets
 from paramove.demonstrations.synthetic import Action
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
-
-Floats = NDArray[np.float64]
 
 ACTIONS: tuple[Action, ...] = ("pointing", "reaching")
 STATES, FRAMES = 20, 100

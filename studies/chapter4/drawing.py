@@ -9,15 +9,13 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.runs.plots import STYLE
 from studies.chapter2.drawing import BLUE, GREY, RED, ellipse
 from studies.chapter2.movement import prototype
 from studies.chapter4.line_movement import SHOWN
 from studies.movements.plots import svg_of
-
-Floats = NDArray[np.float64]
 
 COLOURS = (RED, GREY, BLUE)
 HUES = ("#2f6fc4", "#c8372d", "#1f7a45", "#a86a00", "#7a4fb5", "#5b6470")

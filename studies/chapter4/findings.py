@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from studies.chapter4.kinds import IPHMM_2, IPHMM_3, LPHMM_2, LPHMM_3
 from studies.chapter4.line_movement import THESIS_TRAINING_S
 
-Floats = NDArray[np.float64]
 Verdict = Literal["yes", "in part", "no"]
 
 THESIS_CLASSIFICATION = {

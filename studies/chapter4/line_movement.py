@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import LinearPHMM
 from studies.chapter2.movement import PARAMETER_SHARES, performance, prototype
-
-Floats = NDArray[np.float64]
 
 BOUND, SEQUENCES, PROGRESSION = 0.25, 10, 0.3
 SHOWN = (0.25, 0.0, -0.25)

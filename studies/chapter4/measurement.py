@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.alignment import movement_distance
+from paramove.documents.array_types import Floats
 from paramove.hmm.synthesis import Path
 from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, PolynomialPHMM
 from studies.chapter4.kinds import BY_NAME, Kind
@@ -27,7 +27,6 @@ from studies.chapter4.unfinished import aborted, stopped
 from studies.movements.measures import covered, theta_error
 from studies.movements.method import Estimate
 
-Floats = NDArray[np.float64]
 Values = dict[str, list[float]]
 
 NOISES_M = (0.0, 0.05, 0.10, 0.15, 0.20)

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, redirect_demonstrations, table_targets
 from paramove.demonstrations.synthetic import Action
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import LeftRightHMM, resample
 from studies.movements.tasks import raster_tasks
-
-Floats = NDArray[np.float64]
 
 ACTIONS: tuple[Action, ...] = ("pointing", "reaching")
 COLUMNS, ROWS, REPETITIONS = 7, 5, 4
@@ -45,7 +43,7 @@ class Shown:
                 kept.append(number)
         return self._chosen(np.array(kept))
 
-    def _chosen(self, numbers: NDArray[np.int64]) -> Shown:
+    def _chosen(self, numbers: Ints) -> Shown:
         return Shown(tuple(self.sequences[number] for number in numbers.tolist()), self.places[numbers])
 
 

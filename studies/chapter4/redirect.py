@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.alignment import movement_distance
 from paramove.demonstrations import (
@@ -21,9 +20,8 @@ from paramove.demonstrations import (
     table_place,
     train_pointing_model,
 )
+from paramove.documents.array_types import Floats
 from paramove.phmm import LinearPHMM, ParametricHMM, QuadraticPHMM
-
-Floats = NDArray[np.float64]
 
 STATES, D_MIN, D_MAX, FRAMES = 32, 2, 3, 80
 THESIS_PAIR = (0.25, 0.80, 0.80, 0.30)

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from paramove.documents.array_types import Floats
 from studies.chapter4.experiments import (
     FIT,
     HMMLEARN,
@@ -24,7 +24,6 @@ from studies.chapter4.raster import ACTIONS
 from studies.chapter4.variation import CORNERS
 from studies.movements.measures import auroc
 
-Floats = NDArray[np.float64]
 Results = Sequence[dict[str, Any]]
 
 UNTYPICAL = ("action", "redirect", "aborted", "stopped")

@@ -6,12 +6,10 @@ Half-way is half of the fingertip's way out, not half of the time, which such a 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import POINT_NAMES
+from paramove.documents.array_types import Floats
 from studies.movements.disturbed import SENSOR_NOISE_M
-
-Floats = NDArray[np.float64]
 
 TIP = POINT_NAMES.index("index")
 

@@ -6,7 +6,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.alignment import movement_distance
 from paramove.demonstrations import POINT_NAMES, Demonstrator, Variation, table_place, table_targets
@@ -24,8 +23,6 @@ from studies.chapter4.raster import (
     raster,
     references,
 )
-
-Floats = NDArray[np.float64]
 
 AT_TARGET = 45
 """Frame of 100 in which the finger is at the target."""

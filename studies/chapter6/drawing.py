@@ -7,11 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from studies.chapter6.measures import LOST_OTHERWISE_M, Track
-
-Floats = NDArray[np.float64]
 
 HUES = {
     (0, 1, 2, 3): "#1d2530", (0,): "#2f6fc4", (1,): "#c8372d", (2,): "#1f7a45", (3,): "#a86a00", (1, 3): "#7a4fb5"

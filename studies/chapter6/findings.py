@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.chapter6.goals import length
 from studies.chapter6.measures import Track
@@ -21,7 +20,6 @@ from studies.chapter6.summary import (
     recognition,
 )
 
-Floats = NDArray[np.float64]
 Verdict = Literal["yes", "in part", "no"]
 
 TABLE_6_1 = {

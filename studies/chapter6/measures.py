@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from paramove.documents.array_types import Floats
 from studies.chapter6.vocabularies import BY_OTHERS
-
-Floats = NDArray[np.float64]
 
 TARGET_MARGIN_S = 0.5
 """A target is looked for from so long before the hand arrives until so long after it leaves."""

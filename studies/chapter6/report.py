@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.report_page import report_page, section
 from sim.persons.clips import Clip, clips_code
 from studies.chapter4.drawing import drawn
@@ -191,7 +191,7 @@ def _kinds(tracks: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
     return parts
 
 
-def _errors(tracks: Sequence[Track], *, targets: bool) -> dict[str, NDArray[np.float64]]:
+def _errors(tracks: Sequence[Track], *, targets: bool) -> dict[str, Floats]:
     """Errors in cm of all tracks of each set of views."""
     found = {}
     for case in (FOUR, SINGLE, TWO):

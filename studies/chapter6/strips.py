@@ -8,15 +8,12 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats, Image, Ints
 from paramove.observation.arm_observer import ArmObserver
 from sim.persons.clips import Clip
 from studies.chapter6.measures import Track
-
-Image = NDArray[np.uint8]
-Floats = NDArray[np.float64]
 
 COLUMNS = 8
 SHOWN_PX = (200, 150)
@@ -42,14 +39,14 @@ def strip(clip: Clip, shown: Sequence[tuple[Track, int]], title: str) -> str:
     return f"<img alt='{title}' style='width:100%' src='data:image/jpeg;base64,{data}'>"
 
 
-def moments(track: Track) -> NDArray[np.int64]:
+def moments(track: Track) -> Ints:
     """Numbers of the frames that are shown, (COLUMNS,)."""
     first = max(int(np.searchsorted(track.times_s, track.acts[0].start_s)) - 1, 0)
     last = min(int(np.searchsorted(track.times_s, track.acts[-1].end_s)), len(track.times_s) - 1)
     return np.linspace(first, last, COLUMNS).round().astype(np.int64)
 
 
-def _row(clip: Clip, track: Track, view: int, wanted: NDArray[np.int64]) -> Image:
+def _row(clip: Clip, track: Track, view: int, wanted: Ints) -> Image:
     observer = ArmObserver(clip.sizes, [clip.cameras[view]], threads=1)
     pictures: dict[int, Image] = {}
     for number, image in enumerate(clip.images(view)):

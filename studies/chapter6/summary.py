@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim.persons.performances import KINDS
 from studies.chapter6.experiments import ALL_VIEWS, TRACKED_KINDS
 from studies.chapter6.measures import DUAL, LOST_M, RECOGNISED, Track
-
-Floats = NDArray[np.float64]
 
 FOUR, SINGLE, TWO = "four views", "single views", "cameras 2 and 4"
 TABLE_KINDS = ("pointing", "pouring", "box", "complex")

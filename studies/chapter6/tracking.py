@@ -22,8 +22,6 @@ from sim.persons.clips import TABLE, Clip, read_clip
 from sim.persons.performances import Act
 from studies.chapter6.vocabularies import Knowledge, knowledge_of
 
-Floats = NDArray[np.float64]
-
 LENGTH_DIGITS = 4
 """Lengths are kept in m to 0.1 mm."""
 

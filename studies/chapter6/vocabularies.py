@@ -8,18 +8,16 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.grammar_file import parsed_grammar
 from paramove.action_space.placement import PersonPlacement
 from paramove.action_space.training import cached_action
 from paramove.action_space.vocabulary import ActionModel, Vocabulary, table_target
+from paramove.documents.array_types import Floats
 from sim.persons.actions import EYE, FAR_ORIGIN, SHOWN, far_place
 from sim.persons.performances import recording_of
 from sim.persons.recorded import direction_place, recorded_demonstrations
-
-Floats = NDArray[np.float64]
 
 COMPLEX_POINTING = """
 begin: point(a)

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.alignment import warp
+from paramove.documents.array_types import Floats, Ints
 from paramove.motion.reaching_movement import ArmPoses
-
-FloatArray = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SIGNIFICANT = (20, 60)
 """The significant states, first and last, counted from 1 (5.2.7): outside them base poses differ by themselves."""
@@ -32,9 +30,9 @@ class RobotArm:
         elbow_turn: How far a joint limit turned the elbow about the shoulder-gripper line, [N], rad.
     """
 
-    elbow: FloatArray
-    gripper: FloatArray
-    elbow_turn: FloatArray
+    elbow: Floats
+    gripper: Floats
+    elbow_turn: Floats
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Movement:
     proposed: ArmPoses
     closed_form: RobotArm
     within_limits: RobotArm
-    outside: FloatArray
+    outside: Floats
 
     @property
     def limited(self) -> NDArray[np.bool_]:
@@ -74,11 +72,11 @@ class Errors:
     """
 
     state: Ints
-    gripper: FloatArray
-    elbow: FloatArray
-    effective: FloatArray
-    least_imitation: FloatArray
-    imitation: FloatArray
+    gripper: Floats
+    elbow: Floats
+    effective: Floats
+    least_imitation: Floats
+    imitation: Floats
     limited: NDArray[np.bool_]
 
     @property
@@ -112,7 +110,7 @@ def errors_of(synthesised: Movement, reference: Movement, *, aligned: bool, exec
     )
 
 
-def pairs(first: FloatArray, second: FloatArray, aligned: bool) -> tuple[Ints, Ints]:
+def pairs(first: Floats, second: Floats, aligned: bool) -> tuple[Ints, Ints]:
     """Which states of two sequences [N, 3] are compared: the same, or those that time warping (B.8) brings together."""
     if aligned:
         path = warp(first, second, "B")
@@ -121,7 +119,7 @@ def pairs(first: FloatArray, second: FloatArray, aligned: bool) -> tuple[Ints, I
     return same, same
 
 
-def largest(values: FloatArray, where: NDArray[np.bool_]) -> float | None:
+def largest(values: Floats, where: NDArray[np.bool_]) -> float | None:
     """The largest of the chosen values; None where there are none."""
     chosen = values[where]
     return float(chosen.max()) if chosen.size else None
@@ -137,5 +135,5 @@ def ranges(states: Ints) -> str:
     return ", ".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
 
 
-def _mm(a: FloatArray, b: FloatArray) -> FloatArray:
+def _mm(a: Floats, b: Floats) -> Floats:
     return np.asarray(1000.0 * np.linalg.norm(a - b, axis=1))

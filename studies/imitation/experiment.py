@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.reaching import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
@@ -16,8 +15,6 @@ from paramove.motion.conversion import RobotMovement
 from paramove.robots.description import RobotDescription
 from studies.imitation.errors import SIGNIFICANT, Errors, Movement, errors_of, largest, ranges
 from studies.imitation.reference import ReferenceKind, References, on_robot, reference_movement
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

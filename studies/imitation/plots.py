@@ -10,7 +10,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from paramove.runs.plots import STYLE
 from studies.imitation.errors import SIGNIFICANT, Errors
@@ -23,8 +22,6 @@ from studies.imitation.experiment import (
     maxima,
     raster,
 )
-
-FloatArray = NDArray[np.float64]
 
 BLUE, RED, BLACK, MAGENTA, GREEN = "#2f6fc4", "#c8372d", "#1d2530", "#b0309a", "#1f7a45"
 ELBOW_LINES = (

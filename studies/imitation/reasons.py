@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.imitation.errors import SIGNIFICANT, largest, ranges
 from studies.imitation.experiment import THESIS_PLACES, Comparison, Experiment, Place
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.reaching import demonstrations_at, reaching_grid_demonstrations
+from paramove.documents.array_types import Floats
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.sequences import resample
 from paramove.motion.arm_pose import ArmPoseSolver
@@ -20,7 +20,6 @@ from paramove.phmm import InterpolativePHMM
 from paramove.phmm.synchronisation import synchronised
 from studies.imitation.errors import Movement, RobotArm
 
-FloatArray = NDArray[np.float64]
 ReferenceKind = Literal["own", "global"]
 
 
@@ -48,7 +47,7 @@ class References:
         frames = [references._resampled(sequence) for sequence in shown.sequences]
         return cls(model, seed, repetitions, references._empty().fit(frames).parameters)
 
-    def means(self, target: FloatArray, number: int, kind: ReferenceKind) -> FloatArray:
+    def means(self, target: Floats, number: int, kind: ReferenceKind) -> Floats:
         """State means [N, 21], m, of a local model for one target [3], m, frame of the demonstrations.
 
         "own": an HMM with the same time restrictions, trained on this target alone, as in 4.2.4. "global": set up as
@@ -70,12 +69,12 @@ class References:
         model = self.model
         return LeftRightHMM(model.n_states, model.d_min, model.d_max, options=self._options())
 
-    def _resampled(self, sequence: FloatArray) -> FloatArray:
+    def _resampled(self, sequence: Floats) -> Floats:
         frames = self.model.resampled_frames
         return sequence if frames is None else resample(sequence, frames)
 
 
-def reference_movement(movement: RobotMovement, solver: ArmPoseSolver, means: FloatArray) -> Movement:
+def reference_movement(movement: RobotMovement, solver: ArmPoseSolver, means: Floats) -> Movement:
     """A local model's means converted like the interpolative model's (5.7), on the robot."""
     return on_robot(movement.converted(means, POINT_NAMES), solver)
 

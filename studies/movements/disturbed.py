@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 SENSOR_NOISE_M = 0.001
 

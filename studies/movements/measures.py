@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, rankdata
 
 from paramove.alignment import movement_distance
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, Estimate
 
-Floats = NDArray[np.float64]
 ThetaKind = Literal["direction", "place", "raster"]
 
 RASTER_CM = np.array([80.0, 30.0])

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from paramove.documents.array_types import Floats, Ints
 
 SYNTHESIS, THETA, CLASSES, BEGINNINGS, TYPICALITY = "synthesis", "theta", "classes", "beginnings", "typicality"
 """What a method can do, as it says itself; what it cannot is a dash in the tables."""

@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
 from studies.movements.method import (
@@ -25,7 +25,6 @@ from studies.movements.method import (
 )
 from studies.movements.sweep import Row
 
-Floats = NDArray[np.float64]
 FLOOR_M = 1e-4
 """Recordings may hold a point that never moves: nothing is known better than to a tenth of a millimetre."""
 

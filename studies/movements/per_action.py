@@ -6,11 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from studies.movements.method import Estimate, Examples, Method, NotAble
-
-Floats = NDArray[np.float64]
 
 
 class PerAction(NotAble):

@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from studies.movements.measures import auroc
-
-Floats = NDArray[np.float64]
 
 RESAMPLES = 400
 INTERVAL = (2.5, 97.5)

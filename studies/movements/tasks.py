@@ -21,7 +21,6 @@ from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, table_targets
 from paramove.demonstrations.recorded_people import (
@@ -32,11 +31,11 @@ from paramove.demonstrations.recorded_people import (
     data_folder,
     load_recordings,
 )
+from paramove.documents.array_types import Floats
 from studies.movements.measures import ThetaKind
 from studies.movements.method import Examples
 from studies.movements.per_action import first_frames
 
-Floats = NDArray[np.float64]
 RASTER_ACTIONS = ("reaching", "pointing")
 FIRST_MS = (100, 200, 400)
 

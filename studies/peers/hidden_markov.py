@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library
-
-Floats = NDArray[np.float64]
 
 
 def left_right(n_states: int) -> Floats:

@@ -8,16 +8,15 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.hidden_markov import left_right
 from studies.peers.library import library
 from studies.peers.linear_gaussian import QuadraticFeatures
 
-Floats = NDArray[np.float64]
 ITERATIONS = 15
 
 

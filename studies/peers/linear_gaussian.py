@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
+from paramove.documents.array_types import Floats
 from studies.movements.method import Estimate
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

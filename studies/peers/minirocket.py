@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library
 
-Floats = NDArray[np.float64]
 ALPHAS = np.logspace(-3, 5, 17)
 
 

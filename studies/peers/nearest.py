@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library
-
-Floats = NDArray[np.float64]
 
 
 class NearestByWarping(NotAble):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library
 from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
-
-Floats = NDArray[np.float64]
 
 
 @lru_cache

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, SYNTHESIS, THETA, Estimate, Examples, Method, NotAble
 
-Floats = NDArray[np.float64]
 INNER_FOLDS = 3
 MOST_ASKED = 24
 """About as many movements are asked in an inner fold, evenly chosen: more cost time and change few choices."""

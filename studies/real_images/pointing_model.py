@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.action_space.placement import PersonPlacement
 from paramove.action_space.training import cached_action
@@ -16,10 +16,9 @@ from paramove.action_space.vocabulary import ActionModel
 from paramove.demonstrations import Demonstrations
 from paramove.demonstrations.arm import elbow_positions, swivel_towards, unit
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, minimum_jerk
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import POSE_POINTS, ArmSizes
 from paramove.phmm import CubicPHMM, MovementDescription
-
-Floats = NDArray[np.float64]
 
 NAME = "pointing_seated"
 LEFTMOST, AZIMUTH_SPAN = np.radians(65.0), np.radians(160.0)

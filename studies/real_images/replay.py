@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
-from numpy.typing import NDArray
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.messages import arm_pose_message, estimate_message, outline_message
@@ -24,14 +23,13 @@ from paramove.action_space.vocabulary import Vocabulary
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.frame_sources import open_source
 from paramove.cameras.frames import EndOfFrames, FrameChecks, decode, encode
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.arm_observer import ArmObserver
 from studies.real_images import seated_person
 from studies.real_images.pointing_model import NAME, pointing_action
-
-Floats = NDArray[np.float64]
 
 IMAGES = "color"
 RATE_HZ = 10.0

@@ -11,15 +11,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats
 from paramove.documents.report_page import report_page, section
 from studies.chapter4.drawing import drawn
 from studies.real_images.experiment import JUDGED, Replay
 from studies.real_images.scores import GOAL_PX, RANGES, middle_of_hand
-
-Floats = NDArray[np.float64]
 
 SHOWN_FRAMES = (0, 7, 20, 34, 42, 46, 50, 60)
 MOST_PX = 250.0

@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.arrays import read_arrays
 from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import fitted_poses
 from studies.real_images.replay import Said
 from studies.real_images.seated_person import SIZES
-
-Floats = NDArray[np.float64]
 
 REFERENCE = "hand_reference.npz"
 GOAL_PX = 25.0
@@ -36,7 +35,7 @@ class Distances:
         lost: frames in which the tracker said that the arm is lost, (T,).
     """
 
-    frames: NDArray[np.int64]
+    frames: Ints
     middle: Floats
     tip: Floats
     lost: NDArray[np.bool_]

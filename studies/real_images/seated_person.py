@@ -11,15 +11,13 @@ import json
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.placement import PersonPlacement
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.demonstrations.arm import unit
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
-
-Floats = NDArray[np.float64]
 
 INTRINSICS = "cam_params_realsense.json"
 

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 TABLE_POINTS = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index", "thumb")
 POINTING_POINTS = ("indexFinger", "hand", "forearm", "upperArm", "rightShoulder", "hmd", "leftShoulder")

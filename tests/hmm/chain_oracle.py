@@ -6,11 +6,10 @@ A finish state is state N + 1 with its dummy sample (2.2.3.1). Sub-states that s
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats, Ints
 
 
 @dataclass
@@ -21,7 +20,7 @@ class Chain:
     transitions: Floats
     means: Floats
     covariances: Floats
-    shared: NDArray[np.int64]
+    shared: Ints
 
 
 def forward_backward(chain: Chain, sequence: Floats, finish: bool) -> tuple[float, Floats, Floats, Floats]:

@@ -1,11 +1,10 @@
 """The thesis's own form of the model, as an oracle: every state replaced by d_max sub-states (2.2.3.2), plain numpy."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 def expanded_transitions(durations: Floats) -> Floats:

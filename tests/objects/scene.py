@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim.camera import graphics_backend
 
 COLOURS = {"yellow": "0.90 0.78 0.05 1", "green": "0.08 0.60 0.15 1", "blue": "0.08 0.18 0.75 1"}
@@ -157,7 +158,7 @@ class Scene:
         noisy = bgr + self._draw.normal(0.0, self.look.noise, bgr.shape)
         return np.clip(np.round(noisy), 0, 255).astype(np.uint8)
 
-    def project(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def project(self, point: Floats) -> Floats:
         """The image point of a world point, px, distorted like the image."""
         in_camera = self._camera_from_world[:3, :3] @ point + self._camera_from_world[:3, 3]
         x, y = in_camera[0] / in_camera[2], in_camera[1] / in_camera[2]

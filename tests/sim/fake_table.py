@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from sim import places, tool_box
-
-FloatArray = NDArray[np.float64]
 
 
 class FakeTable:
@@ -24,22 +22,22 @@ class FakeTable:
         self.grasps: list[str] = []
         self._offset = np.zeros(3)
 
-    def position(self, name: str) -> FloatArray:
+    def position(self, name: str) -> Floats:
         return self.positions[name].copy()
 
-    def gripper(self) -> tuple[FloatArray, FloatArray]:
+    def gripper(self) -> tuple[Floats, Floats]:
         return self.gripper_position.copy(), np.eye(3)
 
     def openings_up(self) -> bool:
         return self.up
 
-    def move_hand(self, fingertip: FloatArray, backward: FloatArray) -> None:
+    def move_hand(self, fingertip: Floats, backward: Floats) -> None:
         assert np.linalg.norm(backward) > 0
         self.fingertip = np.array(fingertip)
         if self.held_by_instructor is not None:
             self.positions[self.held_by_instructor] = self.fingertip + self._offset
 
-    def move_box(self, offset: FloatArray, quaternion: tuple[float, ...] | FloatArray) -> None:
+    def move_box(self, offset: Floats, quaternion: tuple[float, ...] | Floats) -> None:
         self.box_offset = np.array(offset)
         self.up = abs(quaternion[0]) > 0.5
         over_box = [centre for centre in self.positions.values() if self._support(centre) > tool_box.TABLE_Z + 0.03]
@@ -62,7 +60,7 @@ class FakeTable:
             centre[2] = self._support(centre) + tool_box.CYLINDER_HALF_HEIGHT
         self.held_by_instructor = None
 
-    def _support(self, centre: FloatArray) -> float:
+    def _support(self, centre: Floats) -> float:
         """Height of what is below a cylinder that falls from `centre`."""
         in_box = all(
             low <= value <= high

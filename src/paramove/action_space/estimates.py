@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.observation.arm_body import HAND
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 KERNEL_WIDTHS = (0.15, 0.10, 0.05)
 """sigma_1 to sigma_3 of (6.19), m."""

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.input_error import InputError
 from paramove.documents.wording import nearest
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEW = -1
 """In a binding: this place is unknown and drawn anew."""

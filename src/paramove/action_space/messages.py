@@ -9,16 +9,15 @@ import numpy as np
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from paramove.action_space.video_tracker import TrackedMoment
 from paramove.cameras.calibrated import WORLD_FRAME
+from paramove.documents.array_types import Floats
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.arm_body import BENT_POSE_POINTS, HAND
-
-Floats = NDArray[np.float64]
 
 NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", "wrist": "wrist"}
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.propagation import Particles, Propagation
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.input_error import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ARRAYS = ("step", "origin", "theta", "tau", "deviation", "poses")
 """Of particles, beside their weights."""

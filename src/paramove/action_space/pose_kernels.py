@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled_sums
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @compiled_sums

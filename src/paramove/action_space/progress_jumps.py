@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 LEAST_CONCENTRATION = 0.8
 """Length of the mean of the progress as a direction, 0 (spread over all of the action) to 1."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.grammar import BASE, Grammar
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.input_error import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 THESIS_RATE_HZ = 8.0
 """The diffusions of 6.4.4 are told per frame at this rate. Here their variances grow with time, so that they are the

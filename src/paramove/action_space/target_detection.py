@@ -6,12 +6,10 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.estimates import ThetaEstimate
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

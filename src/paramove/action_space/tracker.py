@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.estimates import (
     KERNEL_WIDTHS,
@@ -28,11 +27,11 @@ from paramove.action_space.reached_place import ReachedPlace, reached_place
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth
 from paramove.action_space.vocabulary import Vocabulary
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import HAND
 from paramove.observation.presence import Presence
 
-Floats = NDArray[np.float64]
 Measure = Callable[[Floats], Floats | None]
 
 
@@ -244,7 +243,7 @@ class ActionTracker:
         advance = elapsed_s / self.vocabulary.actions[number].duration_s
         self.progress_jumps.update(name, particles.tau[rows], particles.weights[rows], advance)
 
-    def _theta(self, action: NDArray[np.int64]) -> tuple[dict[str, ThetaEstimate], dict[str, Floats]]:
+    def _theta(self, action: Ints) -> tuple[dict[str, ThetaEstimate], dict[str, Floats]]:
         """Parameters and targets of the actions that have particles."""
         particles, theta, targets = self.filter.particles, {}, {}
         for number, model in enumerate(self.vocabulary.actions):

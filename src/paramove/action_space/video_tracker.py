@@ -6,16 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.action_space.tracker import ActionBelief, ActionTracker
 from paramove.cameras.aligned_views import AlignedViews, Views
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.watch import CameraWatch
+from paramove.documents.array_types import Floats, Image
 from paramove.observation.arm_observer import ArmObserver
-
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 LEAST_SHARPNESS = 3.0
 """Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above

@@ -8,17 +8,15 @@ from functools import cached_property
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.action_space.pose_kernels import write_polynomial_poses, write_tabled_poses
 from paramove.demonstrations import table_place
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.input_error import InputError
 from paramove.hmm import LeftRightHMM
 from paramove.observation.arm_body import BENT_POSE_POINTS, HAND, POSE_POINTS
 from paramove.phmm import ParametricHMM, PolynomialPHMM
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 POSE_SIZES = (3 * len(POSE_POINTS), 3 * len(BENT_POSE_POINTS))
 THETA_BOUNDS = (-0.2, 1.2)

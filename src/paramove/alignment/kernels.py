@@ -6,12 +6,9 @@ can do; the recurrence, which they cannot, is left with one addition and one com
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @compiled

@@ -3,13 +3,12 @@
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.alignment import kernels
+from paramove.documents.array_types import Ints
 from paramove.hmm.sequences import checked_sequence
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 StepPattern = Literal["A", "B"]
 
 STEPS = {

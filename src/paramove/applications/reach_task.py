@@ -9,11 +9,11 @@ from typing import Annotated, Self
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
 from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.settled_joints import SettledJoints
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.motion.hand_poses import FARTHEST_M, metres
 from paramove.motion.motion_message import motion_message
@@ -23,8 +23,6 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.out_of_reach import OutOfReachError
-
-FloatArray = NDArray[np.float64]
 
 _log = logging.getLogger(__name__)
 
@@ -71,7 +69,7 @@ class ReachStep(BaseModel):
             return f"reach for {metres(np.array(self.reach))}"
         return f"pick up at {metres(np.array(self.pick))} and place at {metres(np.array(self.place))}"
 
-    def planned(self, reaching: ServoArmReaching, start: FloatArray) -> PlannedMotion:
+    def planned(self, reaching: ServoArmReaching, start: Floats) -> PlannedMotion:
         """The motion from a pose. Raises OutOfReachError."""
         if self.reach is not None:
             return reaching.reach(self.reach, start)
@@ -124,7 +122,7 @@ class ReachTask:
         self._armed = False
         self._done = 0
         self._sent = 0
-        self._at: FloatArray | None = None
+        self._at: Floats | None = None
         self._running: _Running | None = None
         self._says = ReachSays()
         self._now_ns = 0
@@ -228,7 +226,7 @@ class ReachTask:
             self._unarmed_told = self._unarmed
             self._tell(self._unarmed)
 
-    def _plan(self, start: FloatArray) -> None:
+    def _plan(self, start: Floats) -> None:
         going_home = self._done >= len(self._steps)
         try:
             motion = (

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 REST_NS = 300_000_000
 STALE_NS = 1_000_000_000
@@ -29,7 +28,7 @@ class SettledJoints:
 
     def __init__(self, joints: Sequence[str]) -> None:
         self._joints = tuple(joints)
-        self._heard: deque[tuple[int, FloatArray]] = deque()
+        self._heard: deque[tuple[int, Floats]] = deque()
         self.missing: tuple[str, ...] = ()
 
     def hear(self, message: JointStates, now_ns: int) -> None:
@@ -43,7 +42,7 @@ class SettledJoints:
         while len(self._heard) > 2 and now_ns - self._heard[1][0] >= REST_NS:
             self._heard.popleft()
 
-    def settled(self, now_ns: int) -> FloatArray | None:
+    def settled(self, now_ns: int) -> Floats | None:
         """The newest angles [J], rad, if the joints have rested for a while and are heard; else None."""
         if not self._heard or now_ns - self._heard[-1][0] > STALE_NS or now_ns - self._heard[0][0] < REST_NS:
             return None

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Image = NDArray[np.uint8]
+from paramove.documents.array_types import Image
 
 PATIENCE_PERIODS = 3.0
 """A camera that is silent for so many of its periods is gone: nobody waits for it any longer."""

@@ -16,16 +16,14 @@ import cv2
 import numpy as np
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
+from paramove.documents.array_types import Floats, Image
 from paramove.documents.atomic_writing import replacing
 from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
-
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.cameras.charuco_board import Board, BoardView
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
-
-Matrix = NDArray[np.float64]
 
 LEAST_VIEWS = 6
 GOOD_VIEWS = 15
@@ -57,8 +56,8 @@ class Lens:
 
     name: str
     size: tuple[int, int]
-    matrix: Matrix
-    distortion: Matrix
+    matrix: Floats
+    distortion: Floats
     error_px: float
     focal_sd_px: float
     centre_sd_px: float
@@ -182,10 +181,10 @@ def _tilt_deg(views: Sequence[BoardView], board: Board) -> float:
 
 @dataclass(frozen=True)
 class _Fit:
-    matrix: Matrix
-    distortion: Matrix
+    matrix: Floats
+    distortion: Floats
     error_px: float
-    view_errors_px: Matrix
+    view_errors_px: Floats
     focal_sd_px: float
     centre_sd_px: float
 
@@ -215,7 +214,7 @@ def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
     )
 
 
-def _agreeing(errors_px: Matrix) -> NDArray[np.bool_]:
+def _agreeing(errors_px: Floats) -> NDArray[np.bool_]:
     """Views to keep: all but those that are far worse than the rest (blurred, bent, moved); at most a quarter."""
     bad = errors_px > max(OUTLIER_PX, OUTLIER_FACTOR * float(np.median(errors_px)))
     too_many = bad.sum() > MOST_OUTLIERS * len(bad) or (~bad).sum() < LEAST_VIEWS

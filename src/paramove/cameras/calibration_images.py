@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 
 from paramove.cameras.calibration import GOOD_VIEWS, CalibrationError
-from paramove.cameras.charuco_board import BoardFinder, BoardView, Image
+from paramove.cameras.charuco_board import BoardFinder, BoardView
+from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError
 from paramove.documents.pictures import opened_video, read_picture
 

@@ -15,10 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Image
 from paramove.documents.input_error import InputError
-
-Matrix = NDArray[np.float64]
-Image = NDArray[Any]  # uint8 [H, W] or [H, W, 3]
 
 COLUMNS, ROWS = 8, 5
 MARKERS = COLUMNS * ROWS // 2
@@ -103,11 +101,11 @@ class Board:
         size = (COLUMNS, ROWS)
         return cv2.aruco.CharucoBoard(size, self.square, MARKER_SHARE * self.square, dictionary(), self.ids)
 
-    def corners(self) -> Matrix:
+    def corners(self) -> Floats:
         """Inner corners of the squares, [28, 3], m, in the table frame, row by row from the upper left."""
         return self.on_table(self.opencv.getChessboardCorners())
 
-    def on_table(self, points: NDArray[Any]) -> Matrix:
+    def on_table(self, points: NDArray[Any]) -> Floats:
         """Points [..., 3] of OpenCV's board frame in the table frame, m."""
         right, down, into = np.moveaxis(points.astype(np.float64), -1, 0)
         forward = (ROWS + 1) * self.square - down
@@ -134,7 +132,7 @@ class BoardView:
 
     name: str
     corner_ids: NDArray[np.int32]
-    points: Matrix
+    points: Floats
     size: tuple[int, int]
     first_id: int
 
@@ -220,7 +218,7 @@ def _board_of(marker_ids: NDArray[np.int32]) -> int | None:
     return int(np.argmax(counts)) * MARKERS if counts.any() else None
 
 
-def _crossing(gray: Image, on_board: Matrix, in_image: Matrix) -> NDArray[np.bool_]:
+def _crossing(gray: Image, on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
     """At which corners two black and two white squares meet, [N]: not where a finger hides one of them."""
     homography, _ = cv2.findHomography(on_board, in_image, cv2.RANSAC, 3.0)
     if homography is None:
@@ -236,7 +234,7 @@ def _crossing(gray: Image, on_board: Matrix, in_image: Matrix) -> NDArray[np.boo
     return np.asarray(white.min(axis=1) - black.max(axis=1) > LEAST_CONTRAST * contrast)
 
 
-def _agreeing(on_board: Matrix, in_image: Matrix) -> NDArray[np.bool_]:
+def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
     """Which corners agree with a view of a plane, [N].
 
     First with a perspective view, up to what a lens bends; then with one bent smoothly: what is left of the distances

@@ -11,9 +11,10 @@ from typing import Any, Protocol
 import cv2
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.cameras.frames import EndOfFrames, Frame, FrameError, Image, image_of_raw
+from paramove.cameras.frames import EndOfFrames, Frame, FrameError, image_of_raw
 from paramove.cameras.replayed_frames import FolderFrames, RecordingFrames
 from paramove.devices import holders
+from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError
 from paramove.documents.pictures import opened_video
 

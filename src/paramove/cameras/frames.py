@@ -7,18 +7,15 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError
 from paramove.documents.pictures import JPEG, decoded
-
-Image = NDArray[Any]  # uint8 [H, W, 3], BGR
 
 CAMERA_FRAME = "camera_optical"
 DARK_LEVEL = 16.0

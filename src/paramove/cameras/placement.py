@@ -8,13 +8,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.calibration import CalibrationError, Lens
 from paramove.cameras.charuco_board import Board, BoardView
-
-Matrix = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 LEAST_NOISE_PX = 0.05
 """Corners are never found better than this, however few there are to show it."""
@@ -94,7 +92,7 @@ def _check_views(lens: Lens, views: Sequence[BoardView]) -> None:
             )
 
 
-def _best_pose(lens: Lens, on_table: Matrix, in_image: Matrix) -> tuple[Any, Any]:
+def _best_pose(lens: Lens, on_table: Floats, in_image: Floats) -> tuple[Any, Any]:
     """Rotation vector and translation of the better of the two poses in which a plane can be seen, refined."""
     level = on_table - [0.0, 0.0, on_table[0, 2]]
     count, rotations, shifts, _ = cv2.solvePnPGeneric(
@@ -119,7 +117,7 @@ def _best_pose(lens: Lens, on_table: Matrix, in_image: Matrix) -> tuple[Any, Any
     return found[0][1]
 
 
-def _deviations(jacobian: Matrix, rotation: Any, shift: Any, noise_px: float) -> tuple[float, float]:
+def _deviations(jacobian: Floats, rotation: Any, shift: Any, noise_px: float) -> tuple[float, float]:
     """Standard deviations of the direction, deg, and of the place, m, from d(pixels)/d(rotation, translation)."""
     covariance = noise_px**2 * np.linalg.inv(jacobian.T @ jacobian)
     place_by_pose = np.empty((3, 6))
@@ -134,5 +132,5 @@ def _deviations(jacobian: Matrix, rotation: Any, shift: Any, noise_px: float) ->
     return float(np.rad2deg(np.sqrt(np.trace(covariance[:3, :3])))), float(np.sqrt(np.trace(place)))
 
 
-def _position(pose: Matrix) -> Matrix:
+def _position(pose: Floats) -> Floats:
     return np.asarray(-cv2.Rodrigues(pose[:3])[0].T @ pose[3:], dtype=np.float64)

@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.documents import exit_codes
+from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError
 from paramove.documents.wording import printable
 
 if TYPE_CHECKING:
     from paramove.cameras.calibration import Lens
     from paramove.cameras.calibration_images import ImageSource
-    from paramove.cameras.charuco_board import Board, BoardView, Image
+    from paramove.cameras.charuco_board import Board, BoardView
     from paramove.cameras.placement import Placement
+    from paramove.documents.array_types import Image
 
 app = typer.Typer(name="calibrate", no_args_is_help=True, help="Print the calibration board; calibrate cameras.")
 

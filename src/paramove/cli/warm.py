@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 from platformdirs import user_cache_path
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+from paramove.documents.array_types import Floats
 
+if TYPE_CHECKING:
     from paramove.cameras.calibrated import CalibratedCamera
 
 app = typer.Typer(add_completion=False)
@@ -50,7 +49,7 @@ def _stored(cache: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in (*cache.glob("reaching_*.npz"), *cache.glob("actions/*.npz"))}
 
 
-def _sequences() -> list[NDArray[np.float64]]:
+def _sequences() -> list[Floats]:
     """Three short movements."""
     import numpy as np
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 VISUAL_GROUP = 2
 _TYPES = {
@@ -51,7 +50,7 @@ class RobotShape:
                 self._data.qpos[self._model.jnt_qposadr[joint]] = angle
         mujoco.mj_kinematics(self._model, self._data)
 
-    def site(self, name: str) -> FloatArray:
+    def site(self, name: str) -> Floats:
         """Position of a site [3], m; raises KeyError if the model has none of that name."""
         return np.array(self._data.site(name).xpos, dtype=np.float64)
 
@@ -80,5 +79,5 @@ class RobotShape:
         return [_rounded(pose) for pose in poses]
 
 
-def _rounded(values: FloatArray) -> list[float]:
+def _rounded(values: Floats) -> list[float]:
     return [round(float(value), 5) for value in values]

@@ -6,9 +6,8 @@ The seven body points are those of thesis 4.2.1. All positions are in metres, x 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 POINT_NAMES = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index", "thumb")
 UP = np.array([0.0, 0.0, 1.0])

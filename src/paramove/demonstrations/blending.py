@@ -8,16 +8,15 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.alignment import warp
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.reaching import Demonstrations, demonstrations_at, table_place, table_targets
 from paramove.demonstrations.synthetic import FRAME, Demonstrator, Timing, minimum_jerk
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import checked_sequence, interpolate, resample
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
-
-Floats = NDArray[np.float64]
 
 ALIGNED_FRAMES = 200
 SMOOTHED_FRAMES = 7  # over which speed is measured; noise of a sensor is slower then

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement, place_of_theta
+from paramove.demonstrations.movement import DemonstrationError, Movement, place_of_theta
+from paramove.documents.array_types import Floats
 
 BODY = "body"
 SHOULDER, OTHER_SHOULDER, STERNUM = "shoulder", "other_shoulder", "sternum"

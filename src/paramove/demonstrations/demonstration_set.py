@@ -11,10 +11,11 @@ import numpy as np
 
 from paramove.demonstrations import body_frame, timing
 from paramove.demonstrations.labels import FILE_NAME, load_labels
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.reading import read_movements
 from paramove.demonstrations.splitting import SplitBy, split_groups
 from paramove.demonstrations.writing import Label, Take, write_set
+from paramove.documents.array_types import Floats
 
 if TYPE_CHECKING:
     from paramove.demonstrations.reaching import Demonstrations

@@ -8,11 +8,9 @@ to the other. A polynomial follows such a change badly, a grid only with many li
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.synthetic import minimum_jerk
-
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 EDGE_HEIGHT = 0.05
 EDGE_WIDTH = 0.06

@@ -12,8 +12,9 @@ import numpy as np
 
 from paramove.demonstrations.labelling import next_repetition
 from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
-from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, Take, write_set
+from paramove.documents.array_types import Floats
 from paramove.documents.atomic_writing import replacing
 from paramove.robots.arm_points import ARM_BASE, POINT_NAMES, arm_points
 from paramove.robots.description import DescriptionError, RobotDescription

@@ -9,9 +9,10 @@ import numpy as np
 
 from paramove.demonstrations.gaps import fill_gaps
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
 from paramove.demonstrations.timing import FAST, FINGERTIP, SLOW, speeds
+from paramove.documents.array_types import Floats
 from paramove.documents.wording import nearest
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations.arm import POINT_NAMES, ArmLengths
@@ -18,8 +17,7 @@ from paramove.demonstrations.synthetic import (
     Demonstrator,
     Timing,
 )
-
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats, Ints
 
 FRAMES = 24
 """Of a last part, however long it took."""
@@ -111,7 +109,7 @@ class LastParts:
 
     sequences: list[Floats]
     theta: Floats
-    groups: NDArray[np.int64]
+    groups: Ints
     duration_s: float
 
 

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 
-Floats = NDArray[np.float64]
 Side = Literal["right", "left"]
 AXIS_ENDINGS = ("_x", "_y", "_z")
 

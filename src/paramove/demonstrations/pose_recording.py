@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.bus.topics import HUMAN_ARM_POSE
-from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents.array_types import Floats, Ints
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.recording.reader import read
 from paramove.recording.writer import RecordingWriter
@@ -33,7 +34,7 @@ class PoseRecording:
         frame: Coordinate frame.
     """
 
-    time_ns: NDArray[np.int64]
+    time_ns: Ints
     positions: Floats
     point_names: tuple[str, ...]
     frame: str

@@ -4,15 +4,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
+from paramove.documents.array_types import Floats
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 from paramove.phmm.kept_model import stored_model
 from paramove.source_code import code_digest
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from paramove.demonstrations.gaps import PointGap, fill_gaps
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
+from paramove.documents.array_types import Floats
 from paramove.documents.positions import DocumentError, raise_any
 from paramove.documents.wording import nearest
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.documents.arrays import read_arrays
 from paramove.documents.input_error import InputError
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 VARIABLE = "PARAMOVE_DATA"
@@ -323,7 +323,7 @@ def onset_of(fingertip: Floats, end: int, rate_hz: float) -> int:
     return int(slow[-1]) + 1 if slow.size and slow[-1] < fast else (0 if not slow.size else fast)
 
 
-def _target_ids(arrays: dict[str, Any]) -> NDArray[np.int64]:
+def _target_ids(arrays: dict[str, Any]) -> Ints:
     """Numbers of the targets; without the array target_id equal targets have equal numbers."""
     if "target_id" in arrays:
         return np.asarray(arrays["target_id"], dtype=np.int64)

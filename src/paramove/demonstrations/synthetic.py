@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import ArmLengths, ArmPath, body_points, swivel_towards
+from paramove.documents.array_types import Floats
 
-Floats = NDArray[np.float64]
 Action = Literal["reaching", "pointing"]
 
 FRAME = "demonstrator_table"

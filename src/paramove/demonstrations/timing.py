@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement
+from paramove.demonstrations.movement import DemonstrationError, Movement
+from paramove.documents.array_types import Floats
 
 FINGERTIP = "index"
 SLOW, FAST = 0.03, 0.15

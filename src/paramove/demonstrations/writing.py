@@ -11,8 +11,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
-from paramove.demonstrations.movement import DemonstrationError, Floats, Movement, Side
+from paramove.demonstrations.movement import DemonstrationError, Movement, Side
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
+from paramove.documents.array_types import Floats
 from paramove.documents.findings import findings
 
 LIBRARY = "paramove demonstrations"

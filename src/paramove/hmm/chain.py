@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import chain_kernels
 from paramove.hmm.covariances import Covariance, covariances_of, log_prior
 from paramove.hmm.estimation import Moments, whitened
@@ -14,8 +15,6 @@ from paramove.hmm.gaussians import stacked_log_outputs, stacked_moments
 from paramove.hmm.options import Regularisation
 from paramove.hmm.sequences import Stack
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 TopologyName = Literal["ergodic", "left_right", "left_right_skips"]
 

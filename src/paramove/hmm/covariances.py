@@ -3,12 +3,11 @@
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm.gaussians import whitening_of
 from paramove.hmm.options import Regularisation
 
-Floats = NDArray[np.float64]
 Covariance = Literal["full", "diagonal", "tied"]
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import kernels
 from paramove.hmm.covariances import Covariance, covariances_of, floored, log_prior, pooled_covariance
 from paramove.hmm.gaussians import whitening_of
@@ -29,7 +30,6 @@ __all__ = [
     "whitened",
 ]
 
-Floats = NDArray[np.float64]
 UNSEEN = 1e-20  # frames; responsibilities below 1e-30 are left out of the moments
 
 
@@ -86,7 +86,7 @@ class Evaluator:
             log_duration = np.log(parameters.durations)
         return cls(np.ascontiguousarray(means), whitening, log_norm, log_duration, parameters.d_min)
 
-    def ends(self, n_frames: int) -> NDArray[np.int64]:
+    def ends(self, n_frames: int) -> Ints:
         """Feasible numbers of frames used after each state. Shape (N + 1, 2)."""
         return kernels.feasible_ends(len(self.means), self.d_min, self.log_duration.shape[1], n_frames)
 
@@ -145,7 +145,7 @@ class Evaluator:
             )
         return values
 
-    def windows(self, stack: Stack) -> NDArray[np.int64]:
+    def windows(self, stack: Stack) -> Ints:
         """First column that a state can have in each sequence, and the one after the last. Shape (K, N, 2)."""
         return kernels.segment_windows(stack.offsets, len(self.means), self.d_min, self.log_duration.shape[1])
 

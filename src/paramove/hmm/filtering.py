@@ -6,11 +6,10 @@ The forward variables of (2.7), kept as logarithms and divided by their sum afte
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import checked_sequence
-
-Floats = NDArray[np.float64]
 
 
 class OnlineFilter(ABC):

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import synthesis
 from paramove.hmm.chain import (
     ChainEvaluator,
@@ -30,9 +31,6 @@ from paramove.hmm.sequences import (
 )
 from paramove.hmm.training import iterate
 from paramove.hmm.viterbi import best_path
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class GaussianHMM:

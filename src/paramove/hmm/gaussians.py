@@ -6,12 +6,9 @@ factors (E.10), hence lower triangular: ln b(x) = log_norm - |S (x - mu)|^2 / 2 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_sums
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 BLOCK = 128
 TILE = 3

@@ -4,16 +4,14 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.chain import ChainParameters, Topology
 from paramove.hmm.covariances import Covariance
 from paramove.hmm.options import TrainingOptions
 from paramove.hmm.sequences import interpolate
 from paramove.hmm.training import segment_outputs
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Initialisation = Literal["segments", "random"]
 
 

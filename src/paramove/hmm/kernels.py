@@ -9,8 +9,8 @@ Index convention: `ending[i, t]` belongs to "i states are complete and t frames 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
 from paramove.hmm.gaussians import add_moments, stacked_log_outputs, stacked_moments
 from paramove.hmm.vector_functions import exp_of_negative, log_of_positive
@@ -27,8 +27,6 @@ __all__ = [
     "stacked_segments",
 ]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LANES = 8
 """Numbers in a vector register: rows are filled up to a multiple, so that nothing is left over."""

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import kernels, synthesis
 from paramove.hmm.covariances import Covariance, check_kind
 from paramove.hmm.estimation import Evaluator, Parameters
@@ -19,9 +20,6 @@ from paramove.hmm.sequences import (
     checked_sequences,
 )
 from paramove.hmm.training import equal_segments, train
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class LeftRightHMM:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import SequenceLengthError
-
-Floats = NDArray[np.float64]
 
 
 class Likelihood(Protocol):

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats, Ints
+
 CACHED_VALUES = 1 << 16
 LARGEST = 1e100
 LEAST_SPREAD = 1e-100
@@ -22,7 +23,7 @@ class Stack:
     """
 
     columns: Floats
-    offsets: NDArray[np.int64]
+    offsets: Ints
 
     @classmethod
     def of(cls, sequences: Sequence[Floats]) -> "Stack":
@@ -53,7 +54,7 @@ class Stack:
         return int(self.offsets[-1])
 
     @property
-    def lengths(self) -> NDArray[np.int64]:
+    def lengths(self) -> Ints:
         """Number of frames of each sequence. Shape (K,)."""
         return np.diff(self.offsets)
 

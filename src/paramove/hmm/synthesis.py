@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.sequences import interpolate
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Timing = Literal["uniform", "expected"]
 Path = Literal["linear", "smooth"]
 LONGEST_PATH = 1_000_000

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.covariances import Covariance, covariances_of, pooled_covariance
 from paramove.hmm.estimation import Parameters, Statistics, durations_of, penalty
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import Stack
 
-Floats = NDArray[np.float64]
 logger = logging.getLogger(__name__)
 
 
@@ -79,7 +78,7 @@ def equal_segments(
 
 
 def segment_outputs(
-    sequences: Sequence[Floats], labels: Sequence[NDArray[np.int64]], n_states: int, options: TrainingOptions,
+    sequences: Sequence[Floats], labels: Sequence[Ints], n_states: int, options: TrainingOptions,
     kind: Covariance,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Means (N, D) and covariances (N, D, D) of frames with known states; each state has at least one frame."""

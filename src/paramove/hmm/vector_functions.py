@@ -4,12 +4,9 @@ numba's own exponential function and logarithm call the C library once per numbe
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled_arithmetic, compiled_sums
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
 LOG2_E = 1.4426950408889634

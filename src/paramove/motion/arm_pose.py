@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import Arm, RobotDescription
-
-FloatArray = NDArray[np.float64]
 
 # The elbow is turned on this grid, then refined by bisection to a hundredth of a step.
 _TURNS = np.deg2rad(np.arange(0.0, 181.0, 1.0))
@@ -39,9 +38,9 @@ class JointSolution:
         elbow_turn: How far a joint limit turned the elbow about the shoulder-gripper line, [K], rad.
     """
 
-    angles: FloatArray
-    elbow: FloatArray
-    elbow_turn: FloatArray
+    angles: Floats
+    elbow: Floats
+    elbow_turn: Floats
 
 
 class ArmPoseSolver:
@@ -75,7 +74,7 @@ class ArmPoseSolver:
         squared = self._upper_arm**2 + self._forearm**2 + 2 * self._upper_arm * self._forearm * np.cos(bend)
         return float(np.sqrt(squared[0])), float(np.sqrt(squared[1]))
 
-    def moved_outward(self, gripper: FloatArray, margin: float, width: float) -> FloatArray:
+    def moved_outward(self, gripper: Floats, margin: float, width: float) -> Floats:
         """A path [K, 3] with points nearer to the shoulder than the elbow can bend moved outward; the rest stays.
 
         No point ends nearer than `margin` beyond the least reach; the change begins `width` before that, m.
@@ -130,11 +129,11 @@ class ArmPoseSolver:
         straight_on = np.zeros(len(r))
         return JointSolution(*self._pose(_Poses(q, r, o, straight_on), straight_on), straight_on)
 
-    def outside_limits(self, angles: FloatArray) -> FloatArray:
+    def outside_limits(self, angles: Floats) -> Floats:
         """By how much each joint of angles [K, 5] lies outside the limits that `solve` keeps, rad; 0 inside."""
         return np.asarray(np.clip(np.maximum(self._lower - angles, angles - self._upper), 0.0, None))
 
-    def pressed_inside(self, angles: FloatArray) -> FloatArray:
+    def pressed_inside(self, angles: Floats) -> Floats:
         """A curve [K, 5] through solved poses with what overshoots their limits pressed into the margin beyond them.
 
         A curve overshoots where the elbow begins to turn at a limit. Joints that stay within half of the margin are
@@ -173,7 +172,7 @@ class ArmPoseSolver:
                 return min(one_sided, key=lambda s: float(np.abs(s.elbow_turn).max()))
         return solution
 
-    def _check_reach(self, r: FloatArray) -> None:
+    def _check_reach(self, r: Floats) -> None:
         least, greatest = self.reach
         least, greatest = least - self._aside * 0.1, greatest + 1e-9  # the offset changes the bend by up to 2.6 deg
         distance = np.linalg.norm(r, axis=1)
@@ -185,7 +184,7 @@ class ArmPoseSolver:
                 f"the arm reaches {least * 100:.1f} to {greatest * 100:.1f} cm"
             )
 
-    def _nearest(self, poses: _Poses, turns: FloatArray) -> JointSolution:
+    def _nearest(self, poses: _Poses, turns: Floats) -> JointSolution:
         """The first of `turns` (sorted by size) that breaks no limit, refined; only poses that need a turn search."""
         best = np.zeros(len(poses.r))
         angles, _ = self._pose(poses, best)
@@ -204,7 +203,7 @@ class ArmPoseSolver:
         angles, q_set = self._pose(poses, best)
         return JointSolution(angles, q_set, best)
 
-    def _refine(self, poses: _Poses, turn: FloatArray) -> FloatArray:
+    def _refine(self, poses: _Poses, turn: Floats) -> Floats:
         good, bad = turn.copy(), turn - _TURNS[1] * np.sign(turn)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (good + bad)
@@ -212,16 +211,16 @@ class ArmPoseSolver:
             good, bad = np.where(inside, middle, good), np.where(inside, bad, middle)
         return good
 
-    def _excess(self, angles: FloatArray) -> FloatArray:
+    def _excess(self, angles: Floats) -> Floats:
         """How far the worst joint lies outside its limits, rad; not positive inside."""
         return np.asarray(np.maximum(self._lower - angles, angles - self._upper).max(axis=-1))
 
-    def _broken(self, angles: FloatArray) -> str:
+    def _broken(self, angles: Floats) -> str:
         worst = int(np.argmax(np.maximum(self._lower - angles, angles - self._upper)))
         low, high, found = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
         return f"the limit of {self._joints[worst]} ({found:.1f} deg, allowed {low:.1f} to {high:.1f})"
 
-    def _pose(self, poses: _Poses, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _pose(self, poses: _Poses, turn: Floats) -> tuple[Floats, Floats]:
         """Angles [K, 5] and elbow [K, 3] for the elbow of 5.2.4 turned by `turn` [K]."""
         q = self._elbow(poses.q, poses.r, turn)
         o = poses.o / np.maximum(np.linalg.norm(poses.o, axis=-1, keepdims=True), _NEARLY_STRAIGHT)
@@ -229,12 +228,12 @@ class ArmPoseSolver:
         forearm, aside = self._hand(q, poses.r, (1.0 - share) * o + share * _level(q, poses.r))
         return _angles(q / self._upper_arm, forearm, aside), q
 
-    def _elbow(self, q: FloatArray, r: FloatArray, turn: FloatArray) -> FloatArray:
+    def _elbow(self, q: Floats, r: Floats, turn: Floats) -> Floats:
         middle, radius, w2, w3 = self._elbow_circle(q, r)
         side = np.cos(turn)[..., None] * w2 + np.sin(turn)[..., None] * w3
         return np.asarray(middle + radius * side)  # (5.10)
 
-    def _elbow_circle(self, q: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _elbow_circle(self, q: Floats, r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Where the elbow can be: middle [K, 3], radius [K, 1], direction w2 towards q and w3 across, [K, 3]."""
         a, b = self._upper_arm, self._forearm
         c = np.linalg.norm(r, axis=-1, keepdims=True)  # c = |r - p| with p = 0; corrected (printed |r - q|)
@@ -248,7 +247,7 @@ class ArmPoseSolver:
         cos_beta = np.clip((a**2 + c**2 - b**2) / (2 * a * c), -1.0, 1.0)  # (5.8)
         return a * cos_beta * w1, a * np.sqrt(1.0 - cos_beta**2), w2, np.cross(w1, w2)
 
-    def _sloped(self, q: FloatArray, r: FloatArray, slope: float, share: FloatArray) -> FloatArray:
+    def _sloped(self, q: Floats, r: Floats, slope: float, share: Floats) -> Floats:
         """The elbow turned towards the nearest place at which the forearm slopes down by `slope`, by a share [K]."""
         middle, radius, w2, w3 = self._elbow_circle(q, r)
         wanted_z = r[:, 2] + self._forearm * np.sin(slope)
@@ -261,7 +260,7 @@ class ArmPoseSolver:
         nearest = np.where(np.abs(turns[0]) <= np.abs(turns[1]), turns[0], turns[1])
         return self._elbow(q, r, share * nearest)
 
-    def _hand(self, q: FloatArray, r: FloatArray, o: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _hand(self, q: Floats, r: Floats, o: Floats) -> tuple[Floats, Floats]:
         """Unit forearm axis b and the hand's sideward axis y (towards the thumb), with r = q + along b + aside y.
 
         y is o made perpendicular to b, (5.22) corrected. As r - q and o span both, y follows without iteration.
@@ -283,23 +282,23 @@ class ArmPoseSolver:
 class _Poses:
     """Elbow, gripper, finger to thumb [K, 3] and level [K]."""
 
-    q: FloatArray
-    r: FloatArray
-    o: FloatArray
-    level: FloatArray
+    q: Floats
+    r: Floats
+    o: Floats
+    level: Floats
 
     def of(self, places: NDArray[np.intp]) -> _Poses:
         return _Poses(self.q[places], self.r[places], self.o[places], self.level[places])
 
 
-def _level(q: FloatArray, r: FloatArray) -> FloatArray:
+def _level(q: Floats, r: Floats) -> Floats:
     """o′ of 5.2.5: level and across the line from elbow to gripper, to the left, [K, 3]."""
     d = r - q
     level = np.stack([-d[..., 1], d[..., 0], np.zeros_like(d[..., 0])], axis=-1)
     return np.asarray(level / np.linalg.norm(level, axis=-1, keepdims=True))
 
 
-def _angles(upper_arm: FloatArray, forearm: FloatArray, aside: FloatArray) -> FloatArray:
+def _angles(upper_arm: Floats, forearm: Floats, aside: Floats) -> Floats:
     """Joint angles from the axes of the upper arm, the forearm and the hand's side.
 
     Cardan angles as in (5.17)-(5.20), corrected; derived for HOAP-3's chain R_y(α1) R_z(α2) R_x(α3) R_y(α4) R_x(α5) and
@@ -316,20 +315,20 @@ def _angles(upper_arm: FloatArray, forearm: FloatArray, aside: FloatArray) -> Fl
     return np.stack([pitch, roll, torsion, elbow, wrist], axis=-1)
 
 
-def _rotate_x(v: FloatArray, angle: FloatArray) -> FloatArray:
+def _rotate_x(v: Floats, angle: Floats) -> Floats:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([v[..., 0], c * v[..., 1] - s * v[..., 2], s * v[..., 1] + c * v[..., 2]], axis=-1)
 
 
-def _rotate_y(v: FloatArray, angle: FloatArray) -> FloatArray:
+def _rotate_y(v: Floats, angle: Floats) -> Floats:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * v[..., 0] + s * v[..., 2], v[..., 1], -s * v[..., 0] + c * v[..., 2]], axis=-1)
 
 
-def _rotate_z(v: FloatArray, angle: FloatArray) -> FloatArray:
+def _rotate_z(v: Floats, angle: Floats) -> Floats:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * v[..., 0] - s * v[..., 1], s * v[..., 0] + c * v[..., 1], v[..., 2]], axis=-1)
 
 
-def _cm(point: FloatArray) -> str:
+def _cm(point: Floats) -> str:
     return "(" + ", ".join(f"{v * 100:.1f}" for v in point) + ")"

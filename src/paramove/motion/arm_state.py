@@ -6,12 +6,11 @@ from collections import deque
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.robots.description import Arm
-
-FloatArray = NDArray[np.float64]
 
 FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
 GRIPPING_OPENINGS = (0.36, 0.5)  # where fingers rest on an object; at the base pose they are at 0.3, open hands wider
@@ -44,12 +43,12 @@ class ArmState:
     def __init__(self, arm: Arm, base_angles: ArrayLike) -> None:
         self._arm = arm
         self._base = np.asarray(base_angles, dtype=np.float64)
-        self._heard: deque[tuple[int, FloatArray]] = deque()
+        self._heard: deque[tuple[int, Floats]] = deque()
         self._busy_until_ns = 0
         self.known = False
         self.at_base = False
-        self.gripper: FloatArray | None = None
-        self.found: FloatArray | None = None
+        self.gripper: Floats | None = None
+        self.found: Floats | None = None
         self.opening = 1.0
         self.measured = 1.0
         self.lost = False

@@ -7,15 +7,13 @@ from functools import partial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.joint_path import joined, joint_motion
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.relocation import RelocationPlanner
-
-FloatArray = NDArray[np.float64]
 
 LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
 _HIGHER_ENTRY = 0.065
@@ -57,7 +55,7 @@ class ClearPlans:
     def __init__(self, planner: RelocationPlanner, checker: ClearanceChecker) -> None:
         self.planner, self._checker = planner, checker
 
-    def fetch(self, source: FloatArray, standing: FloatArray) -> PlannedMotion:
+    def fetch(self, source: Floats, standing: Floats) -> PlannedMotion:
         """Reach from before the object as in 5.2.5; if that is not clear, lower the open hand over it.
 
         Args:
@@ -70,13 +68,13 @@ class ClearPlans:
         choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
         return self._first(ways, standing, choices)
 
-    def deliver(self, start: FloatArray, target: FloatArray, standing: FloatArray) -> PlannedMotion:
+    def deliver(self, start: Floats, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
 
         Where the open fingers would touch a neighbour, the hand is opened less.
         """
         back = np.array([target[0] + _BEHIND_ROW, start[1], start[2]])
-        detours: list[list[FloatArray]] = [[], [back], [back + _HIGHER_CARRY]]
+        detours: list[list[Floats]] = [[], [back], [back + _HIGHER_CARRY]]
         leavings = [(upward, opened) for opened in (None, _HALF_OPEN) for upward in (False, True)]
         kinds = [(number, leaving) for leaving in leavings for number in range(len(detours))]
         ways = [
@@ -91,17 +89,17 @@ class ClearPlans:
         ]
         return self._first(ways, standing, choices)
 
-    def hold(self, start: FloatArray, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+    def hold(self, start: Floats, place: Floats, standing: Floats) -> PlannedMotion:
         """Carry a held object to `place` and stay there: straight, else over the start or over the place."""
         corners = [np.array([*side[:2], max(start[2], place[2])]) for side in (start, place)]
         ways = [[], *([self.planner.far_enough(corner)] for corner in corners)]
         return self._first([partial(self.planner.hold, start, place, via) for via in ways], standing)
 
-    def leave(self, here: FloatArray, opening: float, standing: FloatArray) -> PlannedMotion:
+    def leave(self, here: Floats, opening: float, standing: Floats) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
         return self._first([partial(self.planner.leave, here, opening, upward) for upward in (False, True)], standing)
 
-    def home(self, angles: FloatArray, holding: bool, standing: FloatArray) -> PlannedMotion:
+    def home(self, angles: Floats, holding: bool, standing: Floats) -> PlannedMotion:
         """From measured `angles` [6], rad, wherever they are, to the base pose.
 
         A held object is put down where it is. An empty hand is opened and withdrawn as after a placing; where it is
@@ -121,12 +119,12 @@ class ClearPlans:
         high = here[2] > grasped + _HIGH and not holding
         return self._first([straight, *learned] if high else [*learned, straight], standing)
 
-    def _from(self, start: FloatArray, way: _Way, holding: bool) -> PlannedMotion:
+    def _from(self, start: Floats, way: _Way, holding: bool) -> PlannedMotion:
         """The motion, begun with a way to its first sample."""
         motion = way()
         return joined(self._straight(start, motion.angles[0], "gather", holding), motion)
 
-    def _straight(self, start: FloatArray, end: FloatArray, phase: str, holding: bool = False) -> PlannedMotion:
+    def _straight(self, start: Floats, end: Floats, phase: str, holding: bool = False) -> PlannedMotion:
         planner = self.planner
         kinematics = planner.arm.kinematics
         return joint_motion(
@@ -140,16 +138,16 @@ class ClearPlans:
             holding,
         )
 
-    def offer(self, place: FloatArray, standing: FloatArray) -> PlannedMotion:
+    def offer(self, place: Floats, standing: Floats) -> PlannedMotion:
         """Go to `place` with an open hand."""
         return self._first([partial(self.planner.offer, place)], standing)
 
-    def fingers(self, here: FloatArray, start: float, end: float, standing: FloatArray) -> PlannedMotion:
+    def fingers(self, here: Floats, start: float, end: float, standing: Floats) -> PlannedMotion:
         """Open or close the hand where it is."""
         return self._first([partial(self.planner.fingers, here, start, end)], standing)
 
     def _first(
-        self, ways: Sequence[_Way], standing: FloatArray, choices: Sequence[_Choices] | None = None
+        self, ways: Sequence[_Way], standing: Floats, choices: Sequence[_Choices] | None = None
     ) -> PlannedMotion:
         """The first way that is reachable and clear. With `choices`, ways that would fail as one before are skipped."""
         if len(standing) > self._checker.n_standing:

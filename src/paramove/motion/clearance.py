@@ -8,11 +8,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.robots.description import RobotDescription
-
-FloatArray = NDArray[np.float64]
 
 _FAR = 0.05  # distances beyond are not told apart, m
 _HIDDEN = 10.0
@@ -159,13 +158,13 @@ class ClearanceChecker:
                     worst = Clearance(distance, k, (self._name(one), self._name(two)), number)
         return worst
 
-    def _pairs(self, upright: list[int]) -> NDArray[np.int64]:
+    def _pairs(self, upright: list[int]) -> Ints:
         """Shapes whose distance counts, [P, 2], without a held object."""
         pairs = [(g, other) for g in self._moving for other in (self._surface_geom, *upright)]
         pairs += [(g, other) for g in self._hand_geoms for other in self._fixed]
         return np.array(pairs, dtype=np.int64)
 
-    def _near(self, pairs: NDArray[np.int64], distance: float) -> list[tuple[int, int]]:
+    def _near(self, pairs: Ints, distance: float) -> list[tuple[int, int]]:
         """The pairs that may be closer than `distance`, by the spheres around them; the surface is a box, exactly."""
         one, two = pairs.T
         away, radius = self._data.geom_xpos[one] - self._data.geom_xpos[two], self._model.geom_rbound
@@ -179,7 +178,7 @@ class ClearanceChecker:
     def _hand_geoms(self) -> list[int]:
         return [g for g in self._moving if self._model.body(int(self._model.geom_bodyid[g])).name in self._hand_names]
 
-    def _place(self, standing: FloatArray) -> list[int]:
+    def _place(self, standing: Floats) -> list[int]:
         if len(standing) > self._n_standing:
             raise ValueError(f"{len(standing)} standing objects; this checker was made for {self._n_standing}")
         self._data.mocap_pos[:] = [_HIDDEN, _HIDDEN, 0.0]

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.body_points import arm_of, points_of
 from paramove.motion.elbow_interpolation import interpolated_elbow
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 
-FloatArray = NDArray[np.float64]
 ElbowInterpolation = Literal["carried", "linear"]
 
 _NEWTON_STEPS = 3
@@ -41,14 +41,14 @@ class RobotMovement(ReachingMovement):
     """
 
     grid: ParameterGrid
-    means: FloatArray
+    means: Floats
     scale: float
     o_min: float
     o_max: float
     reach_state: int
     release_state: int
     duration: float
-    shoulder: FloatArray
+    shoulder: Floats
     elbow_interpolation: ElbowInterpolation = "carried"
 
     @classmethod
@@ -95,7 +95,7 @@ class RobotMovement(ReachingMovement):
             elbow_interpolation=elbow_interpolation,
         )
 
-    def converted(self, means: FloatArray, point_names: tuple[str, ...]) -> ArmPoses:
+    def converted(self, means: Floats, point_names: tuple[str, ...]) -> ArmPoses:
         """Other poses of the same person as this movement's are: scaled by s, seen from p̄ (5.7).
 
         Args:
@@ -108,7 +108,7 @@ class RobotMovement(ReachingMovement):
         return ArmPoses(*(self.scale * part for part in arm_of(points_of(means, point_names), self.shoulder)))
 
     @property
-    def centre(self) -> FloatArray:
+    def centre(self) -> Floats:
         """Mean of the grid's targets, [3], m."""
         return np.asarray(self.grid.points().mean(axis=0))
 
@@ -125,7 +125,7 @@ class RobotMovement(ReachingMovement):
         """One state's mean for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
         return ArmPoses.from_stacked(self._means(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
 
-    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+    def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
 
         The demonstrations miss their targets a little; a few Newton steps on the effect remove that.
@@ -140,12 +140,12 @@ class RobotMovement(ReachingMovement):
             parameter = parameter + np.linalg.solve(jacobian, (wanted - reached)[..., None])[..., 0]
         return parameter
 
-    def opening(self, finger_to_thumb: ArrayLike) -> FloatArray:
+    def opening(self, finger_to_thumb: ArrayLike) -> Floats:
         """Normalised opening ξ of the gripper, [K], 1 open (after 5.24, corrected)."""
         size = np.linalg.norm(np.asarray(finger_to_thumb, dtype=np.float64), axis=-1)
         return np.asarray(np.clip((size - self.o_min) / (self.o_max - self.o_min), 0.0, 1.0))
 
-    def openings(self, states: ArmPoses) -> FloatArray:
+    def openings(self, states: ArmPoses) -> Floats:
         """ξ in all states, as `opening`."""
         return self.opening(states.finger_to_thumb)
 
@@ -154,19 +154,19 @@ class RobotMovement(ReachingMovement):
         coordinates = self.grid.coordinates(self.parameter_for(self.reach_state, target))
         return bool(((coordinates >= 0.0) & (coordinates <= 1.0)).all())
 
-    def _means(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
+    def _means(self, parameters: Floats, state: int | None = None) -> Floats:
         """Means of all states, [K, N, 9], or of one, [K, 9], for K parameters."""
         weights, corners = self._corners(parameters, state)
-        means: FloatArray = np.einsum("kc,kc...->k...", weights, corners)
+        means: Floats = np.einsum("kc,kc...->k...", weights, corners)
         if self.elbow_interpolation == "carried":
             means[..., :3] = interpolated_elbow(weights, corners[..., :3], corners[..., 3:6])
         return means
 
-    def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:
+    def _gripper(self, state: int, parameters: Floats) -> Floats:
         weights, corners = self._corners(parameters, state)
         return np.asarray(np.einsum("kc,kcd->kd", weights, corners[..., 3:6]))
 
-    def _corners(self, parameters: FloatArray, state: int | None) -> tuple[FloatArray, FloatArray]:
+    def _corners(self, parameters: Floats, state: int | None) -> tuple[Floats, Floats]:
         """Weights [K, C] and means [K, C, N, 9] or [K, C, 9] of the grid points around each parameter."""
         indices, weights = self.grid.weights(self.grid.coordinates(parameters), clamped=False)
         means = self.means if state is None else self.means[:, state]

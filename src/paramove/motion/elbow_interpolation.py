@@ -8,15 +8,14 @@ which the elbow leaves that line is carried to the new line by the smallest rota
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 _TINY = 1e-9
 _LEAST_RADIUS = 1e-6  # m; keeps the elbow's side known where the arm is straight
 
 
-def interpolated_elbow(weights: FloatArray, elbow: FloatArray, gripper: FloatArray) -> FloatArray:
+def interpolated_elbow(weights: Floats, elbow: Floats, gripper: Floats) -> Floats:
     """Elbows of M weighted means of C arm poses each, in the frame of the shoulder.
 
     Where one pose has weight 1 the result is that pose's elbow. Weights sum to one; outside a grid some are negative.
@@ -44,7 +43,7 @@ def interpolated_elbow(weights: FloatArray, elbow: FloatArray, gripper: FloatArr
     return np.asarray(middle * along_line + radius * carried)
 
 
-def carried_over(vectors: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+def carried_over(vectors: Floats, start: Floats, end: Floats) -> Floats:
     """`vectors` turned by the smallest rotation that takes unit vectors `start` to `end`. All [..., 3]."""
     axis = np.cross(start, end)
     cosine = _dot(start, end)
@@ -53,17 +52,17 @@ def carried_over(vectors: FloatArray, start: FloatArray, end: FloatArray) -> Flo
     )
 
 
-def _mean(weights: FloatArray, values: FloatArray) -> FloatArray:
+def _mean(weights: Floats, values: Floats) -> Floats:
     return np.asarray(np.einsum("mc,mc...->m...", weights, values))
 
 
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sum(a * b, axis=-1, keepdims=True))
 
 
-def _length(v: FloatArray) -> FloatArray:
+def _length(v: Floats) -> Floats:
     return np.asarray(np.linalg.norm(v, axis=-1, keepdims=True))
 
 
-def _unit(v: FloatArray) -> FloatArray:
+def _unit(v: Floats) -> Floats:
     return np.asarray(v / np.maximum(_length(v), _TINY))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.motion.reaching_movement import ReachingMovement
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
-
-FloatArray = NDArray[np.float64]
 
 FRAME = "right_shoulder"
 FARTHEST = 2.0
@@ -20,7 +18,7 @@ class GoalRefusedError(ValueError):
     """A goal cannot be done; the message says why and what would work."""
 
 
-def point_of(goal: RelocationGoal, name: str) -> FloatArray:
+def point_of(goal: RelocationGoal, name: str) -> Floats:
     """Position `name` ("from" or "to") of a goal, [3], m; raises GoalRefusedError if it lacks or is not finite."""
     if not goal.HasField(name):
         raise GoalRefusedError(f"the goal lacks its position {name!r}")
@@ -46,7 +44,7 @@ def hull_of(goal: RelocationGoal, name: str, movement: ReachingMovement) -> Relo
     return RelocationStatus.HULL_INSIDE if within else RelocationStatus.HULL_OUTSIDE
 
 
-def standing_of(goal: RelocationGoal) -> FloatArray:
+def standing_of(goal: RelocationGoal) -> Floats:
     """Places of the objects to keep clear of, [M, 2], m; raises GoalRefusedError if one is not finite."""
     places = np.array([[place.x, place.y, place.z] for place in goal.avoid]).reshape(-1, 3)
     if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > LARGEST:
@@ -54,6 +52,6 @@ def standing_of(goal: RelocationGoal) -> FloatArray:
     return places[:, :2]
 
 
-def centimetres(point: FloatArray) -> str:
+def centimetres(point: Floats) -> str:
     """A place in words, in cm."""
     return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.table_clearance import TableClearance
 from paramove.robots.description import Chain
 from paramove.robots.out_of_reach import OutOfReachError
-
-FloatArray = NDArray[np.float64]
 
 LEAST_HEIGHT = 0.0005
 """m; of the hand's lowest point above the table."""
@@ -52,14 +51,14 @@ class HandPoses:
                 return float(pitch)
         raise self._refusal(goal, wanted, band, len(pitches) > 0)
 
-    def middle(self, height: float, band: tuple[float, float]) -> FloatArray:
+    def middle(self, height: float, band: tuple[float, float]) -> Floats:
         """Of the places straight ahead at this height that are reached with a pitch of a band, [3], m."""
         ahead = np.arange(0.02, 0.5, _GRID_M)
         places = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
         found = self._chain.kinematics.all_joint_angles(places[:, None], np.linspace(*band, 13)[None])
         return np.asarray(places[np.isfinite(found).all(axis=-1).any(axis=-1).any(axis=-1)].mean(axis=0))
 
-    def _poses(self, goal: FloatArray, wanted: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    def _poses(self, goal: Floats, wanted: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
         """Pitches in order of their distance from the wanted one, with the joint angles, [P] and [P, J]."""
         pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(wanted, *band)])
         pitches = pitches[np.argsort(np.abs(pitches - wanted), kind="stable")]
@@ -69,11 +68,11 @@ class HandPoses:
         reached = good.any(axis=-1)
         return pitches[reached], found[np.arange(len(pitches)), first][reached]
 
-    def _clear(self, row: FloatArray) -> bool:
+    def _clear(self, row: Floats) -> bool:
         pose = np.append(row, self._gripper)[None]
         return float(self._clearance.heights(pose)[0]) >= LEAST_HEIGHT and self._clearance.touching(pose) is None
 
-    def _refusal(self, goal: FloatArray, wanted: float, band: tuple[float, float], reached: bool) -> OutOfReachError:
+    def _refusal(self, goal: Floats, wanted: float, band: tuple[float, float], reached: bool) -> OutOfReachError:
         lowest, highest = np.rad2deg(band)
         cause = "the hand would touch the table or the arm itself there" if reached else self._cause(goal, wanted)
         sentence = f"{metres(goal)} cannot be reached with the hand {lowest:.0f} to {highest:.0f} deg down: {cause}"
@@ -82,14 +81,14 @@ class HandPoses:
             return OutOfReachError(f"{sentence}; nor can any place in that direction")
         return OutOfReachError(f"{sentence}; the nearest place that can be reached is {metres(nearest)}", None, nearest)
 
-    def _cause(self, goal: FloatArray, wanted: float) -> str:
+    def _cause(self, goal: Floats, wanted: float) -> str:
         try:
             pitch = self._chain.kinematics.nearest_pitch(goal, wanted)
         except OutOfReachError as error:
             return str(error).split("is out of reach: ")[-1].split("; ")[0]
         return f"the hand would have to be {np.rad2deg(pitch):.0f} deg down"
 
-    def _nearest(self, goal: FloatArray, wanted: float, band: tuple[float, float]) -> FloatArray | None:
+    def _nearest(self, goal: Floats, wanted: float, band: tuple[float, float]) -> Floats | None:
         """Nearest place of a grid in the upright plane through the arm's axis and the goal that can be reached."""
         axis = np.array([*self._chain.kinematics.yaw_axis, 0.0])
         ahead, side = (goal - axis)[:2]
@@ -107,6 +106,6 @@ class HandPoses:
         return None
 
 
-def metres(point: FloatArray) -> str:
+def metres(point: Floats) -> str:
     """A place in words, in m."""
     return f"({', '.join(f'{value:.3f}' for value in point)}) m"

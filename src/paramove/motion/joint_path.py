@@ -6,13 +6,12 @@ No movement was learned for this. It is used only after an interruption, when th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.timing import minimum_jerk
 from paramove.robots.arm_kinematics import ArmKinematics
-
-FloatArray = NDArray[np.float64]
 
 LIMIT_SHARE = 0.5  # of the operating velocity and acceleration: nobody expects this motion
 LEAST_DURATION_S = 0.5
@@ -23,8 +22,8 @@ def joint_motion(
     start: ArrayLike,
     end: ArrayLike,
     kinematics: ArmKinematics,
-    velocity: FloatArray,
-    acceleration: FloatArray,
+    velocity: Floats,
+    acceleration: Floats,
     phase: str,
     period: float = 0.005,
     holding: bool = False,
@@ -48,7 +47,7 @@ def joint_motion(
     n = int(np.ceil(duration / period))
     angles = a + minimum_jerk(np.arange(n + 1) / n)[:, None] * (b - a)
     gripper = kinematics.forward(angles[:, :5]).gripper
-    times: FloatArray = period * np.arange(n + 1, dtype=np.float64)
+    times: Floats = period * np.arange(n + 1, dtype=np.float64)
     return PlannedMotion(times, angles, gripper, np.full(n + 1, holding), ((phase, 0.0),), 0.0)
 
 

@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from paramove.documents.array_types import Floats
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import minimum_jerk, smoothed
-
-FloatArray = NDArray[np.float64]
 
 AHEAD = np.deg2rad(45.0)
 """Up to here a target lies before the person; where it lies further aside, the person is turned towards it."""
@@ -37,13 +35,13 @@ class LearnedWay:
         opening: Of the hand, ξ, 1 open, [N].
     """
 
-    progress: FloatArray
-    beside: FloatArray
+    progress: Floats
+    beside: Floats
     length: float
-    opening: FloatArray
+    opening: Floats
 
     @classmethod
-    def of(cls, states: ArmPoses, opening: FloatArray, points: int) -> Self:
+    def of(cls, states: ArmPoses, opening: Floats, points: int) -> Self:
         """The way of the gripper, resampled to so many points."""
         at = np.linspace(0.0, 1.0, len(states))
         columns = np.concatenate([states.gripper, opening[:, None]], axis=1)
@@ -66,7 +64,7 @@ class LearnedWay:
         u = np.linspace(0.0, 1.0, len(self.progress))
         return replace(self, beside=self.beside + (16.0 * height * u**2 * (1.0 - u) ** 2)[:, None] * _UP)
 
-    def between(self, start: FloatArray, end: FloatArray, axis: tuple[float, float]) -> FloatArray:
+    def between(self, start: Floats, end: Floats, axis: tuple[float, float]) -> Floats:
         """The way from a point [3] to another about an upright axis (x, y), [N, 3]; without the region behind it.
 
         A way that is shorter than the person's deviates less, in proportion.
@@ -89,41 +87,41 @@ class PlacedPerson:
         points: Of the ways.
     """
 
-    def __init__(self, movement: ReachingMovement, middle: FloatArray, axis: tuple[float, float], points: int) -> None:
+    def __init__(self, movement: ReachingMovement, middle: Floats, axis: tuple[float, float], points: int) -> None:
         self._movement, self._points = movement, points
         self._shoulder = middle - movement.centre
         self._axis = np.array([*axis, 0.0])
 
-    def approach(self, target: FloatArray) -> LearnedWay:
+    def approach(self, target: Floats) -> LearnedWay:
         """To a target [3], frame of the base, m."""
         turn, seen = self._seen(target)
         return self._turned(turn, *self._movement.approach(seen))
 
-    def retreat(self, target: FloatArray) -> LearnedWay:
+    def retreat(self, target: Floats) -> LearnedWay:
         """Back from a target."""
         turn, seen = self._seen(target)
         return self._turned(turn, *self._movement.retreat(seen))
 
-    def within_training(self, target: FloatArray) -> bool | None:
+    def within_training(self, target: Floats) -> bool | None:
         """Whether a target lies between the demonstrated ones."""
         return self._movement.within_training(self._seen(target)[1])
 
-    def _seen(self, target: FloatArray) -> tuple[float, FloatArray]:
+    def _seen(self, target: Floats) -> tuple[float, Floats]:
         """By how much the person is turned, and the target from the shoulder."""
         x, y, _ = target - self._axis
         azimuth = float(np.arctan2(y, x))
         turn = azimuth - float(np.clip(azimuth, -AHEAD, AHEAD))
         return turn, _rotation(-turn) @ (target - self._axis) + self._axis - self._shoulder
 
-    def _turned(self, turn: float, states: ArmPoses, opening: FloatArray) -> LearnedWay:
+    def _turned(self, turn: float, states: ArmPoses, opening: Floats) -> LearnedWay:
         way = LearnedWay.of(states, opening, self._points)
         return replace(way, beside=way.beside @ _rotation(turn).T)
 
 
-def _cylindrical(point: FloatArray) -> FloatArray:
+def _cylindrical(point: Floats) -> Floats:
     return np.array([np.hypot(point[0], point[1]), np.arctan2(point[1], point[0]), point[2]])
 
 
-def _rotation(angle: float) -> FloatArray:
+def _rotation(angle: float) -> Floats:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

@@ -10,16 +10,15 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.body_points import arm_of, points_of
 from paramove.motion.conversion import RobotMovement
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement, TrainingTargets
 from paramove.motion.timing import minimum_jerk
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
-
-FloatArray = NDArray[np.float64]
 
 WIDEST_AT = 0.7
 """Share of the way to an object after which a hand that will grasp is opened widest: 60 to 80 % (Jeannerod 1984)."""
@@ -59,12 +58,12 @@ class ModelledMovement(ReachingMovement):
         length = np.linalg.norm(elbow, axis=-1) + np.linalg.norm(gripper - elbow, axis=-1)
         self.scale = arm_length / float(length.max())  # s = l / l′
         self._shoulder = person["shoulder"].mean(axis=(0, 1))  # p̄
-        self._centre: FloatArray = (targets.mean(axis=0) - self._shoulder) * self.scale
+        self._centre: Floats = (targets.mean(axis=0) - self._shoulder) * self.scale
         size = self.scale * np.linalg.norm(across, axis=-1)
         self.o_min, self.o_max = float(size.min()), float(size.max())
 
     @property
-    def centre(self) -> FloatArray:
+    def centre(self) -> Floats:
         """Mean target of the training, [3], m."""
         return self._centre
 
@@ -77,7 +76,7 @@ class ModelledMovement(ReachingMovement):
         """One state's mean for K parameters [K, 3]."""
         return ArmPoses.from_stacked(self._arm(np.atleast_2d(np.asarray(parameters, dtype=np.float64)), state))
 
-    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+    def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b).
 
         Newton's method with steps that are halved until they come nearer; a linear model needs one step. Also outside
@@ -87,7 +86,7 @@ class ModelledMovement(ReachingMovement):
             UnreachablePoseError: No parameter is found for a point.
         """
         wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
-        parameter: FloatArray = wanted + self._centre - self._gripper(state, self._centre[None])
+        parameter: Floats = wanted + self._centre - self._gripper(state, self._centre[None])
         missed = wanted - self._gripper(state, parameter)
         for _ in range(_NEWTON_STEPS):
             if np.abs(missed).max() < _EXACT:
@@ -98,7 +97,7 @@ class ModelledMovement(ReachingMovement):
             return parameter
         raise UnreachablePoseError(self._refusal(wanted[worst], float(np.linalg.norm(missed[worst]))))
 
-    def openings(self, states: ArmPoses) -> FloatArray:
+    def openings(self, states: ArmPoses) -> Floats:
         """ξ in all states: measured where the movement grasps, else opened on the way and closed on the way back."""
         n = len(states)
         if self._returns:
@@ -122,9 +121,7 @@ class ModelledMovement(ReachingMovement):
         theta = self._model.training_theta_
         return None if theta is None else TrainingTargets((theta - self._shoulder) * self.scale)
 
-    def _nearer(
-        self, state: int, wanted: FloatArray, parameter: FloatArray, missed: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _nearer(self, state: int, wanted: Floats, parameter: Floats, missed: Floats) -> tuple[Floats, Floats]:
         """One step of Newton's method, halved where it would not come nearer."""
         steps = _STEP * np.eye(3)
         columns = [self._gripper(state, parameter + step) - self._gripper(state, parameter - step) for step in steps]
@@ -143,7 +140,7 @@ class ModelledMovement(ReachingMovement):
             change = np.where(worse[:, None], 0.5 * change, change)
         return tried, left
 
-    def _refusal(self, wanted: FloatArray, missed: float) -> str:
+    def _refusal(self, wanted: Floats, missed: float) -> str:
         x, y, z = 100.0 * wanted
         description = self._model.description or MovementDescription()
         return (
@@ -152,10 +149,10 @@ class ModelledMovement(ReachingMovement):
             "model extrapolates farther than others"
         )
 
-    def _gripper(self, state: int, parameters: FloatArray) -> FloatArray:
+    def _gripper(self, state: int, parameters: Floats) -> Floats:
         return self._arm(parameters, state)[..., 3:6]
 
-    def _arm(self, parameters: FloatArray, state: int | None = None) -> FloatArray:
+    def _arm(self, parameters: Floats, state: int | None = None) -> Floats:
         """Elbow, gripper, finger to thumb of all states, [K, N, 9], or of one, [K, 9], for K parameters (5.7)."""
         means = self._model.state_means(parameters / self.scale + self._shoulder)
         if state is not None:
@@ -169,7 +166,7 @@ def ends_at_target(description: MovementDescription) -> bool:
     return description.arrival == 1.0 or (description.arrival < 0.0 and description.grasp < 0.0)
 
 
-def _targets_of(model: ParametricHMM) -> FloatArray:
+def _targets_of(model: ParametricHMM) -> Floats:
     """Targets [K, 3] that stand for all of the training."""
     if model.training_theta_ is not None:
         targets = model.training_theta_

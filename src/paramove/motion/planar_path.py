@@ -7,13 +7,11 @@ all solutions at all points (a ladder graph) keeps the pitch near what is wanted
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.motion.timing import smoothed
 from paramove.robots.out_of_reach import OutOfReachError
 from paramove.robots.planar_arm import PlanarArm
-
-FloatArray = NDArray[np.float64]
 
 OFFSETS = np.deg2rad(5.0) * np.arange(-30, 31)
 """Of the pitch from what is wanted, among which the search chooses, rad."""
@@ -30,7 +28,7 @@ class NoJointPathError(ValueError):
     """The joints cannot follow a path; the message says where."""
 
 
-def planar_path(arm: PlanarArm, positions: FloatArray, pitches: FloatArray, start: FloatArray) -> FloatArray:
+def planar_path(arm: PlanarArm, positions: Floats, pitches: Floats, start: Floats) -> Floats:
     """Joint angles along a path, within the limits, that begin at `start` and end with the last pitch exactly.
 
     Args:
@@ -56,7 +54,7 @@ def planar_path(arm: PlanarArm, positions: FloatArray, pitches: FloatArray, star
     return _smoothed(arm, positions, pitches, rough)
 
 
-def _shortest(found: FloatArray, extra: FloatArray, start: FloatArray, positions: FloatArray) -> FloatArray:
+def _shortest(found: Floats, extra: Floats, start: Floats, positions: Floats) -> Floats:
     """One solution [J] of each point's [P, S, J] so that the way from `start` over all is the least."""
     before, cost, origins = start[None], np.zeros(1), []
     for number, (states, offset) in enumerate(zip(found, extra, strict=True), start=1):
@@ -80,7 +78,7 @@ def _shortest(found: FloatArray, extra: FloatArray, start: FloatArray, positions
     return np.array(path[::-1])
 
 
-def _smoothed(arm: PlanarArm, positions: FloatArray, pitches: FloatArray, rough: FloatArray) -> FloatArray:
+def _smoothed(arm: PlanarArm, positions: Floats, pitches: Floats, rough: Floats) -> Floats:
     """The path with the pitch's steps taken out; where that is out of reach it stays as it was."""
     smooth = pitches + smoothed(arm.forward(rough).pitch - pitches, SMOOTHING)
     n = len(smooth)
@@ -95,5 +93,5 @@ def _smoothed(arm: PlanarArm, positions: FloatArray, pitches: FloatArray, rough:
     return path
 
 
-def _metres(point: FloatArray) -> str:
+def _metres(point: Floats) -> str:
     return f"({', '.join(f'{value:.3f}' for value in point)}) m"

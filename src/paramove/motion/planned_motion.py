@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.motion.reaching_movement import ArmPoses
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,8 @@ class Path:
 
     period: float
     poses: list[ArmPoses] = field(default_factory=list)
-    opening: list[FloatArray] = field(default_factory=list)
-    level: list[FloatArray] = field(default_factory=list)
+    opening: list[Floats] = field(default_factory=list)
+    level: list[Floats] = field(default_factory=list)
     holding: list[NDArray[np.bool_]] = field(default_factory=list)
     phases: list[tuple[str, float]] = field(default_factory=list)
 
@@ -92,9 +91,9 @@ class PlannedMotion:
         elbow_turn: Largest turn of the elbow that a joint limit asked for, rad.
     """
 
-    times: FloatArray
-    angles: FloatArray
-    gripper: FloatArray
+    times: Floats
+    angles: Floats
+    gripper: Floats
     holding: NDArray[np.bool_]
     phases: tuple[tuple[str, float], ...]
     elbow_turn: float

@@ -6,10 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class ArmPoses:
         finger_to_thumb: o, [K, 3].
     """
 
-    elbow: FloatArray
-    gripper: FloatArray
-    finger_to_thumb: FloatArray
+    elbow: Floats
+    gripper: Floats
+    finger_to_thumb: Floats
 
     def __len__(self) -> int:
         return len(self.gripper)
@@ -41,12 +41,12 @@ class ArmPoses:
             np.concatenate([p.finger_to_thumb for p in parts]),
         )
 
-    def stacked(self) -> FloatArray:
+    def stacked(self) -> Floats:
         """All components side by side, [K, 9]."""
         return np.concatenate([self.elbow, self.gripper, self.finger_to_thumb], axis=1)
 
     @classmethod
-    def from_stacked(cls, values: FloatArray) -> ArmPoses:
+    def from_stacked(cls, values: Floats) -> ArmPoses:
         """Inverse of `stacked`."""
         return cls(values[:, :3], values[:, 3:6], values[:, 6:])
 
@@ -71,7 +71,7 @@ class ReachingMovement(ABC):
 
     @property
     @abstractmethod
-    def centre(self) -> FloatArray:
+    def centre(self) -> Floats:
         """Mean target of the training, [3], m, robot's shoulder frame."""
 
     @abstractmethod
@@ -83,11 +83,11 @@ class ReachingMovement(ABC):
         """One state for K parameters [K, 3]: the sequences θ_T^t of 5.2.5 in which only t varies."""
 
     @abstractmethod
-    def parameter_for(self, state: int, gripper: ArrayLike) -> FloatArray:
+    def parameter_for(self, state: int, gripper: ArrayLike) -> Floats:
         """Parameters [K, 3] for which the gripper in `state` is at the given points [K, 3] (thesis 5.1, 1b)."""
 
     @abstractmethod
-    def openings(self, states: ArmPoses) -> FloatArray:
+    def openings(self, states: ArmPoses) -> Floats:
         """Normalised openings ξ of the gripper, 1 open, in all states [N, 9] of one movement, [N]."""
 
     @abstractmethod
@@ -97,13 +97,13 @@ class ReachingMovement(ABC):
         Between: the parameter lies in the convex hull of the targets of the training.
         """
 
-    def approach(self, target: ArrayLike) -> tuple[ArmPoses, FloatArray]:
+    def approach(self, target: ArrayLike) -> tuple[ArmPoses, Floats]:
         """States 1..T of the movement that brings the gripper to `target` [3], and the openings."""
         poses = self.poses(self.parameter_for(self.reach_state, target)[0])
         last = self.reach_state + 1
         return poses[:last], self.openings(poses)[:last]
 
-    def retreat(self, target: ArrayLike) -> tuple[ArmPoses, FloatArray]:
+    def retreat(self, target: ArrayLike) -> tuple[ArmPoses, Floats]:
         """States T′..N of the movement that leaves `target` [3], and the openings."""
         poses = self.poses(self.parameter_for(self.release_state, target)[0])
         return poses[self.release_state :], self.openings(poses)[self.release_state :]
@@ -116,12 +116,12 @@ class TrainingTargets:
         targets: [K, P].
     """
 
-    def __init__(self, targets: FloatArray) -> None:
+    def __init__(self, targets: Floats) -> None:
         try:
             self._hull: Delaunay | None = Delaunay(targets)
         except (QhullError, ValueError):
             self._hull = None  # too few targets, or all in one plane: nothing lies between them
 
-    def enclose(self, parameter: FloatArray) -> bool:
+    def enclose(self, parameter: Floats) -> bool:
         """Whether a parameter [P] lies in the hull."""
         return self._hull is not None and bool(self._hull.find_simplex(parameter[None])[0] >= 0)

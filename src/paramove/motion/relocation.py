@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.planned_motion import Path, PlannedMotion, RelocationOptions
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
 from paramove.robots.description import Arm
-
-FloatArray = NDArray[np.float64]
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SLOWING_ROUNDS = 6
@@ -131,7 +130,7 @@ class RelocationPlanner:
     def _new_path(self) -> Path:
         return Path(self.options.sample_period)
 
-    def _approach(self, path: Path, target: FloatArray, final_opening: float) -> None:
+    def _approach(self, path: Path, target: Floats, final_opening: float) -> None:
         """States 1..T of the movement for `target`, started from the base pose."""
         o = self.options
         states, opening = self.movement.approach(self.far_enough(target))
@@ -144,7 +143,7 @@ class RelocationPlanner:
             self._way_to_table(path, "approach", states[:1])
         self._synthesised(path, "approach", states, opening, level, o.approach_duration)
 
-    def _leave(self, path: Path, target: FloatArray, opening: float, upward: bool, opened: float) -> None:
+    def _leave(self, path: Path, target: Floats, opening: float, upward: bool, opened: float) -> None:
         o = self.options
         self._fingers(path, "release", opening, opened)
         aside = target + o.release_aside * self._right(target)
@@ -173,7 +172,7 @@ class RelocationPlanner:
         return n if self.movement.begins_above_table else self.options.level_states
 
     def _synthesised(
-        self, path: Path, name: str, states: ArmPoses, opening: FloatArray, level: FloatArray, duration: float
+        self, path: Path, name: str, states: ArmPoses, opening: Floats, level: Floats, duration: float
     ) -> None:
         """State means in order (synthesis method D), smoothly timed from rest to rest."""
         at = np.linspace(0.0, 1.0, len(states))
@@ -195,17 +194,17 @@ class RelocationPlanner:
         along = minimum_jerk((np.arange(n, 0, -1) - 1 if backwards else np.arange(1, n + 1)) / n)
         path.add(name, self._pose_of(PchipInterpolator(at / at[-1], corners)(along)), self._base_opening, 0.0)
 
-    def far_enough(self, point: FloatArray) -> FloatArray:
+    def far_enough(self, point: Floats) -> Floats:
         """The point moved away from the shoulder until `_outward` leaves it where it is."""
         least = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
         return point * max(1.0, least / float(np.linalg.norm(point)))
 
-    def _outward(self, gripper: FloatArray) -> FloatArray:
+    def _outward(self, gripper: Floats) -> Floats:
         """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""
         return self.solver.moved_outward(gripper, self.options.reach_margin, self.options.reach_width)
 
     def _move(
-        self, path: Path, name: str, points: Sequence[FloatArray], speed: float, opening: float, holding: bool = False
+        self, path: Path, name: str, points: Sequence[Floats], speed: float, opening: float, holding: bool = False
     ) -> None:
         """θ_T^t along straight lines of t, at rest at every point."""
         here = path.end.gripper[0]
@@ -216,12 +215,12 @@ class RelocationPlanner:
             path.add(name, self._reached(here + along * (point - here)), opening, holding=holding)
             here = point
 
-    def _carry(self, path: Path, here: FloatArray, points: Sequence[ArrayLike]) -> None:
+    def _carry(self, path: Path, here: Floats, points: Sequence[ArrayLike]) -> None:
         o, along = self.options, [np.asarray(point, dtype=np.float64) for point in points]
         self._stay(path, "carry", here, o.closed_opening, holding=True)
         self._move(path, "carry", along, o.speed, o.closed_opening, holding=True)
 
-    def _stay(self, path: Path, name: str, here: FloatArray, opening: float, holding: bool = False) -> None:
+    def _stay(self, path: Path, name: str, here: Floats, opening: float, holding: bool = False) -> None:
         path.add(name, self._reached(here[None]), opening, holding=holding)
 
     def _fingers(self, path: Path, name: str, start: float, end: float) -> None:
@@ -232,25 +231,25 @@ class RelocationPlanner:
         opening = np.concatenate([start + along * (end - start), np.full(rest, end)])
         path.add(name, self._reached(np.repeat(path.end.gripper, n + rest, axis=0)), opening, holding=end < start)
 
-    def _reached(self, gripper: FloatArray) -> ArmPoses:
+    def _reached(self, gripper: Floats) -> ArmPoses:
         """Poses of state T in which the gripper is at the given points [K, 3]."""
         m = self.movement
         poses = m.poses_of_state(m.reach_state, m.parameter_for(m.reach_state, gripper))
         return ArmPoses(poses.elbow, gripper, poses.finger_to_thumb)
 
-    def _right(self, target: FloatArray) -> FloatArray:
+    def _right(self, target: Floats) -> Floats:
         """b′⊥ of 5.2.5: level, to the right of the forearm when the gripper is at `target`."""
         b = self._forward(target)
         return np.array([b[1], -b[0], 0.0])
 
-    def _forward(self, target: FloatArray) -> FloatArray:
+    def _forward(self, target: Floats) -> Floats:
         """b′ of 5.2.5: the forearm's direction projected onto the table plane."""
         pose = self._reached(target[None])
         solution = self.solver.solve(pose.elbow, pose.gripper, pose.finger_to_thumb, 1.0, self.options.work_slope)
         b = (pose.gripper - solution.elbow)[0] * [1.0, 1.0, 0.0]
         return np.asarray(b / np.linalg.norm(b))
 
-    def _before(self, target: FloatArray) -> FloatArray:
+    def _before(self, target: Floats) -> Floats:
         """t′ = t - 0.03 b′ + 0.01 b′⊥ of 5.2.5."""
         return target - self.options.before * self._forward(target) + self.options.aside * self._right(target)
 
@@ -269,7 +268,7 @@ class RelocationPlanner:
         fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (share * (n - 1)), 0.0, 1.0))
         return ArmPoses.from_stacked(values + fade[:, None] * (first.stacked()[0] - values[0]))
 
-    def _pose_of(self, angles: FloatArray) -> ArmPoses:
+    def _pose_of(self, angles: Floats) -> ArmPoses:
         """Poses of joint angles [K, 5]."""
         points = self.arm.kinematics.forward(angles)
         return ArmPoses(points.elbow, points.gripper, points.shoulder_from_hand[..., :, 1] * self.movement.o_max)
@@ -306,14 +305,14 @@ class RelocationPlanner:
             elbow_turn=float(np.abs(solution.elbow_turn).max()),
         )
 
-    def _sampled(self, times: FloatArray, columns: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+    def _sampled(self, times: Floats, columns: Floats, period: float) -> tuple[Floats, Floats]:
         """Joint angles and gripper positions at even times, the arm's joints within their limits."""
         even, values = resampled(times, columns, period)
         values[:, :5] = self.solver.pressed_inside(values[:, :5])
         return even, values
 
 
-def _crossfaded(first: FloatArray, second: FloatArray, n: int) -> FloatArray:
+def _crossfaded(first: Floats, second: Floats, n: int) -> Floats:
     """From one curve of n values to another."""
     share = fade_in(n, n)
     return np.asarray((1.0 - share) * first + share * second)

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.hand_poses import HandPoses, metres
 from paramove.motion.learned_way import SMOOTHING, LearnedWay, PlacedPerson
@@ -24,8 +25,6 @@ from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
 from paramove.robots.description import DescriptionError, RobotDescription
 from paramove.robots.out_of_reach import OutOfReachError
-
-FloatArray = NDArray[np.float64]
 
 POINTS = 48
 """Of a learned way."""
@@ -137,14 +136,14 @@ class ServoArmReaching:
     # The parts of a motion
 
     def _over(
-        self, motion: MotionRows, name: str, point: FloatArray, pitch: float, opening: float, holding: bool = False
+        self, motion: MotionRows, name: str, point: Floats, pitch: float, opening: float, holding: bool = False
     ) -> None:
         """By the learned movement to over an object or its place."""
         above, above_pitch = self._above(point, pitch)
         way = self._learned(self._person.approach, above)
         self._go(motion, name, above, above_pitch, way, opening, self.options.carry_clearance, holding)
 
-    def _home(self, motion: MotionRows, name: str, from_point: FloatArray) -> None:
+    def _home(self, motion: MotionRows, name: str, from_point: Floats) -> None:
         base = self.base_angles
         way = self._learned(self._person.retreat, from_point)
         pitch = float(self._arm.forward(base[:-1]).pitch)
@@ -155,7 +154,7 @@ class ServoArmReaching:
         self,
         motion: MotionRows,
         name: str,
-        point: FloatArray,
+        point: Floats,
         pitch: float,
         way: LearnedWay,
         opening: float | None,
@@ -179,13 +178,13 @@ class ServoArmReaching:
 
     def _clear(
         self,
-        start: FloatArray,
+        start: Floats,
         way: LearnedWay,
-        point: FloatArray,
+        point: Floats,
         pitch: float,
-        gripper: FloatArray,
+        gripper: Floats,
         clearance: float,
-    ) -> tuple[FloatArray | None, str]:
+    ) -> tuple[Floats | None, str]:
         """Rows along a way with the least arch with which it is clear; if it never is, None and what is in the way."""
         refusal = ""
         for arch in _ARCHES_M:
@@ -200,7 +199,7 @@ class ServoArmReaching:
             refusal = refusal or fault
         return None, refusal
 
-    def _line(self, motion: MotionRows, name: str, point: FloatArray, pitch: float, holding: bool = False) -> None:
+    def _line(self, motion: MotionRows, name: str, point: Floats, pitch: float, holding: bool = False) -> None:
         """Straight, with the gripper as it is."""
         here = self._hand(motion.end)
         distance = float(np.linalg.norm(point - here))
@@ -226,14 +225,12 @@ class ServoArmReaching:
         rest = np.repeat(rows[-1:], round(self.options.settle_duration / self._period), axis=0)
         motion.add(name, np.concatenate([rows, rest]), closing)
 
-    def _joints(self, motion: MotionRows, name: str, end: FloatArray) -> None:
+    def _joints(self, motion: MotionRows, name: str, end: Floats) -> None:
         """The last bit in joint angles: the roll, and the gripper."""
         if np.abs(motion.end - end).max() > 1e-9:
             motion.add(name, rest_to_rest(np.linspace(motion.end, end, 6), 0.2, self._period, self._limits), False)
 
-    def _along(
-        self, start: FloatArray, way: LearnedWay, point: FloatArray, pitch: float, gripper: FloatArray
-    ) -> FloatArray:
+    def _along(self, start: Floats, way: LearnedWay, point: Floats, pitch: float, gripper: Floats) -> Floats:
         here = self._arm.forward(start[:-1])
         positions = way.between(here.position, point, self._arm.yaw_axis)
         share = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
@@ -244,7 +241,7 @@ class ServoArmReaching:
         knots = np.concatenate([arm, gripper[:, None]], axis=1)
         return self._inside(rest_to_rest(knots, self.options.way_duration, self._period, self._limits, ramped))
 
-    def _openings(self, start: FloatArray, way: LearnedWay, opening: float | None) -> FloatArray:
+    def _openings(self, start: Floats, way: LearnedWay, opening: float | None) -> Floats:
         """Angles of the gripper along a way: the person's opening, times how far it shall be opened; kept if closed."""
         share = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
         if opening is None:
@@ -255,7 +252,7 @@ class ServoArmReaching:
         angles = np.array([self._gripper(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in way.opening])
         return smoothed(angles + (1.0 - share) * (start[-1] - angles[0]), SMOOTHING)
 
-    def _fault(self, rows: FloatArray, clearance: float) -> str:
+    def _fault(self, rows: Floats, clearance: float) -> str:
         """What is in the way of a path; empty if nothing is."""
         checked = np.concatenate([rows[:-1:_CHECKED_EVERY], rows[-1:]])
         heights, hand = self._clearance.heights(checked), self._arm.forward(checked[:, :-1]).position
@@ -280,29 +277,29 @@ class ServoArmReaching:
     def _finished(self, motion: MotionRows) -> PlannedMotion:
         rows = np.concatenate(motion.rows)
         phases = tuple((name, self._period * first) for name, first in motion.phases)
-        times: FloatArray = self._period * np.arange(len(rows), dtype=np.float64)
+        times: Floats = self._period * np.arange(len(rows), dtype=np.float64)
         return PlannedMotion(times, rows, self._hand(rows), np.concatenate(motion.holding), phases, 0.0)
 
-    def _learned(self, way: Callable[[FloatArray], LearnedWay], target: FloatArray) -> LearnedWay:
+    def _learned(self, way: Callable[[Floats], LearnedWay], target: Floats) -> LearnedWay:
         try:
             return way(target)
         except (UnreachablePoseError, np.linalg.LinAlgError) as error:
             raise OutOfReachError(f"the learned movement does not lead to {metres(target)}: {error}") from error
 
-    def _grasp_pitch(self, point: FloatArray) -> float:
+    def _grasp_pitch(self, point: Floats) -> float:
         return self._poses.pitch_at(point, np.deg2rad(self.options.pitch_deg), self._band(self.options.grasp_band_deg))
 
-    def _above(self, point: FloatArray, pitch: float) -> tuple[FloatArray, float]:
+    def _above(self, point: Floats, pitch: float) -> tuple[Floats, float]:
         above = point + self.options.lift * _UP
         return above, self._poses.pitch_at(above, pitch, self._band(self.options.reach_band_deg))
 
-    def _hand(self, angles: FloatArray) -> FloatArray:
+    def _hand(self, angles: Floats) -> Floats:
         return self._arm.forward(angles[..., :-1]).position
 
     def _gripper(self, opening: float) -> float:
         return self._chain.gripper_closed + opening * (self._chain.gripper_open - self._chain.gripper_closed)
 
-    def _inside(self, angles: FloatArray) -> FloatArray:
+    def _inside(self, angles: Floats) -> Floats:
         return np.asarray(np.clip(angles, self.lower, self.upper))
 
     @staticmethod

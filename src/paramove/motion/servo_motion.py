@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,16 @@ class ServoReachingOptions:
 class MotionRows:
     """A motion under construction: rows of joint angles, rad."""
 
-    rows: list[FloatArray]
+    rows: list[Floats]
     holding: list[NDArray[np.bool_]] = field(default_factory=list)
     phases: list[tuple[str, int]] = field(default_factory=list)
 
     @property
-    def end(self) -> FloatArray:
+    def end(self) -> Floats:
         """The last row [J]."""
         return np.asarray(self.rows[-1][-1])
 
-    def add(self, name: str, rows: FloatArray, holding: bool) -> None:
+    def add(self, name: str, rows: Floats, holding: bool) -> None:
         """More rows, of which the first repeats the last one that is there."""
         if not self.phases or self.phases[-1][0] != name:
             self.phases.append((name, sum(map(len, self.rows)) - 1))

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import FELT_OPENING, ArmState
 from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
@@ -20,8 +20,6 @@ from paramove.motion.motion_message import motion_message
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
-
-FloatArray = NDArray[np.float64]
 
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
@@ -186,9 +184,7 @@ class Synthesizer:
 
     # The courses of the goals. Each yields a motion, is resumed when it has been executed, and returns the outcome.
 
-    def _fetch(
-        self, goal: RelocationGoal, then: Callable[[FloatArray, FloatArray, FloatArray], PlannedMotion]
-    ) -> _Course:
+    def _fetch(self, goal: RelocationGoal, then: Callable[[Floats, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         if not self._hand.at_base:
             raise GoalRefusedError(NOT_AT_BASE)
@@ -235,7 +231,7 @@ class Synthesizer:
             yield self._plans.leave(self._waits_at(), self._hand.opening, standing_of(goal))
         return _Outcome(True)
 
-    def _placed(self, target: FloatArray) -> _Outcome:
+    def _placed(self, target: Floats) -> _Outcome:
         if self._hand.lost:
             return _Outcome(False, f"the object slipped out of the hand on the way to {centimetres(target)} cm")
         return _Outcome(True)
@@ -335,7 +331,7 @@ class Synthesizer:
         sample = min(int(np.searchsorted(running.motion.times, running.time_s)), len(running.motion.times) - 1)
         return self._hand.opening_of(float(running.motion.angles[sample, 5]))
 
-    def _waits_at(self) -> FloatArray:
+    def _waits_at(self) -> Floats:
         if self._hand.gripper is None:
             raise GoalRefusedError("the arm is at its base pose; offer the hand first")
         return self._hand.gripper

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import Chain, RobotDescription
-
-FloatArray = NDArray[np.float64]
 
 
 class TableClearance:
@@ -28,7 +26,7 @@ class TableClearance:
         self._table = table_z + float(self._data.site(chain.sites.base).xpos[2])
         self._moving = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
 
-    def heights(self, angles: FloatArray) -> FloatArray:
+    def heights(self, angles: Floats) -> Floats:
         """Of the arm's lowest moving point above the table, [K], m."""
         heights = np.empty(len(angles))
         for number, row in enumerate(angles):
@@ -36,7 +34,7 @@ class TableClearance:
             heights[number] = self._lowest() - self._table
         return heights
 
-    def touching(self, angles: FloatArray) -> tuple[str, str] | None:
+    def touching(self, angles: Floats) -> tuple[str, str] | None:
         """Two bodies of the arm that touch in one of the poses, the fingers aside; None if none do."""
         for row in angles:
             self._place(row)
@@ -48,7 +46,7 @@ class TableClearance:
                     return first, second
         return None
 
-    def _place(self, row: FloatArray) -> None:
+    def _place(self, row: Floats) -> None:
         """Put the joints there, and those that are coupled to them."""
         model, data = self._model, self._data
         data.qpos[self._qpos] = row

@@ -5,32 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 _WINDOW_S = 0.12
 _ACCELERATION_ROUNDS = 6
 
 
-def minimum_jerk(u: FloatArray) -> FloatArray:
+def minimum_jerk(u: Floats) -> Floats:
     """Progress 0 to 1 from rest to rest for u in 0 to 1 (Flash and Hogan 1985)."""
     return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
 
 
-def soft_ends(u: FloatArray) -> FloatArray:
+def soft_ends(u: Floats) -> Floats:
     """Progress that is even but for its ends, so that a movement with a timing of its own keeps it in the middle."""
     return np.asarray(0.6 * u + 0.4 * minimum_jerk(u))
 
 
-def fade_in(n: int, last: int) -> FloatArray:
+def fade_in(n: int, last: int) -> Floats:
     """0 up to the last `last` of n values, then smoothly to 1 at the end."""
     return minimum_jerk(np.clip((np.arange(n) - (n - last)) / max(1, last - 1), 0.0, 1.0))
 
 
-def slowed_times(angles: FloatArray, period: float, velocity: FloatArray, acceleration: FloatArray) -> FloatArray:
+def slowed_times(angles: Floats, period: float, velocity: Floats, acceleration: Floats) -> Floats:
     """Times of samples that were planned `period` apart, stretched where a joint would exceed its limits.
 
     The stretch is spread over a tenth of a second before and after, so that slowing down is itself smooth.
@@ -53,7 +52,7 @@ def slowed_times(angles: FloatArray, period: float, velocity: FloatArray, accele
     return np.concatenate([[0.0], np.cumsum(stretch * period)])
 
 
-def largest_excess(angles: FloatArray, period: float, velocity: FloatArray, acceleration: FloatArray) -> float:
+def largest_excess(angles: Floats, period: float, velocity: Floats, acceleration: Floats) -> float:
     """The factor by which even samples [K, J] must be slowed to keep the limits; not above 1 if they do.
 
     Before and after the samples the joints rest.
@@ -65,21 +64,21 @@ def largest_excess(angles: FloatArray, period: float, velocity: FloatArray, acce
     return float(max(speed, np.sqrt(change)))
 
 
-def _spread(needed: FloatArray, period: float) -> FloatArray:
+def _spread(needed: Floats, period: float) -> Floats:
     """At least 1 and at least `needed`, smooth in time."""
     window = max(1, round(_WINDOW_S / period))
     widest = maximum_filter1d(np.maximum(1.0, needed), 2 * window + 1, mode="nearest")
     return np.asarray(gaussian_filter1d(widest, window / 2.0, mode="nearest", truncate=2.0))
 
 
-def resampled(times: FloatArray, values: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
+def resampled(times: Floats, values: Floats, period: float) -> tuple[Floats, Floats]:
     """A curve through `values` [K, J] at `times` [K], sampled every `period` and at its end."""
     n = max(1, int(np.ceil(times[-1] / period - 1e-9)))
     at = np.linspace(0.0, times[-1], n + 1)
     return np.asarray(period * np.arange(n + 1)), np.asarray(CubicSpline(times, values, axis=0)(at))
 
 
-def smoothed(values: FloatArray, width: float) -> FloatArray:
+def smoothed(values: Floats, width: float) -> Floats:
     """Near the values [K, ...], with the same ends, and bent as little as possible over about `width` of them."""
     n = len(values)
     bends = np.diff(np.eye(n), 2, axis=0)
@@ -88,7 +87,7 @@ def smoothed(values: FloatArray, width: float) -> FloatArray:
     return np.concatenate([values[:1], np.linalg.solve(inner[:, 1:-1], right), values[-1:]])
 
 
-def ramped(u: FloatArray, share: float = 0.25) -> FloatArray:
+def ramped(u: Floats, share: float = 0.25) -> Floats:
     """Even progress 0 to 1 for u in 0 to 1 that begins and ends at rest, without a jump of acceleration.
 
     The speed rises over the first `share` and falls over the last, which are at most half each.
@@ -99,18 +98,18 @@ def ramped(u: FloatArray, share: float = 0.25) -> FloatArray:
     return np.asarray(way / (1.0 - share))
 
 
-def _ramp(x: FloatArray) -> FloatArray:
+def _ramp(x: Floats) -> Floats:
     """Way of a speed 3 x² - 2 x³ that rises from 0 to 1; half of the time at full speed."""
     return np.asarray(x**3 - 0.5 * x**4)
 
 
 def rest_to_rest(
-    knots: FloatArray,
+    knots: Floats,
     duration: float,
     period: float,
-    limits: tuple[FloatArray, FloatArray, FloatArray],
-    progress: Callable[[FloatArray], FloatArray] = minimum_jerk,
-) -> FloatArray:
+    limits: tuple[Floats, Floats, Floats],
+    progress: Callable[[Floats], Floats] = minimum_jerk,
+) -> Floats:
     """A curve through joint angles, sampled evenly from rest to rest, all of it slowed until the limits are kept.
 
     Args:

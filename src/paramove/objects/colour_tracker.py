@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Image
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize, Size
 from paramove.objects.openings import find_openings
 
-Image = NDArray[Any]  # uint8; cv2's own annotations say only integer or floating
 MOST_PIECES = 6
 
 
@@ -72,7 +72,7 @@ class Region:
     width_px: float
     height_px: float
     lean: float
-    outline: NDArray[np.float64]  # [M, 2] convex hull
+    outline: Floats  # [M, 2] convex hull
 
 
 class ColourTracker:
@@ -236,7 +236,7 @@ def _measure(image: Image, box: tuple[int, int, int, int], colour: Colour) -> Re
     return _region(weight, left, top, outlined=colour.hand)
 
 
-def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) -> Region | None:
+def _region(weight: Floats, left: int, top: int, outlined: bool) -> Region | None:
     area = float(weight.sum())
     if area <= 0:
         return None
@@ -261,7 +261,7 @@ def _region(weight: NDArray[np.float64], left: int, top: int, outlined: bool) ->
     )
 
 
-def _lean(weight: NDArray[np.float64], u: float, v: float) -> float:
+def _lean(weight: Floats, u: float, v: float) -> float:
     """du/dv of the principal axis through the centre (u, v)."""
     du, dv = np.arange(weight.shape[1]) - u, np.arange(weight.shape[0]) - v
     uu, vv = float(weight.sum(axis=0) @ du**2), float(weight.sum(axis=1) @ dv**2)
@@ -269,14 +269,14 @@ def _lean(weight: NDArray[np.float64], u: float, v: float) -> float:
     return float(np.tan(0.5 * np.arctan2(2 * uv, vv - uu)))
 
 
-def _palm(weight: NDArray[np.float64]) -> tuple[float, float]:
+def _palm(weight: Floats) -> tuple[float, float]:
     """Middle of the largest circle within the region: of a hand the palm, wherever its fingers and its sleeve are."""
     inside = np.pad((weight > 0.5).astype(np.uint8), 1)
     _, _, _, (u, v) = cv2.minMaxLoc(cv2.distanceTransform(inside, cv2.DIST_L2, 3))
     return u - 1.0, v - 1.0
 
 
-def _outline(weight: NDArray[np.float64], left: int, top: int) -> NDArray[np.float64]:
+def _outline(weight: Floats, left: int, top: int) -> Floats:
     """Convex hull of the pixels that belong to the region by more than a half; [M, 2] px."""
     points = cv2.findNonZero((weight > 0.5).astype(np.uint8))
     if points is None:
@@ -284,7 +284,7 @@ def _outline(weight: NDArray[np.float64], left: int, top: int) -> NDArray[np.flo
     return np.asarray(cv2.convexHull(points).reshape(-1, 2) + np.array([left, top]), dtype=np.float64)
 
 
-def _extent(profile: NDArray[np.float64]) -> tuple[float, float]:
+def _extent(profile: Floats) -> tuple[float, float]:
     """Where a profile first and last crosses half of its typical value, to a part of a pixel."""
     typical = np.sort(profile[profile > 0.2 * profile.max()])
     level = 0.5 * float(typical[typical.size // 2])

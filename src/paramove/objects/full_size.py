@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from paramove.documents.array_types import Floats
 
 PLACE_RADIUS_PX = 24.0
 """Nearer samples belong to one place: about one object's width apart, over which the size changes by < 3 %."""
@@ -65,8 +66,8 @@ class FullSize:
 
     def __init__(self) -> None:
         self._places: dict[str, list[_Place]] = {}
-        self._model: dict[str, NDArray[np.float64]] = {}
-        self._slope: NDArray[np.float64] = np.zeros((2, 5))
+        self._model: dict[str, Floats] = {}
+        self._slope: Floats = np.zeros((2, 5))
 
     def expected(self, name: str, u_px: float, v_px: float) -> Size | None:
         """Full size of the object at an image point; None before it was first seen at rest."""

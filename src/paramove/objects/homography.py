@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration, PlaneCorrespondence
-
-Matrix = NDArray[np.float64]
 
 LEAST_FLATNESS = 0.03
 """Three points count as collinear below this ratio of the triangle's height to its longest side."""
@@ -34,11 +33,11 @@ class PlaneHomography:
         correspondences: [M, 4] rows (u_px, v_px, x, y) that it was fitted to.
     """
 
-    plane_from_image_matrix: Matrix
+    plane_from_image_matrix: Floats
     plane_z: float = 0.0
     plane_frame: str = "right_shoulder"
     image_frame: str = "camera_optical"
-    correspondences: Matrix | None = None
+    correspondences: Floats | None = None
 
     @classmethod
     def fit(cls, image_points: ArrayLike, plane_points: ArrayLike, plane_z: float = 0.0) -> PlaneHomography:
@@ -97,7 +96,7 @@ class PlaneHomography:
         """(u, v), px. Raises ValueError for a point that is seen at no finite place."""
         return _apply(np.asarray(np.linalg.inv(self.plane_from_image_matrix), dtype=np.float64), x, y)
 
-    def residuals(self) -> Matrix:
+    def residuals(self) -> Floats:
         """Distance of each correspondence to its mapped image point, m, [M]. All 0 when there are just four."""
         if self.correspondences is None:
             return np.zeros(0)
@@ -114,7 +113,7 @@ class PlaneHomography:
         across, down = np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]])
         return float(np.linalg.norm(down) / np.linalg.norm(across))
 
-    def _refuse_mirrored(self, image: Matrix) -> None:
+    def _refuse_mirrored(self, image: Floats) -> None:
         depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]
         if np.any(depths <= 0) and np.any(depths >= 0):
             raise HomographyError("the horizon runs between the points: corners are mixed up, or a point is wrong")
@@ -123,14 +122,14 @@ class PlaneHomography:
             raise HomographyError("the image shows the plane mirrored: two correspondences are mixed up")
 
 
-def _points(points: ArrayLike, which: str) -> Matrix:
+def _points(points: ArrayLike, which: str) -> Floats:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 2 or not np.all(np.isfinite(array)):
         raise HomographyError(f"{which} points have shape {array.shape}: finite numbers of shape [M, 2] needed")
     return array
 
 
-def _refuse_collinear(points: Matrix, which: str) -> None:
+def _refuse_collinear(points: Floats, which: str) -> None:
     """Refuse points among which no four are found of which no three lie on one line."""
     distances = np.linalg.norm(points[:, None] - points[None], axis=2)
     i, j = np.unravel_index(int(np.argmax(distances)), distances.shape)
@@ -144,17 +143,17 @@ def _refuse_collinear(points: Matrix, which: str) -> None:
         )
 
 
-def _flatness(a: Matrix, b: Matrix, c: Matrix) -> float:
+def _flatness(a: Floats, b: Floats, c: Floats) -> float:
     """Height over longest side of the triangle; 0 for three points of one line."""
     longest = float(max(np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(a - c)))
     return abs(_cross(b - a, c - a)) / longest**2 if longest > 0 else 0.0
 
 
-def _cross(a: Matrix, b: Matrix) -> float:
+def _cross(a: Floats, b: Floats) -> float:
     return float(a[0] * b[1] - a[1] * b[0])
 
 
-def _direct_linear_transform(image: Matrix, plane: Matrix) -> Matrix:
+def _direct_linear_transform(image: Floats, plane: Floats) -> Floats:
     """Hartley and Zisserman, Multiple View Geometry, algorithm 4.2: with both point sets normalised."""
     to_unit_image, to_unit_plane = _normalising(image), _normalising(plane)
     u = np.hstack([image, np.ones((len(image), 1))]) @ to_unit_image.T
@@ -170,14 +169,14 @@ def _direct_linear_transform(image: Matrix, plane: Matrix) -> Matrix:
     return np.asarray(matrix / matrix[2, 2], dtype=np.float64)
 
 
-def _normalising(points: Matrix) -> Matrix:
+def _normalising(points: Floats) -> Floats:
     """Similarity [3, 3] that moves the mean to 0 and makes the mean distance to it √2."""
     mean = points.mean(axis=0)
     scale = np.sqrt(2.0) / np.linalg.norm(points - mean, axis=1).mean()
     return np.array([[scale, 0.0, -scale * mean[0]], [0.0, scale, -scale * mean[1]], [0.0, 0.0, 1.0]])
 
 
-def _apply(matrix: Matrix, a: float, b: float) -> tuple[float, float]:
+def _apply(matrix: Floats, a: float, b: float) -> tuple[float, float]:
     x, y, w = matrix @ np.array([a, b, 1.0])
     if not np.isfinite(w) or abs(w) < 1e-12:
         raise ValueError(f"point ({a}, {b}) lies on the horizon and has no image")

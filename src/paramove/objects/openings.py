@@ -14,11 +14,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Image
 from paramove.msgs.tracked_objects_pb2 import Opening
-
-Image = NDArray[Any]
 
 SURROUNDINGS_PX = 15
 """Side of the square in which the surface around an opening takes up more than half, px at a quarter of the size."""

@@ -10,13 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.sinking import Sample
-
-Point = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Pointing:
         self._candidate: str | None = None
         self._since_s = 0.0
         self._last_near_s = 0.0
-        self._palm_then: Point | None = None
+        self._palm_then: Floats | None = None
 
     def update(
         self,
@@ -84,7 +82,7 @@ class Pointing:
         return self._hold(nearest, np.array([hand.u_px, hand.v_px]), now_s, resting[nearest], homography)
 
     def _hold(
-        self, name: str, palm: Point, now_s: float, place: Sample, homography: PlaneHomography | None
+        self, name: str, palm: Floats, now_s: float, place: Sample, homography: PlaneHomography | None
     ) -> str | None:
         moved = self._palm_then is not None and (
             np.linalg.norm(palm - self._palm_then) / self._near_px(place, homography) > self._limits.still
@@ -128,7 +126,7 @@ class Pointing:
         return self._limits.near / float(np.linalg.norm(beside - here))
 
 
-def _fingertip(hand: TrackedObject, place: Sample) -> Point:
+def _fingertip(hand: TrackedObject, place: Sample) -> Floats:
     """The extreme point of the hand's outline: its own tip if it has one, else the one towards the object; px."""
     centre = np.array([hand.u_px, hand.v_px])
     if not hand.outline:

@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import ArmLengths, across
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
-
-Floats = NDArray[np.float64]
 
 POSE_POINTS = ("shoulder", "elbow", "hand")
 """The three points of an arm pose, in this order; the hand is the tip of the index finger."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats, Image
 from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
@@ -34,9 +35,6 @@ from paramove.observation.options import ObservationOptions
 from paramove.observation.presence import Presence, seen_presence
 from paramove.observation.segment_sums import LANES, NX, NY, SHARE
 from paramove.observation.silhouette_kernels import Camera, new_canvas
-
-Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 LEAST_AREA_PX = 200.0
 CHUNK = 50

@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Image
 from paramove.observation.background_kernels import changes, learn, samples
-
-Image = NDArray[np.uint8]
 
 KNOWN_AFTER_S, FOLLOWS_S, FOLLOWS_LARGE_S = 0.4, 3.0, 20.0
 LEAST_NOISE = 2.0

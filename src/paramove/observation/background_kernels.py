@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Bytes
 from paramove.hmm.compilation import compiled
 
-Bytes = NDArray[np.uint8]
 Signed = NDArray[np.int8]
 Floats32 = NDArray[np.float32]
 

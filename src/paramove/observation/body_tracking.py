@@ -6,19 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paramove.cameras.aligned_views import AlignedViews, Views
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.measured_files import measured_cameras
 from paramove.cameras.watch import CameraWatch
+from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError
 from paramove.objects.colour_tracker import Colour
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint, StereoBodyTracker
-
-Image = NDArray[np.uint8]
 
 UNSEEN_S = 3.0
 """A point that was not seen by two cameras for so long is told. A hand that rests below the table comes back sooner."""

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Image, Ints
 from paramove.observation.edge_kernels import (
     DIRECTIONS,
     MARGIN,
@@ -20,8 +21,6 @@ from paramove.observation.edge_kernels import (
     whole_intensity,
 )
 from paramove.observation.options import ObservationOptions
-
-Image = NDArray[np.uint8]
 
 REACH_PX = 10
 """L of (6.25) and (6.23)."""
@@ -87,7 +86,7 @@ class EdgeImages:
             distance_image(flat, *self._steps[i], *size, self.distances[i])
 
 
-def line_steps(i: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
+def line_steps(i: int, stride: int) -> tuple[Ints, NDArray[np.uint16]]:
     """Steps l n_i of (6.25), l > 0, rounded to pixels, as flat offsets, and their weights 256 (1 - l / L)."""
     angle = i * np.pi / DIRECTIONS
     along = np.arange(1, REACH_PX)
@@ -95,7 +94,7 @@ def line_steps(i: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.uint1
     return offsets, np.rint(256.0 * (1.0 - along / REACH_PX)).astype(np.uint16)
 
 
-def disc_steps(stride: int) -> tuple[NDArray[np.int64], NDArray[np.uint16]]:
+def disc_steps(stride: int) -> tuple[Ints, NDArray[np.uint16]]:
     """Steps q - p of (6.23) in half the disc of radius L, as flat offsets, and their weights 256 (1 - |q - p| / L)."""
     dy, dx = np.indices((2 * REACH_PX + 1, 2 * REACH_PX + 1)).reshape(2, -1) - REACH_PX
     distance = np.hypot(dx, dy)

@@ -7,12 +7,10 @@ image of one direction lies before the next.
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Bytes, Ints
 from paramove.hmm.compilation import compiled, compiled_sums
 
-Bytes = NDArray[np.uint8]
 Floats32 = NDArray[np.float32]
-Ints = NDArray[np.int64]
-Counts = NDArray[np.int64]
 
 MARGIN = 32
 """Pixels of zeros about an edge image; shifts, distance search and the look 10 px aside stay within it."""

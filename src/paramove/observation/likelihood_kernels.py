@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Bytes, Floats
 from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
 from paramove.observation.background_kernels import covered
 from paramove.observation.contour_kernels import (
@@ -18,9 +19,7 @@ from paramove.observation.matching_kernels import Shifts, match, new_shifts
 from paramove.observation.segment_sums import BASE, LANES, NX, NY, PX, PY, SHARE
 from paramove.observation.silhouette_kernels import Camera, Canvas, draw_arm, new_canvas, wipe
 
-Bytes = NDArray[np.uint8]
 Signed = NDArray[np.int8]
-Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 LOOK_ASIDE = np.float32(10.0)

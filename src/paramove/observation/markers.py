@@ -12,16 +12,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import WORLD_FRAME, CalibratedCamera
-from paramove.cameras.charuco_board import MARKERS, SIZE_UNTOLD_ID, Image, dictionary
+from paramove.cameras.charuco_board import MARKERS, SIZE_UNTOLD_ID, dictionary
 from paramove.cameras.stereo import StereoRig
+from paramove.documents.array_types import Floats, Image
 from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects.colour_tracker import Colour, ColourTracker
-
-Floats = NDArray[np.float64]
 
 BOARD_IDS = SIZE_UNTOLD_ID + MARKERS
 """Smaller ids are those of calibration boards, which may lie on the table meanwhile."""

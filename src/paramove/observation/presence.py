@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
+from paramove.documents.array_types import Floats
 from paramove.observation.arm_body import HAND
 from paramove.observation.background_kernels import FULL
-
-Floats = NDArray[np.float64]
 
 AXIS_SHARES = np.linspace(0.25, 0.95, 15)
 """Of the line from elbow over the wrist to the fingertip: places at which something must be seen."""

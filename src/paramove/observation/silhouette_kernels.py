@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Bytes, Floats
 from paramove.hmm.compilation import compiled, compiled_arithmetic
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
 
 CORNERS = 32

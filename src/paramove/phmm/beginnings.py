@@ -11,14 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.performance import BEGINNING_POINTS, FIRST_FRAMES, GROWTH, beginning_features
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SHRINKAGE = 0.1
 """Share of each variance that is taken for independent."""

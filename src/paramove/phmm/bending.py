@@ -1,11 +1,9 @@
 """How far the true means may lie from those interpolated between grid lines, as uncertainty of theta."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.phmm.grid import ParameterGrid
-
-Floats = NDArray[np.float64]
 
 UNSEEN_BEND = 0.03
 """Standard deviation of theta half-way between the only two lines of a dimension, as a share of the grid: what lies

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import checked_sequence, checked_sequences
 from paramove.phmm.beginnings import BeginningDiscriminant, discriminants
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.performance import groups_of
 from paramove.phmm.polynomial import PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
-
-Floats = NDArray[np.float64]
 
 INDEX_FILE = "classifier.npz"
 

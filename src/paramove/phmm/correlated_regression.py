@@ -14,18 +14,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.phmm.features import Monomials
 from paramove.phmm.left_out import folds_of, inflation_of
 from paramove.phmm.noise import distances_with_noise
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
 from paramove.phmm.typicality import PredictiveDistribution
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""

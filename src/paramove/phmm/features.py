@@ -8,12 +8,11 @@ from functools import cached_property
 from math import comb
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 MOST_MONOMIALS = 5000
 MOST_PARAMETERS = 12
 

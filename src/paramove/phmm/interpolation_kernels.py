@@ -6,14 +6,11 @@ and durations alike (Fisher's identity).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_sums
 from paramove.hmm.kernels import feasible_ends, stacked_segments
 from paramove.hmm.vector_functions import dot
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEGLIGIBLE = 1e-7
 LOG_2PI = 1.8378770664093453

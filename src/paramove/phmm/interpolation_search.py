@@ -7,11 +7,9 @@ it has kinks. So the search goes from region to region, a region being a cell or
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled
 from paramove.phmm.interpolation_kernels import expectation_at, value_at
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 BORDER = 1e-9
 MOST_STEPS, TOLERANCE = 40, 1e-3

@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import Any, Self, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
@@ -20,9 +21,6 @@ from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingD
 from paramove.phmm.performance import state_averages
 from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity, left_out_of_groups
 from paramove.phmm.synchronisation import synchronised
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SMOOTHING = 0.3
 """Factor on squared distances where the search begins: covariances are widened as much (paper 5.3)."""

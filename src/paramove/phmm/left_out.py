@@ -3,11 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri  # scipy.stats would take half a second to import
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from paramove.documents.array_types import Floats, Ints
 
 MOST_FOLDS = 10
 

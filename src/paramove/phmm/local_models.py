@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 ROUNDING = 1e-6
 

@@ -10,10 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NUMBERS_OF_UNITS = (1, 2, 4, 8)
 DECAYS = (1e-4, 1e-2)

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.phmm.correlated_regression import (
     SHRINKAGES,
     LeftOutFold,
@@ -25,8 +25,6 @@ from paramove.phmm.networks import StateNetworks, hidden_units
 from paramove.phmm.performance import part_averages
 from paramove.phmm.ridge import residuals_left_out
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Missed = Callable[[Floats], tuple[Floats, Floats]]
 
 PARTS = 10

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
-Floats = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 INNER_DEVIATION = 3.0
 """Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""

@@ -7,8 +7,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
@@ -25,8 +26,6 @@ from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingD
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed
 from paramove.phmm.ridge import chosen_ridge
-
-Floats = NDArray[np.float64]
 
 SMOOTHNESS = 0.05
 """Of the polynomial model whose alignment of frames and states the networks begin with."""

@@ -13,12 +13,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from paramove.hmm.compilation import compiled_sums
-
-Floats = NDArray[np.float64]
 
 MEDIAN_OF_SQUARES = 0.4549364
 """Of a standard normal variable; a median since reversals, impacts and gaps make a few great differences."""

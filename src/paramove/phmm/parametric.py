@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
 from paramove.hmm.sequences import checked_sequence, checked_sequences
 from paramove.hmm.synthesis import Path as PathKind
@@ -21,8 +22,6 @@ from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 from paramove.phmm.training_checks import check_training
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 MOST_FRAMES = 100_000
 
 

@@ -8,16 +8,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import resample
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
 from paramove.phmm.typicality import PredictiveDistribution
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""

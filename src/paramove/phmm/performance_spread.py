@@ -11,13 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.estimation import Parameters
 from paramove.phmm.left_out import inflation_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SHRINKAGE = 0.05
 """Share of each variance that is taken for independent."""

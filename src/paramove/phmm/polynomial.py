@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
 from paramove.hmm.estimation import Evaluator
 from paramove.hmm.sequences import check_length, checked_sequence
@@ -29,8 +30,6 @@ from paramove.phmm.performance import (
 )
 from paramove.phmm.regression import RegressedParameters, train_regressed, with_coefficients
 from paramove.phmm.ridge import smoothed
-
-Floats = NDArray[np.float64]
 
 Residuals = Literal["independent", "correlated"]
 MOST_STEPS = 40

@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import kernels
 from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
 from paramove.hmm.options import TrainingOptions, TrainingSummary
 from paramove.hmm.sequences import Stack
 from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
 from paramove.phmm.slope_prior import SlopePrior
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 EVIDENCE_ITERATIONS = 8
 """The prior's strength follows the evidence while covariances anneal, but at least so long; then it is constant."""

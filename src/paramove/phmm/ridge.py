@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from paramove.documents.array_types import Floats, Ints
 
 STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
 """Candidates for the ridge of each degree, as a share of the number of movements."""

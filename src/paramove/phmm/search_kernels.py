@@ -7,15 +7,12 @@ the coefficients; then one evaluation costs little more than its recursions. u i
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_sums
 from paramove.hmm.kernels import filled, segments_log_likelihood, stacked_segments
 from paramove.hmm.vector_functions import add_multiple, dot
 from paramove.phmm.features import monomials_at
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEGLIGIBLE = 1e-15  # of a responsibility
 WIDTH = 1e-5

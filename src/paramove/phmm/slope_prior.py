@@ -11,10 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from paramove.documents.array_types import Floats, Ints
 
 LEAST_STRENGTH, GREATEST_STRENGTH = 1e-8, 1e8
 CONJUGATE_STEPS = 6

@@ -9,13 +9,13 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.arrays import read_arrays
 from paramove.documents.atomic_writing import replacing
 from paramove.documents.input_error import InputError
 from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.phmm.description import MovementDescription
 
-Floats = NDArray[np.float64]
 FORMAT_VERSION = 1
 MOST_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""

@@ -3,13 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import Parameters, TrainingOptions
 from paramove.hmm.estimation import Statistics, covariances_of, durations_of
 from paramove.hmm.training import regularisation_at, root_mean_deviation
 
-Floats = NDArray[np.float64]
 AFTER_ANNEALING = 10**6
 
 

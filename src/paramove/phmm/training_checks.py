@@ -2,12 +2,8 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paramove.documents.array_types import Floats
 from paramove.hmm.sequences import SequenceLengthError, check_demonstrations, check_length
-
-Floats = NDArray[np.float64]
 
 
 def check_training(

@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, stdtr  # scipy.stats would take half a second to import
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from paramove.documents.array_types import Floats, Ints
 
 LEAST_DEVIATION = 1e-3
 

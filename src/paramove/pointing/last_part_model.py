@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.last_parts import FRAMES, last_parts
 from paramove.demonstrations.synthetic import FRAME, Action
+from paramove.documents.array_types import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import MovementDescription, QuadraticPHMM
 from paramove.phmm.kept_model import kept_model
-
-Floats = NDArray[np.float64]
 
 STATES = 8
 PERSONS = 8

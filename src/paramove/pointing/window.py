@@ -12,20 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
-from numpy.typing import NDArray
 
 from paramove.action_space.messages import BALL_M, ball_colour, certainty
 from paramove.action_space.placement import PersonPlacement
 from paramove.cameras.calibrated import WORLD_FRAME
 from paramove.demonstrations import table_place
 from paramove.demonstrations.last_parts import FRAMES, at_times
+from paramove.documents.array_types import Floats
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.events import FARTHEST_M
 from paramove.pointing.last_part_model import Judgement, LastPartModel
 from paramove.pointing.window_options import PointingWindowOptions
-
-Floats = NDArray[np.float64]
 
 LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 """Of the windows that are tried, over the mean duration of the demonstrated last parts."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class ArmPoints:
     torso's axes) into the shoulder's frame.
     """
 
-    elbow: FloatArray
-    gripper: FloatArray
-    fingertip: FloatArray
-    shoulder_from_hand: FloatArray
+    elbow: Floats
+    gripper: Floats
+    fingertip: Floats
+    shoulder_from_hand: Floats
 
 
 @dataclass(frozen=True)
@@ -64,22 +64,22 @@ class ArmKinematics:
         )
 
 
-def rotation_x(angle: ArrayLike) -> FloatArray:
+def rotation_x(angle: ArrayLike) -> Floats:
     """Rotation matrices about x, [..., 3, 3], for angles [...] in rad."""
     return _rotation(angle, 1, 2)
 
 
-def rotation_y(angle: ArrayLike) -> FloatArray:
+def rotation_y(angle: ArrayLike) -> Floats:
     """Rotation matrices about y, [..., 3, 3], for angles [...] in rad."""
     return _rotation(angle, 2, 0)
 
 
-def rotation_z(angle: ArrayLike) -> FloatArray:
+def rotation_z(angle: ArrayLike) -> Floats:
     """Rotation matrices about z, [..., 3, 3], for angles [...] in rad."""
     return _rotation(angle, 0, 1)
 
 
-def _rotation(angle: ArrayLike, first: int, second: int) -> FloatArray:
+def _rotation(angle: ArrayLike, first: int, second: int) -> Floats:
     """Rotation that turns axis `first` towards axis `second`."""
     angle = np.asarray(angle, dtype=np.float64)
     matrix = np.zeros((*angle.shape, 3, 3))

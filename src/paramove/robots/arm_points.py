@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import Chain
-
-FloatArray = NDArray[np.float64]
 
 ARM_BASE = "arm_base"
 """Frame of a servo arm's base: x forward, y left, z up from the table, m."""
@@ -18,7 +17,7 @@ OPEN_M, CLOSED_M = 0.08, 0.02
 """From index to thumb for the open and the closed gripper, about as people's are; no gripper's own sizes."""
 
 
-def arm_points(chain: Chain, angles: ArrayLike, gripper: ArrayLike) -> FloatArray:
+def arm_points(chain: Chain, angles: ArrayLike, gripper: ArrayLike) -> Floats:
     """Where the points are.
 
     The shoulder is the yaw axis at the height of the first pitch axis, elbow and wrist are the other two pitch axes.
@@ -40,7 +39,7 @@ def arm_points(chain: Chain, angles: ArrayLike, gripper: ArrayLike) -> FloatArra
     up = np.array([0.0, 0.0, 1.0])
     shoulder = np.broadcast_to([*arm.yaw_axis, arm.shoulder[2]], ahead.shape)
 
-    def along(pitch: FloatArray, forward: float, upward: float) -> FloatArray:
+    def along(pitch: Floats, forward: float, upward: float) -> Floats:
         """A vector of the arm's plane, turned downward."""
         cos_pitch, sin_pitch = np.cos(pitch)[..., None], np.sin(pitch)[..., None]
         forward_part = forward * (cos_pitch * ahead - sin_pitch * up)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.wording import nearest
 from paramove.robots.arm_kinematics import ArmKinematics
 from paramove.robots.description_file import (
@@ -32,8 +33,6 @@ from paramove.robots.planar_arm import PlanarArm
 from paramove.safety.limits import MotionLimits
 
 __all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +102,18 @@ class RobotDescription:
     joint_names: tuple[str, ...]
     motors: tuple[str, ...]
     velocity_loop: NDArray[np.bool_]
-    lower: FloatArray
-    upper: FloatArray
-    soft_lower: FloatArray
-    soft_upper: FloatArray
-    velocity: FloatArray
-    operating_velocity: FloatArray
-    operating_acceleration: FloatArray
-    stop_acceleration: FloatArray
-    jerk: FloatArray
-    torque_average: FloatArray
-    torque_peak: FloatArray
-    base_pose: FloatArray
+    lower: Floats
+    upper: Floats
+    soft_lower: Floats
+    soft_upper: Floats
+    velocity: Floats
+    operating_velocity: Floats
+    operating_acceleration: Floats
+    stop_acceleration: Floats
+    jerk: Floats
+    torque_average: Floats
+    torque_peak: Floats
+    base_pose: Floats
     units: JointUnits
     firmware: FirmwareParameters | None
     stream: StreamParameters
@@ -250,7 +249,7 @@ def _arm(names: tuple[str, ...], arm: ArmPart) -> Arm:
     )
 
 
-def _chain(names: tuple[str, ...], chain: ChainPart, lower: FloatArray, upper: FloatArray) -> Chain:
+def _chain(names: tuple[str, ...], chain: ChainPart, lower: Floats, upper: Floats) -> Chain:
     indices = np.array([names.index(joint) for joint in chain.joints], dtype=np.intp)
     links = chain.links
     return Chain(
@@ -275,11 +274,11 @@ def _chain(names: tuple[str, ...], chain: ChainPart, lower: FloatArray, upper: F
     )
 
 
-def _frozen(values: Iterable[float]) -> FloatArray:
+def _frozen(values: Iterable[float]) -> Floats:
     array = np.array(list(values), dtype=np.float64)
     array.flags.writeable = False
     return array
 
 
-def _radians(degrees: Iterable[float]) -> FloatArray:
+def _radians(degrees: Iterable[float]) -> Floats:
     return _frozen(np.deg2rad(list(degrees)))

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.array_types import Floats
+
 INT16_RANGE = (-32768, 32767)
 
 
@@ -29,12 +31,12 @@ class JointUnits:
     """
 
     names: tuple[str, ...]
-    counts_per_rad: NDArray[np.float64]
-    zero_counts: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
+    counts_per_rad: Floats
+    zero_counts: Floats
+    lower: Floats
+    upper: Floats
 
-    def counts_range(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def counts_range(self) -> tuple[Floats, Floats]:
         """Smallest and largest counts that keep each joint inside its mechanical range, each [J]."""
         ends = np.stack([self.zero_counts + self.counts_per_rad * end for end in (self.lower, self.upper)])
         # The manual's ends are whole counts; rounding must not shut them out.
@@ -61,7 +63,7 @@ class JointUnits:
         self._refuse_first(values, (counts < low - slack) | (counts > high + slack))
         return counts.astype(np.int16)
 
-    def to_radians(self, counts: ArrayLike) -> NDArray[np.float64]:
+    def to_radians(self, counts: ArrayLike) -> Floats:
         """Joint angles of integer units. Measured joints may lie a little beyond their range, so that is no error.
 
         Args:
@@ -83,7 +85,7 @@ class JointUnits:
             )
         return np.asarray((values - self.zero_counts) / self.counts_per_rad, dtype=np.float64)
 
-    def _checked(self, values: ArrayLike, what: str) -> NDArray[np.float64]:
+    def _checked(self, values: ArrayLike, what: str) -> Floats:
         array = np.asarray(values, dtype=np.float64)
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise JointRangeError(f"{what} have shape {array.shape}; the last axis must hold {len(self.names)} joints")
@@ -92,7 +94,7 @@ class JointUnits:
             raise JointRangeError(f"joint {self.names[place[-1]]}: {array[place]} is not a finite number")
         return array
 
-    def _refuse_first(self, angles: NDArray[np.float64], bad: NDArray[np.bool_]) -> None:
+    def _refuse_first(self, angles: Floats, bad: NDArray[np.bool_]) -> None:
         if not bad.any():
             return
         place = tuple(int(i) for i in np.argwhere(bad)[0])

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 
 class OutOfReachError(ValueError):
@@ -16,13 +15,13 @@ class OutOfReachError(ValueError):
         position: If not, a reachable point [3] nearer to the shoulder, frame of the base, m, if there is one.
     """
 
-    def __init__(self, sentence: str, pitch: float | None = None, position: FloatArray | None = None) -> None:
+    def __init__(self, sentence: str, pitch: float | None = None, position: Floats | None = None) -> None:
         super().__init__(sentence)
         self.pitch = pitch
         self.position = position
 
 
-def describe_miss(names: tuple[str, ...], lower: FloatArray, upper: FloatArray, solutions: FloatArray) -> str:
+def describe_miss(names: tuple[str, ...], lower: Floats, upper: Floats, solutions: Floats) -> str:
     """Why none of the solutions [S, J], some of them nan, is within the limits: the joint that breaks one by least."""
     long_enough = solutions[np.isfinite(solutions).all(axis=-1)]
     beyond = np.maximum(lower - long_enough, long_enough - upper)

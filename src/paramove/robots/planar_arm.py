@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.robots.out_of_reach import OutOfReachError, describe_miss
 
-FloatArray = NDArray[np.float64]
-Floats = FloatArray | np.float64
+Numbers = Floats | np.float64
 
 PITCHES = np.linspace(-np.pi, np.pi, 720, endpoint=False)
 """Where a search for a reachable pitch looks, rad."""
@@ -29,9 +29,9 @@ ROUNDING = 1e-9
 class EndEffector:
     """Where the end effector is in the frame of the base: position [..., 3], m; pitch, roll [...], rad."""
 
-    position: FloatArray
-    pitch: FloatArray
-    roll: FloatArray
+    position: Floats
+    pitch: Floats
+    roll: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,8 @@ class PlanarArm:
     """
 
     names: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray
+    lower: Floats
+    upper: Floats
     yaw_axis: tuple[float, float]
     shoulder: tuple[float, float, float]
     upper_arm: tuple[float, float]
@@ -88,7 +88,7 @@ class PlanarArm:
 
     def joint_angles(
         self, position: ArrayLike, pitch: float, roll: float = 0.0, near: ArrayLike | None = None
-    ) -> FloatArray:
+    ) -> Floats:
         """Joint angles that bring the end effector to a position with a pitch and roll, exactly.
 
         Of the solutions within the limits (elbow above or below, facing the position or with the back to it) the one
@@ -116,7 +116,7 @@ class PlanarArm:
             return np.asarray(good[0])
         return np.asarray(good[np.abs(good - np.asarray(near)).max(axis=-1).argmin()])
 
-    def all_joint_angles(self, positions: ArrayLike, pitches: ArrayLike) -> FloatArray:
+    def all_joint_angles(self, positions: ArrayLike, pitches: ArrayLike) -> Floats:
         """All that bring the end effector to positions with pitches, and roll 0; nan where none is within the limits.
 
         Args:
@@ -144,7 +144,7 @@ class PlanarArm:
             raise self._out_of_reach(goal, pitch, roll, self._solutions(goal, np.float64(pitch), roll, None))
         return found
 
-    def _nearest_pitch(self, goal: FloatArray, pitch: float, roll: float) -> float | None:
+    def _nearest_pitch(self, goal: Floats, pitch: float, roll: float) -> float | None:
         offsets = PITCHES[self._reachable(goal[None], pitch + PITCHES, roll)]
         if len(offsets) == 0:
             return None
@@ -158,7 +158,7 @@ class PlanarArm:
                 outside = middle
         return float(np.remainder(pitch + inside + np.pi, 2 * np.pi) - np.pi)
 
-    def _goal(self, position: ArrayLike, pitch: float, roll: float) -> FloatArray:
+    def _goal(self, position: ArrayLike, pitch: float, roll: float) -> Floats:
         goal = np.asarray(position, dtype=np.float64)
         if goal.shape != (3,):
             raise ValueError(f"a position has shape (3,), found {goal.shape}")
@@ -168,12 +168,12 @@ class PlanarArm:
             raise OutOfReachError(f"roll {np.rad2deg(roll):.1f} deg is out of reach: the arm has no roll joint")
         return goal
 
-    def _rolled(self, roll: Floats) -> tuple[Floats, Floats]:
+    def _rolled(self, roll: Numbers) -> tuple[Numbers, Numbers]:
         """The end effector beside the roll axis, left and up in the frame before the roll."""
         cosine, sine = np.cos(roll), np.sin(roll)
         return self.hand[1] * cosine - self.hand[2] * sine, self.hand[1] * sine + self.hand[2] * cosine
 
-    def _solutions(self, goal: FloatArray, pitch: Floats, roll: float, near: ArrayLike | None) -> FloatArray:
+    def _solutions(self, goal: Floats, pitch: Numbers, roll: float, near: ArrayLike | None) -> Floats:
         """All four, [..., 4, J], where the arm is long enough, else nan, for positions [..., 3] and pitches [...]."""
         upper, fore = self._lengths
         solutions = []
@@ -193,7 +193,7 @@ class PlanarArm:
     def _lengths(self) -> tuple[float, float]:
         return float(np.hypot(*self.upper_arm)), float(np.hypot(*self.forearm))
 
-    def _wrist(self, goal: FloatArray, pitch: Floats, roll: float, facing: float) -> tuple[FloatArray, FloatArray]:
+    def _wrist(self, goal: Floats, pitch: Numbers, roll: float, facing: float) -> tuple[Floats, Floats]:
         """Yaw, rad, and the wrist from the shoulder, forward and up, m, facing (1) the goal or with the back to it."""
         left, up = self._rolled(np.float64(roll))
         left = self.shoulder[1] + left
@@ -204,13 +204,13 @@ class PlanarArm:
         return yaw, end - _turned(self.hand[0], up, pitch)
 
     @staticmethod
-    def _bend(wrist: FloatArray, upper: float, fore: float) -> FloatArray:
+    def _bend(wrist: Floats, upper: float, fore: float) -> Floats:
         """Between upper arm and forearm, rad, nan where the wrist is too far or too near."""
         cosine = (np.sum(wrist**2, axis=-1) - upper**2 - fore**2) / (2 * upper * fore)
         rounded = np.where(np.abs(cosine) <= 1.0 + ROUNDING, np.clip(cosine, -1.0, 1.0), np.nan)
         return np.asarray(np.arccos(rounded))
 
-    def _whole_turns(self, angles: FloatArray, near: ArrayLike | None) -> FloatArray:
+    def _whole_turns(self, angles: Floats, near: ArrayLike | None) -> Floats:
         """The same angles with the whole turns that bring them between the limits, and then nearest to `near`."""
         middle = 0.5 * (self.lower + self.upper)
         wanted = middle if near is None else np.asarray(near, dtype=np.float64)
@@ -220,16 +220,16 @@ class PlanarArm:
         central = middle + np.remainder(angles - middle + np.pi, 2 * np.pi) - np.pi
         return np.where(self._inside(nearest), nearest, central)
 
-    def _inside(self, angles: FloatArray) -> NDArray[np.bool_]:
+    def _inside(self, angles: Floats) -> NDArray[np.bool_]:
         return (angles >= self.lower - ROUNDING) & (angles <= self.upper + ROUNDING)
 
-    def _within(self, solutions: FloatArray) -> NDArray[np.bool_]:
+    def _within(self, solutions: Floats) -> NDArray[np.bool_]:
         return np.asarray(self._inside(solutions).all(axis=-1))
 
-    def _reachable(self, goal: FloatArray, pitch: Floats, roll: float) -> NDArray[np.bool_]:
+    def _reachable(self, goal: Floats, pitch: Numbers, roll: float) -> NDArray[np.bool_]:
         return np.asarray(self._within(self._solutions(goal, pitch, roll, None)).any(axis=-1))
 
-    def _cause(self, goal: FloatArray, pitch: float, roll: float, found: FloatArray) -> str:
+    def _cause(self, goal: Floats, pitch: float, roll: float, found: Floats) -> str:
         if np.isfinite(found).all(axis=-1).any():
             return describe_miss(self.names, self.lower, self.upper, found)
         with np.errstate(invalid="ignore"):
@@ -240,7 +240,7 @@ class PlanarArm:
         reach = f"{abs(upper - fore):.3f} to {upper + fore:.3f} m"
         return f"the wrist would have to be {away:.3f} m from the shoulder, found links for {reach}"
 
-    def _out_of_reach(self, goal: FloatArray, pitch: float, roll: float, found: FloatArray) -> OutOfReachError:
+    def _out_of_reach(self, goal: Floats, pitch: float, roll: float, found: Floats) -> OutOfReachError:
         cause = self._cause(goal, pitch, roll, found)
         where = f"{_metres(goal)} with pitch {np.rad2deg(pitch):.1f} deg"
         other = self._nearest_pitch(goal, pitch, roll)
@@ -257,7 +257,7 @@ class PlanarArm:
         return OutOfReachError(f"{where} is out of reach: {cause}; {hint}", position=point)
 
 
-def _turned(forward: float, up: float | Floats, angle: Floats) -> FloatArray:
+def _turned(forward: float, up: float | Numbers, angle: Numbers) -> Floats:
     """Forward and up of a vector turned downward by angles [...]; [..., 2]."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.stack([forward * cosine + up * sine, up * cosine - forward * sine], axis=-1)
@@ -268,5 +268,5 @@ def _down(vector: tuple[float, float]) -> float:
     return float(np.arctan2(-vector[1], vector[0]))
 
 
-def _metres(point: FloatArray) -> str:
+def _metres(point: Floats) -> str:
     return f"({', '.join(f'{value:.3f}' for value in point)}) m"

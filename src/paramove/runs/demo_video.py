@@ -20,8 +20,8 @@ from paramove.runs.story import Story
 from paramove.runs.video_frame import SIZE, VideoFrame
 from paramove.runs.video_writer import VideoError, VideoWriter
 from paramove.documents.input_error import InputError
+from paramove.documents.array_types import Image
 
-Picture = NDArray[np.uint8]
 
 FRAMES_PER_S = 10.0
 CAMERA_HZ = 15.0
@@ -65,7 +65,7 @@ def view_times(folder: Path) -> Iterator[float]:
         yield recorded.log_ns * 1e-9
 
 
-def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Picture, Picture]]:
+def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Image, Image]]:
     """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the newest one by then."""
     cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
     newest, following = None, next(cameras, None)
@@ -76,7 +76,7 @@ def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Picture, Pi
             yield view.log_ns * 1e-9, _decoded(newest.message.data), _decoded(view.message.data)
 
 
-def _decoded(data: bytes) -> Picture:
+def _decoded(data: bytes) -> Image:
     try:
         image = decoded(data)
     except InputError as error:

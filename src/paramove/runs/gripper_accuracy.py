@@ -16,8 +16,8 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Motion, Relocation
 from paramove.motion.planned_motion import RelocationOptions
 from paramove.robots.description import RobotDescription
+from paramove.documents.array_types import Floats
 
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +36,9 @@ class GripperMoment:
     stage: str
     kind: str
     time_s: float
-    target: FloatArray
-    commanded: FloatArray
-    gripper: FloatArray
+    target: Floats
+    commanded: Floats
+    gripper: Floats
 
     @property
     def commanded_error_mm(self) -> float:
@@ -68,7 +68,7 @@ class CommandedGripper:
         points = arm.kinematics.forward(self.angles)
         self.gripper, self.elbow = points.gripper, points.elbow
 
-    def at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
+    def at(self, time_s: float) -> tuple[Floats, Floats]:
         """Gripper and elbow [3] nearest to a time."""
         place = int(np.abs(self.time_s - time_s).argmin())
         return self.gripper[place], self.elbow[place]
@@ -98,7 +98,7 @@ def gripper_moments(
     return found
 
 
-def grasp_target(source: FloatArray, gripper: FloatArray, elbow: FloatArray) -> FloatArray:
+def grasp_target(source: Floats, gripper: Floats, elbow: Floats) -> Floats:
     """Where the gripper closes: beside the object's place, to the right of the forearm (thesis 5.2.5)."""
     forward = (gripper - elbow) * [1.0, 1.0, 0.0]
     forward /= np.linalg.norm(forward)
@@ -106,6 +106,6 @@ def grasp_target(source: FloatArray, gripper: FloatArray, elbow: FloatArray) -> 
     return np.asarray(source + RelocationOptions().grasp_aside * right)
 
 
-def place_target(relocation: Relocation) -> FloatArray:
+def place_target(relocation: Relocation) -> Floats:
     """Where the gripper opens: a little above the target."""
     return np.asarray(relocation.target + np.array([0.0, 0.0, RelocationOptions().release_height]))

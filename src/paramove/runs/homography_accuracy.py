@@ -13,8 +13,8 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.spread import spread
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects.homography import PlaneHomography
+from paramove.documents.array_types import Floats
 
-FloatArray = NDArray[np.float64]
 
 GRID_X = (0.135, 0.190)
 GRID_Y = (-0.100, 0.076)
@@ -31,11 +31,11 @@ _AT_REST = (Gesture.KIND_APPEARED, Gesture.KIND_RESTED)
 class MappedPoints:
     """True places and the ones that the robot's calibration gives, each [M, 2], m, shoulder frame."""
 
-    true: FloatArray
-    estimated: FloatArray
+    true: Floats
+    estimated: Floats
 
     @property
-    def errors_mm(self) -> FloatArray:
+    def errors_mm(self) -> Floats:
         """Distances, [M]."""
         return np.asarray(1e3 * np.linalg.norm(self.estimated - self.true, axis=1))
 
@@ -55,7 +55,7 @@ class SeenAtRest:
         return 1e3 * float(np.hypot(self.estimated[0] - self.true[0], self.estimated[1] - self.true[1]))
 
 
-def project(layout: Any, points: ArrayLike) -> FloatArray:
+def project(layout: Any, points: ArrayLike) -> Floats:
     """Image points [M, 2], px, of world points [M, 3], m, through the true camera and lens.
 
     distorted = undistorted * (1 + k1 r²), r in focal lengths.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.runs.recorded_run import RunFolderError, recording_in
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.documents.array_types import Floats
 
-Floats = NDArray[np.float64]
 
 FARTHEST_M = 0.10
 MEDIAN_M = 0.04

@@ -23,8 +23,8 @@ from paramove.runs.video_writer import VideoWriter
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.cameras.calibrated import CalibratedCamera, read_cameras
 from paramove.cameras.frames import decode
+from paramove.documents.array_types import Image
 
-Picture = NDArray[np.uint8]
 
 WIDTH_PX = 960
 RATE_HZ = 15.0
@@ -48,7 +48,7 @@ def write_pointing_video(folder: Path, console: Console) -> Path | None:
     return path
 
 
-def drawn(image_bgr: Picture, outline: Any | None, told: str, size_px: tuple[int, int]) -> Picture:
+def drawn(image_bgr: Image, outline: Any | None, told: str, size_px: tuple[int, int]) -> Image:
     """The picture RGB of an image with `foxglove.ImageAnnotations` in its pixels, enlarged."""
     scale = size_px[0] / image_bgr.shape[1]
     picture = cv2.cvtColor(cv2.resize(image_bgr, size_px, interpolation=cv2.INTER_CUBIC), cv2.COLOR_BGR2RGB)

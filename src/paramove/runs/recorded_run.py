@@ -23,8 +23,8 @@ from paramove.documents.input_error import InputError
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import Recorded
+from paramove.documents.array_types import Floats
 
-FloatArray = NDArray[np.float64]
 
 HEAVY = frozenset(
     topic.name
@@ -58,19 +58,19 @@ class Truth:
     """
 
     layout: Any
-    time_s: FloatArray
-    gripper: FloatArray
-    commanded: FloatArray
-    objects: dict[str, FloatArray]
-    upright: dict[str, FloatArray]
+    time_s: Floats
+    gripper: Floats
+    commanded: Floats
+    objects: dict[str, Floats]
+    upright: dict[str, Floats]
     held_by_instructor: dict[str, NDArray[np.bool_]]
     unwanted_contacts: NDArray[np.int_]
-    penetration_mm: FloatArray
+    penetration_mm: Floats
     contacts: tuple[tuple[str, ...], ...]
     instructor: tuple[str, ...]
 
     @property
-    def shoulder(self) -> FloatArray:
+    def shoulder(self) -> Floats:
         """Origin of the shoulder's frame in the world, [3], m."""
         return np.array(self.layout.world_from_shoulder)
 
@@ -80,7 +80,7 @@ class Truth:
         return float(self.layout.surface_z - self.shoulder[2])
 
     @property
-    def openings(self) -> dict[str, FloatArray]:
+    def openings(self) -> dict[str, Floats]:
         """Name -> centre (x, y), m."""
         return {o.name: np.array([o.x, o.y]) - self.shoulder[:2] for o in self.layout.openings}
 

@@ -14,8 +14,8 @@ from paramove.runs.relocations import Relocation, relocations_of
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
+from paramove.documents.array_types import Floats
 
-Floats = NDArray[np.float64]
 
 SCALE = 0.42
 """Of the simulated person and table over a grown person at a table of usual size."""

@@ -31,8 +31,8 @@ from paramove.runs.video_frame import (
 )
 from paramove.runs.video_writer import VideoWriter
 from paramove.cameras.frames import decode
+from paramove.documents.array_types import Image
 
-Picture = NDArray[np.uint8]
 
 FRAMES_PER_S = 10.0
 EVERY = 3
@@ -68,7 +68,7 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     return path
 
 
-def composed(camera_bgr: Picture, outline: Any | None, view: Picture) -> Picture:
+def composed(camera_bgr: Image, outline: Any | None, view: Image) -> Image:
     """Both images side by side, RGB, with room above and below."""
     frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
     frame[:] = BACK
@@ -80,7 +80,7 @@ def composed(camera_bgr: Picture, outline: Any | None, view: Picture) -> Picture
     return frame
 
 
-def _moments(folder: Path) -> Iterator[tuple[int, Picture, Any | None, Picture]]:
+def _moments(folder: Path) -> Iterator[tuple[int, Image, Any | None, Image]]:
     """Time, image BGR and its annotations, and the view RGB, of every so-many-th view."""
     wanted = {CAMERA, topics.ACTION_OUTLINE.name}
     outlines: dict[int, Any] = {}

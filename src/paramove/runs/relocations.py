@@ -14,8 +14,8 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage
+from paramove.documents.array_types import Floats
 
-FloatArray = NDArray[np.float64]
 
 _LAST = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
 _HULLS: dict[int, str] = {RelocationStatus.HULL_INSIDE: "inside", RelocationStatus.HULL_OUTSIDE: "outside"}
@@ -59,13 +59,13 @@ class Relocation:
         return str(RelocationGoal.Kind.Name(self.goal.kind)).removeprefix("KIND_").lower()
 
     @property
-    def source(self) -> FloatArray:
+    def source(self) -> Floats:
         """Where it was to be fetched, [3], m."""
         position = getattr(self.goal, "from")
         return np.array([position.x, position.y, position.z])
 
     @property
-    def target(self) -> FloatArray:
+    def target(self) -> Floats:
         """Where it was to be put, [3], m."""
         return np.array([self.goal.to.x, self.goal.to.y, self.goal.to.z])
 
@@ -86,12 +86,12 @@ class Motion:
     goal_id: str
     begun_s: float
     reached_s: float
-    times: FloatArray
-    angles: FloatArray
+    times: Floats
+    angles: Floats
     joints: tuple[str, ...]
     phases: dict[str, float]
 
-    def angles_at(self, time_s: float) -> FloatArray:
+    def angles_at(self, time_s: float) -> Floats:
         """Planned angles [J] at a time along the trajectory."""
         return np.array([np.interp(time_s, self.times, column) for column in self.angles.T])
 

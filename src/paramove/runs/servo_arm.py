@@ -24,8 +24,8 @@ from paramove.runs.recorded_run import RunFolderError
 from paramove.documents.input_error import InputError
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import PartedRecording
+from paramove.documents.array_types import Floats
 
-Floats = NDArray[np.float64]
 
 REACHED_M, PLACED_M = 0.015, 0.010
 """The hand hangs below where it is commanded: a servo holds a load by the error of its position."""

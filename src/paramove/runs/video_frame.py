@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 from matplotlib import font_manager
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+import PIL.Image
+from PIL import ImageDraw, ImageFont
 
 from paramove.runs.story import Moment
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
+from paramove.documents.array_types import Image
 
-Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 PANEL = (480, 360)
@@ -42,7 +43,7 @@ class VideoFrame:
         self._title, self._factor = title, factor
         self._steady = SteadyImage()
 
-    def draw(self, camera: Picture, view: Picture, moment: Moment, time_s: float, end_s: float) -> Picture:
+    def draw(self, camera: Image, view: Image, moment: Moment, time_s: float, end_s: float) -> Image:
         """A picture from the two images, RGB, and the robot's mind."""
         frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         frame[:] = BACK
@@ -59,7 +60,7 @@ class VideoFrame:
         frame[-3:, :done] = ACCENT
         return frame
 
-    def _top(self, bar: Picture, moment: Moment, time_s: float) -> None:
+    def _top(self, bar: Image, moment: Moment, time_s: float) -> None:
         paste(bar, label(self._title, 15, TEXT, bold=True), 12, 9)
         reached = (
             len(STAGES) if moment.stage == "done" else STAGES.index(moment.stage) if moment.stage in STAGES else -1
@@ -82,11 +83,11 @@ class SteadyImage:
     CHANGE = 9  # of 255, in any colour, after smoothing
 
     def __init__(self) -> None:
-        self._held: Picture | None = None
+        self._held: Image | None = None
         self._seed = np.ones((3, 3), dtype=np.uint8)
         self._around = np.ones((9, 9), dtype=np.uint8)
 
-    def update(self, image: Picture) -> Picture:
+    def update(self, image: Image) -> Image:
         """The image with new content only where it differs from what is held."""
         smooth = np.asarray(cv2.GaussianBlur(image, (5, 5), 0), dtype=np.uint8)
         if self._held is None:
@@ -98,7 +99,7 @@ class SteadyImage:
         return self._held.copy()
 
 
-def draw_mind(image: Picture, moment: Moment) -> None:
+def draw_mind(image: Image, moment: Moment) -> None:
     """Tracked objects, the hand, the goal, the believed openings, in place onto the camera's image."""
     if moment.homography is not None:
         for name, place in moment.rules.items():
@@ -116,14 +117,14 @@ def draw_mind(image: Picture, moment: Moment) -> None:
             _draw_object(image, item, moment)
 
 
-def _draw_hand(image: Picture, item: Any) -> None:
+def _draw_hand(image: Image, item: Any) -> None:
     corners = np.array([(p.u_px, p.v_px) for p in item.outline]).round().astype(np.int32).reshape(-1, 1, 2)
     if len(corners):
         cv2.polylines(image, [corners], True, HAND, 1, cv2.LINE_AA)
     cv2.circle(image, (round(item.u_px), round(item.v_px)), 3, HAND, -1, cv2.LINE_AA)
 
 
-def _draw_object(image: Picture, item: Any, moment: Moment) -> None:
+def _draw_object(image: Image, item: Any, moment: Moment) -> None:
     colour = COLOURS.get(item.name, TEXT)
     left, top = round(item.left_px) - 2, round(item.top_px) - 2
     right, bottom = left + round(item.width_px) + 4, top + round(item.height_px) + 4
@@ -135,7 +136,7 @@ def _draw_object(image: Picture, item: Any, moment: Moment) -> None:
     paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
 
 
-def _captions(panel: Picture, moment: Moment) -> None:
+def _captions(panel: Image, moment: Moment) -> None:
     if moment.sentence:
         paste(panel, label(f"“{_shortened(moment.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
     paste(panel, label("believes", 13, FAINT), 14, 46)
@@ -168,17 +169,17 @@ def _font(size: int, bold: bool) -> ImageFont.FreeTypeFont:
 
 
 @lru_cache(maxsize=1024)
-def label(text: str, size: int, colour: Colour, bold: bool = False) -> Picture:
+def label(text: str, size: int, colour: Colour, bold: bool = False) -> Image:
     """A text as RGBA [h, w, 4]."""
     font = _font(size, bold)
     left, _, right, _ = font.getbbox(text)
     ascent, descent = font.getmetrics()
-    image = Image.new("RGBA", (max(1, round(right - left) + 2), ascent + descent), (*colour, 0))
+    image = PIL.Image.new("RGBA", (max(1, round(right - left) + 2), ascent + descent), (*colour, 0))
     ImageDraw.Draw(image).text((1 - left, 0), text, font=font, fill=(*colour, 255))
     return np.asarray(image)
 
 
-def paste(image: Picture, sprite: Picture, x: int, y: int, shade: bool = False) -> None:
+def paste(image: Image, sprite: Image, x: int, y: int, shade: bool = False) -> None:
     """Blend a sprite in at (x, y), in place, cut at the borders; with `shade` onto a darkened ground."""
     left, top = max(0, x), max(0, y)
     part = image[top : max(0, y + sprite.shape[0]), left : max(0, x + sprite.shape[1])]

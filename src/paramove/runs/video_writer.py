@@ -10,8 +10,8 @@ from typing import Self
 import av
 import numpy as np
 from numpy.typing import NDArray
+from paramove.documents.array_types import Image
 
-Picture = NDArray[np.uint8]
 
 WAITING_FRAMES = 8
 ENCODER = {"deadline": "realtime", "cpu-used": "7", "row-mt": "1", "crf": "34", "b": "0", "g": "20"}
@@ -54,11 +54,11 @@ class VideoWriter:
         self._file.mux(self._stream.encode())
         self._file.close()
 
-    def write(self, picture: Picture) -> None:
+    def write(self, picture: Image) -> None:
         """Add a picture, RGB; waits while many wait to be encoded."""
         self._waiting.append(self._thread.submit(self._encode, picture))
         if len(self._waiting) > WAITING_FRAMES:
             self._waiting.popleft().result()
 
-    def _encode(self, picture: Picture) -> None:
+    def _encode(self, picture: Image) -> None:
         self._file.mux(self._stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))

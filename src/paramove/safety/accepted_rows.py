@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.gate_io import Measured, Targets
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import stop_ramp, straight_move
-
-FloatArray = NDArray[np.float64]
 
 
 class AcceptedRows:
@@ -28,7 +26,7 @@ class AcceptedRows:
         """Forget them, once the robot has played them or never will."""
         self._sent = None
 
-    def held(self, next_index: int) -> FloatArray | None:
+    def held(self, next_index: int) -> Floats | None:
         """The last row [J] if the robot has played them all."""
         return None if self._sent is None or self.unplayed(next_index) else np.asarray(self._sent.rows[-1])
 
@@ -42,14 +40,14 @@ class AcceptedRows:
             return measured.next_index, measured.next_index
         return max(measured.next_index, self._sent.first_index + 1), self._sent.end_index
 
-    def before(self, first_index: int, measured: Measured) -> FloatArray:
+    def before(self, first_index: int, measured: Measured) -> Floats:
         """Those just before `first_index`, [B, J]; the commanded pose where there are none."""
         if self._sent is None:
             return measured.commanded[None]
         upto = first_index - self._sent.first_index
         return self._sent.rows[max(0, upto - self._limits.history) : upto]
 
-    def accept(self, first_index: int, rows: FloatArray, ramp: FloatArray, measured: Measured) -> Targets:
+    def accept(self, first_index: int, rows: Floats, ramp: Floats, measured: Measured) -> Targets:
         """Take `rows` and the `ramp` after them in place of all from `first_index` on."""
         targets = Targets(first_index, np.concatenate([rows, ramp]), len(ramp))
         kept_index, kept = first_index - 1, measured.commanded[None]

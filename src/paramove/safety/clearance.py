@@ -7,12 +7,10 @@ is faster is refused, not slowed down: that is the planner's business. Rows are 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.gate_io import Clearance, Fault
 from paramove.safety.limits import INWARD_SHARE, MotionLimits
-
-FloatArray = NDArray[np.float64]
 
 CHECK_EVERY_S = 0.02
 STOP_M = 0.005
@@ -23,7 +21,7 @@ STILL_M_S = 1e-4
 
 
 def clearance_fault(
-    clearance: Clearance, last: FloatArray, rows: FloatArray, limits: MotionLimits, n_proposed: int
+    clearance: Clearance, last: Floats, rows: Floats, limits: MotionLimits, n_proposed: int
 ) -> Fault | None:
     """The first of `rows` [N, J] after `last` [J], rad, that comes too close; from `n_proposed` on they stop."""
     stride = max(1, round(CHECK_EVERY_S / limits.dt_s))

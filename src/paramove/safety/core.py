@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.gate_io import (
     ArmWord,
@@ -36,8 +36,6 @@ from paramove.safety.gate_io import (
 from paramove.safety.limits import MotionLimits
 from paramove.safety.proposal_gate import ProposalGate
 from paramove.safety.watches import EmergencyWatch, FollowingWatch, RateWatch
-
-FloatArray = NDArray[np.float64]
 
 TOUCHED = "it has been armed, stopped or at fault before"
 """Why no program may arm an emulated robot either."""
@@ -60,7 +58,7 @@ class SafetyCore:
     def __init__(
         self,
         limits: MotionLimits,
-        mechanical: tuple[FloatArray, FloatArray],
+        mechanical: tuple[Floats, Floats],
         epoch: int,
         start_ns: int,
         settings: SafetySettings | None = None,
@@ -97,7 +95,7 @@ class SafetyCore:
         self.untouched &= self.state in (State.DISCONNECTED, State.DISARMED) and stop is None
         return targets, self.state, self.faults
 
-    def held(self, next_index: int) -> FloatArray | None:
+    def held(self, next_index: int) -> Floats | None:
         """The last accepted row [J] if the robot has played them all: its own report of it is rounded to its units."""
         return self._accepted.held(next_index)
 

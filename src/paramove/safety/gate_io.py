@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 PERSON_STOP = "person_stop"
 """Code of the fault that a person's stop latches."""
@@ -40,8 +39,8 @@ class Measured:
     """What the robot said of itself. Arrays [J], rad; `next_index` counts the stream's rows."""
 
     captured_ns: int
-    positions: FloatArray
-    commanded: FloatArray
+    positions: Floats
+    commanded: Floats
     at_rest: bool
     next_index: int
 
@@ -64,8 +63,8 @@ class Proposal:
     epoch: int
     joint_names: tuple[str, ...]
     first_index: int
-    rows: FloatArray
-    ahead: FloatArray
+    rows: Floats
+    ahead: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ class Targets:
     """Rows that may be sent, [N, J], rad, the last `ramp_rows` of which are the stop ramp."""
 
     first_index: int
-    rows: FloatArray
+    rows: Floats
     ramp_rows: int
 
     @property
@@ -105,7 +104,7 @@ class Targets:
 class Clearance(Protocol):
     """How near the robot's parts come to each other and to what is fixed around it."""
 
-    def distances(self, q: FloatArray) -> tuple[float, str, str]:
+    def distances(self, q: Floats) -> tuple[float, str, str]:
         """The smallest distance in the pose `q` [J], rad: metres (negative: penetration) and the names of the two."""
         ...
 
@@ -128,7 +127,7 @@ class SafetySettings:
     checks_ms: float = 3000.0
     lost_rows_ms: float = 500.0
     pose_tolerance: float = float(np.deg2rad(0.5))
-    following: FloatArray | None = None
+    following: Floats | None = None
     following_ms: float = 100.0
     emergency_timeout_ms: float | None = None
     proposals_per_s: float | None = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 # Accelerations are taken over two spans of this length; a span is at least one row. A single 1 ms difference of angles
 # that were rounded to six decimals is noise of 1 rad/s²; over 4 ms it is 0.06 rad/s².
@@ -68,13 +68,13 @@ class MotionLimits:
     """Limits of J joints; arrays [J] in rad, rad/s, rad/s², rad/s³."""
 
     names: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray
-    motor_velocity: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    stop_acceleration: FloatArray
-    jerk: FloatArray
+    lower: Floats
+    upper: Floats
+    motor_velocity: Floats
+    velocity: Floats
+    acceleration: Floats
+    stop_acceleration: Floats
+    jerk: Floats
     dt_s: float
 
     @property
@@ -93,7 +93,7 @@ class MotionLimits:
         return 3 * self.jerk_span
 
     def first_violation(
-        self, rows: FloatArray, before: FloatArray, *, rest_at_end: bool = False, stopping: bool = False
+        self, rows: Floats, before: Floats, *, rest_at_end: bool = False, stopping: bool = False
     ) -> Violation | None:
         """The first rule that `rows` break, in the gate's order, or None.
 
@@ -117,12 +117,12 @@ class MotionLimits:
         found = self._first("joint_limit", outward, whole[history:])
         return found or self._first_too_fast(whole, excess[:-1] > 1e-9, stopping)
 
-    def _first_too_fast(self, whole: FloatArray, outside: NDArray[np.bool_], stopping: bool) -> Violation | None:
+    def _first_too_fast(self, whole: Floats, outside: NDArray[np.bool_], stopping: bool) -> Violation | None:
         """`whole` begins with the history; `outside` says where the row before lies outside the soft range."""
         h, end = self.history, len(whole)
         span_s, jerk_span_s = self.span * self.dt_s, self.jerk_span * self.dt_s
 
-        def earlier(rows: int) -> FloatArray:
+        def earlier(rows: int) -> Floats:
             return whole[h - rows : end - rows]
 
         n, m = self.span, self.jerk_span
@@ -151,9 +151,9 @@ class MotionLimits:
         self,
         code: str,
         bad: NDArray[np.bool_],
-        values: FloatArray,
+        values: Floats,
         unit: str = "deg",
-        limit: FloatArray | float = np.nan,
+        limit: Floats | float = np.nan,
     ) -> Violation | None:
         if not bad.any():
             return None

@@ -10,16 +10,15 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-FloatArray = NDArray[np.float64]
+from paramove.documents.array_types import Floats
 
 LINEAR_UP_TO_S = 0.002
 DENSE_UP_TO_S = 0.050
 
 
-def sample_path(times_s: FloatArray, positions: FloatArray, dt_s: float) -> FloatArray:
+def sample_path(times_s: Floats, positions: Floats, dt_s: float) -> Floats:
     """Rows at 0, dt, 2 dt, … up to the first at or after the last point.
 
     Args:
@@ -38,7 +37,7 @@ def sample_path(times_s: FloatArray, positions: FloatArray, dt_s: float) -> Floa
     return rows
 
 
-def largest_detour(times_s: FloatArray, positions: FloatArray) -> tuple[int, int, float]:
+def largest_detour(times_s: Floats, positions: Floats) -> tuple[int, int, float]:
     """Where the path lies furthest from the straight line between two points, at mid-segment: (segment, joint, rad)."""
     worst = (0, 0, 0.0)
     for first, last in runs(times_s):
@@ -51,7 +50,7 @@ def largest_detour(times_s: FloatArray, positions: FloatArray) -> tuple[int, int
     return worst
 
 
-def runs(times_s: FloatArray) -> list[tuple[int, int]]:
+def runs(times_s: Floats) -> list[tuple[int, int]]:
     """First and last point of each dense run and of each segment between via points, in order."""
     sparse = np.diff(times_s) > DENSE_UP_TO_S + 1e-9
     ends = [0]
@@ -61,7 +60,7 @@ def runs(times_s: FloatArray) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def _run(times_s: FloatArray, points: FloatArray, at_s: FloatArray) -> FloatArray:
+def _run(times_s: Floats, points: Floats, at_s: Floats) -> Floats:
     gaps = np.diff(times_s)
     if len(times_s) == 2 and gaps[0] > DENSE_UP_TO_S:
         u = ((at_s - times_s[0]) / gaps[0])[:, None]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.clearance import clearance_fault
 from paramove.safety.gate_io import Clearance, Fault, Measured, Proposal, SafetySettings
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stop_ramp import stop_ramp
 from paramove.safety.watches import RateWatch
-
-FloatArray = NDArray[np.float64]
 
 MAX_ROWS = 5000
 
@@ -28,7 +26,7 @@ class ProposalGate:
         self._rate = RateWatch(settings.proposals_per_s)
         self._counted_ns: int | None = None
 
-    def judged(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | FloatArray:
+    def judged(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | Floats:
         """The first gate that refuses: form, age, rate, place, movement, the stop after it, clearance.
 
         Returns:
@@ -68,7 +66,7 @@ class ProposalGate:
             return Fault("played", "", f"rows from index {index}, allowed from {first}: earlier ones are played")
         return Fault("gap", "", f"rows from index {index}, allowed up to {last}: no gap") if index > last else None
 
-    def _movement(self, proposal: Proposal, before: FloatArray) -> Fault | FloatArray:
+    def _movement(self, proposal: Proposal, before: Floats) -> Fault | Floats:
         # The rows ahead are judged too: the stop ramp will run over them.
         rows = np.concatenate([proposal.rows, proposal.ahead])
         violation = self._limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))

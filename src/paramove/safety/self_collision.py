@@ -12,9 +12,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
-
-FloatArray = NDArray[np.float64]
 
 FAR_M = 0.05
 TOUCHING_M = 0.005
@@ -41,9 +40,9 @@ class SelfCollision:
         self,
         model: mujoco.MjModel,
         joints: Sequence[str],
-        free_pose: FloatArray,
-        lower: FloatArray,
-        upper: FloatArray,
+        free_pose: Floats,
+        lower: Floats,
+        upper: Floats,
         n_samples: int = 200,
         seed: int = 0,
     ) -> None:
@@ -53,7 +52,7 @@ class SelfCollision:
         self.pairs = _movable_pairs(model)
         self._free_of(free_pose, lower, upper, n_samples, seed)
 
-    def distances(self, q: FloatArray) -> tuple[float, str, str]:
+    def distances(self, q: Floats) -> tuple[float, str, str]:
         """The smallest distance in the pose `q` [J], rad: metres, negative for penetration, and the two bodies.
 
         Nothing nearer than 50 mm is told as 50 mm between two empty names.
@@ -66,7 +65,7 @@ class SelfCollision:
         one, other = self.pairs[near][int(np.argmin(found))]
         return min(found), self._body(one), self._body(other)
 
-    def _free_of(self, free_pose: FloatArray, lower: FloatArray, upper: FloatArray, n_samples: int, seed: int) -> None:
+    def _free_of(self, free_pose: Floats, lower: Floats, upper: Floats, n_samples: int, seed: int) -> None:
         """Leave out the pairs that touch by design."""
         generator = np.random.default_rng(seed)
         always = np.ones(len(self.pairs), dtype=bool)
@@ -74,14 +73,14 @@ class SelfCollision:
             always &= self._touching(q)
         self.pairs = self.pairs[~(always | self._touching(free_pose))]
 
-    def _touching(self, q: FloatArray) -> NDArray[np.bool_]:
+    def _touching(self, q: Floats) -> NDArray[np.bool_]:
         self._pose(q)
         near = self._near()
         touching = np.zeros(len(self.pairs), dtype=bool)
         touching[near] = [self._measure(one, other) < TOUCHING_M for one, other in self.pairs[near]]
         return touching
 
-    def _pose(self, q: FloatArray) -> None:
+    def _pose(self, q: Floats) -> None:
         self._data.qpos[self._places] = q
         mujoco.mj_kinematics(self._model, self._data)
 

@@ -8,15 +8,13 @@ every joint within its limits.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from paramove.documents.array_types import Floats
 from paramove.safety.limits import MotionLimits
 
-FloatArray = NDArray[np.float64]
 
-
-def stop_ramp(last: FloatArray, path: FloatArray, limits: MotionLimits) -> FloatArray:
+def stop_ramp(last: Floats, path: Floats, limits: MotionLimits) -> Floats:
     """Rows that bring the joints to rest after `last`, along `path`.
 
     Args:
@@ -47,7 +45,7 @@ def longest_path_s(limits: MotionLimits) -> float:
     return 0.5 * float(_durations(limits.velocity, limits).max()) + 2 * limits.dt_s
 
 
-def _durations(speed: FloatArray, limits: MotionLimits) -> FloatArray:
+def _durations(speed: Floats, limits: MotionLimits) -> Floats:
     # The path itself may use the operating acceleration a and jerk j. Slowing adds 1.5 v/T to the one; to the other
     # 6 v/T² + 3 a/T, which may be j again.
     spare = limits.stop_acceleration - limits.acceleration
@@ -55,7 +53,7 @@ def _durations(speed: FloatArray, limits: MotionLimits) -> FloatArray:
     return np.maximum(1.5 * speed / spare, (3 * a + np.sqrt(9 * a**2 + 24 * j * speed)) / (2 * j))
 
 
-def straight_move(start: FloatArray, goal: FloatArray, limits: MotionLimits) -> FloatArray:
+def straight_move(start: Floats, goal: Floats, limits: MotionLimits) -> Floats:
     """Rows [N, J] from rest after `start` to rest at `goal`, each [J], rad: minimum jerk, as fast as allowed."""
     way = np.abs(goal - start)
     # Peaks of the profile: velocity 15/8 d/T, acceleration 10/√3 d/T², jerk 60 d/T³.

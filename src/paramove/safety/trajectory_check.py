@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.limits import MotionLimits
 from paramove.safety.path_sampling import largest_detour, sample_path
-
-FloatArray = NDArray[np.float64]
 
 MAX_DURATION_S = 120.0
 MAX_DETOUR = np.deg2rad(1.0)
@@ -44,7 +43,7 @@ class TrajectoryRefusedError(ValueError):
 class CheckedPath:
     """Rows [N, J] of all joints, rad, one every `dt_s`; row 0 is the commanded pose, both ends are at rest."""
 
-    rows: FloatArray
+    rows: Floats
     dt_s: float
 
     @property
@@ -57,7 +56,7 @@ def check_trajectory(
     joints: Sequence[str],
     times_s: ArrayLike,
     positions: Sequence[Sequence[float]],
-    commanded: FloatArray,
+    commanded: Floats,
     limits: MotionLimits,
     start_tolerance: ArrayLike,
 ) -> CheckedPath:
@@ -103,7 +102,7 @@ def _places(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
     return np.array([limits.names.index(joint) for joint in joints], dtype=np.intp)
 
 
-def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> FloatArray:
+def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> Floats:
     if len(positions) < 2:
         raise TrajectoryRefusedError("times", -1, "", f"{len(positions)} points", "at least 2")
     for index, point in enumerate(positions):
@@ -117,7 +116,7 @@ def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> Floa
     return points
 
 
-def _times(times_s: ArrayLike, n_points: int) -> FloatArray:
+def _times(times_s: ArrayLike, n_points: int) -> Floats:
     times = np.asarray(times_s, dtype=np.float64)
     if times.shape != (n_points,):
         raise TrajectoryRefusedError("times", -1, "", f"{times.size} times", f"{n_points}, one a point")
@@ -138,11 +137,11 @@ def _times(times_s: ArrayLike, n_points: int) -> FloatArray:
 
 def _check_points(
     joints: Sequence[str],
-    points: FloatArray,
+    points: Floats,
     places: NDArray[np.intp],
-    commanded: FloatArray,
+    commanded: Floats,
     limits: MotionLimits,
-    tolerance: FloatArray,
+    tolerance: Floats,
 ) -> None:
     # A joint commanded outside its range may begin there; the rows are judged to come inward.
     held = commanded[places]
@@ -161,7 +160,7 @@ def _check_points(
         raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 
-def _check_rows(rows: FloatArray, times: FloatArray, commanded: FloatArray, limits: MotionLimits) -> None:
+def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLimits) -> None:
     found = limits.first_violation(rows, commanded[None], rest_at_end=True)
     if found is None:
         return
@@ -170,7 +169,7 @@ def _check_rows(rows: FloatArray, times: FloatArray, commanded: FloatArray, limi
     raise TrajectoryRefusedError(found.code, index, found.joint, f"{found.asked:.4g} {found.unit}", found.allowed)
 
 
-def _fade(n_rows: int, dt_s: float) -> FloatArray:
+def _fade(n_rows: int, dt_s: float) -> Floats:
     """From 1 at the first row to 0 after `FADE_S` or at the last row, at rest at both ends, [N]."""
     u = np.clip(np.arange(n_rows) * dt_s / min(FADE_S, (n_rows - 1) * dt_s), 0.0, 1.0)
     return np.asarray(1.0 - (10 * u**3 - 15 * u**4 + 6 * u**5))

@@ -7,9 +7,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.safety.gate_io import Fault, Measured
-
-FloatArray = NDArray[np.float64]
 
 RATE_WINDOW_NS = 250_000_000
 RATE_FACTOR = 1.2
@@ -43,7 +42,7 @@ class EmergencyWatch:
 class FollowingWatch:
     """Whether joints are where they are commanded. `allowed` [J], rad; None: not watched."""
 
-    def __init__(self, names: tuple[str, ...], allowed: FloatArray | None, patience_ms: float) -> None:
+    def __init__(self, names: tuple[str, ...], allowed: Floats | None, patience_ms: float) -> None:
         self._names = names
         self._allowed = allowed
         self._patience_ns = round(patience_ms * 1e6)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.documents.input_error import InputError
@@ -14,8 +13,6 @@ from paramove.phmm import MovementClassifier, ParametricHMM
 from paramove.training.drawing import bounds, dimension, parameter_names, point_names, raster
 from paramove.training.examining import Examiner
 from paramove.training.leaving_out import covers, synthesis_error
-
-Floats = NDArray[np.float64]
 
 FRAMES = 100
 

@@ -11,16 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from paramove.demonstrations.plots import POINTS_FIRST
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.documents.wording import nearest
 from paramove.phmm import ParametricHMM
 from paramove.training.examples import is_place
-
-Floats = NDArray[np.float64]
 
 COLOURS = "viridis"
 INK, FAINT, WARN = "#1d2530", "#aab3bd", "#b3372b"

@@ -7,19 +7,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from paramove.demonstrations import DemonstrationError, Movement
 from paramove.demonstrations.body_frame import BODY, in_body_frame, mirrored
 from paramove.demonstrations.timing import resampled
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of
 from paramove.training.leaving_out import REGION, covers
-
-Floats = NDArray[np.float64]
 
 LEAST_TYPICALITY = 0.01
 """A movement less typical than this is taken for none of the known ones."""

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.demonstrations.movement import AXIS_ENDINGS
+from paramove.documents.array_types import Floats
 from paramove.documents.wording import nearest
 from paramove.phmm import MovementDescription
 from paramove.robots.arm_points import ARM_BASE
-
-Floats = NDArray[np.float64]
 
 VARIES = 0.1
 """A coordinate of a place whose range is a smaller share of the widest coordinate's is taken for constant."""

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 from scipy.stats import chi2
 
 from paramove.alignment import movement_distance
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from paramove.phmm import InterpolativePHMM, ParametricHMM
 from paramove.phmm.performance import groups_of
 from paramove.training.examples import Examples, is_place
 
-Floats = NDArray[np.float64]
 LeftOutBy = Literal["theta", "subject", "repetition"]
 
 MOST_FOLDS = 10

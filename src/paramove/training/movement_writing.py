@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
+from paramove.documents.array_types import Floats
 from paramove.documents.atomic_writing import replacing
 from paramove.phmm import MovementDescription, ParametricHMM
 from paramove.training.drawing import point_names
-
-Floats = NDArray[np.float64]
 
 ENDINGS = (".csv", ".npz", ".mcap")
 LIBRARY = "paramove synthesize"

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.hmm.synthesis import expected_durations
 from paramove.phmm import ParametricHMM
 from paramove.training.drawing import (
@@ -32,8 +32,6 @@ from paramove.training.drawing import (
     with_unit,
 )
 from paramove.training.kinds import kind_of
-
-Floats = NDArray[np.float64]
 
 STEP = 1e-3
 """Of the training's range: for derivatives with respect to theta."""

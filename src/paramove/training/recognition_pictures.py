@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from paramove.phmm import ParametricHMM
 from paramove.training.drawing import (
@@ -26,8 +25,6 @@ from paramove.training.drawing import (
     with_unit,
 )
 from paramove.training.examining import LEAST_TYPICALITY, Recognition, confusion, percent
-
-Floats = NDArray[np.float64]
 
 
 def plot_recognition(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:

@@ -5,18 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from paramove.documents.array_types import Floats
 from paramove.hmm import resample
-from studies.movements.method import (
-    BEGINNINGS,
-    CLASSES,
-    SYNTHESIS,
-    THETA,
-    TYPICALITY,
-    Estimate,
-    Examples,
-    Floats,
-    NotAble,
-)
+from studies.movements.method import BEGINNINGS, CLASSES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.movements.tasks import Fold, real_tasks
 from tests.demonstrations.made_up_recordings import write_pointing, write_table
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents.array_types import Floats
 from paramove.documents.files import read_text
 
 MOST_LEVELS = 200
@@ -78,7 +78,7 @@ def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
 
 def _places(joints: tuple[Joint, ...], values: Floats) -> Floats:
     places = np.zeros((len(values), len(joints), 3))
-    turns: list[NDArray[np.float64]] = []
+    turns: list[Floats] = []
     column = 0
     for number, joint in enumerate(joints):
         place = np.broadcast_to(joint.offset, (len(values), 3)).copy()

@@ -12,8 +12,9 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError, Floats, place_of_theta
+from paramove.demonstrations.movement import DemonstrationError, place_of_theta
 from paramove.demonstrations.writing import Take, recording_name
+from paramove.documents.array_types import Floats
 from paramove.documents.positions import read_document
 from paramove.documents.wording import closest, nearest
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.movement import DemonstrationError
+from paramove.documents.array_types import Floats
 from paramove.documents.files import size_of, unreadable
 
 COLUMN = re.compile(r"(.+?)[ _.:/-]?([xyz])", re.IGNORECASE)

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError, Floats
+from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label
+from paramove.documents.array_types import Floats
 from paramove.documents.arrays import read_arrays
 
 TARGET = ("target_x", "target_y", "target_z")

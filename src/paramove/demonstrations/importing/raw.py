@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from paramove.demonstrations.movement import Floats
 from paramove.demonstrations.writing import Label
+from paramove.documents.array_types import Floats
 
 
 @dataclass(frozen=True)

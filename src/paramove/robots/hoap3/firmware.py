@@ -11,9 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import DescriptionError, RobotDescription
-
-FloatArray = NDArray[np.float64]
 
 
 class Firmware:
@@ -49,11 +48,11 @@ class Firmware:
         self._target = np.empty(description.n_joints)
         self._torque = np.empty(description.n_joints)
 
-    def reset(self, positions: FloatArray) -> None:
+    def reset(self, positions: Floats) -> None:
         """Start the servos' set-points at the given joint angles, [J], rad."""
         self._set_point[:] = positions
 
-    def step(self, target_counts: NDArray[np.int16], positions: FloatArray, velocities: FloatArray) -> FloatArray:
+    def step(self, target_counts: NDArray[np.int16], positions: Floats, velocities: Floats) -> Floats:
         """Torques for the next millisecond.
 
         Args:
@@ -79,7 +78,7 @@ class Firmware:
         return torque
 
 
-def _clip(values: FloatArray, limit: FloatArray) -> None:
+def _clip(values: Floats, limit: Floats) -> None:
     """Clip in place to ±limit. Cheaper than np.clip for 28 values."""
     np.minimum(values, limit, out=values)
     np.maximum(values, -limit, out=values)

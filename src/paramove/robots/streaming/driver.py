@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
@@ -26,8 +26,6 @@ from paramove.safety.core import TOUCHED, SafetyCore
 from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
 from paramove.safety.stop_ramp import longest_path_s
 from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
-
-FloatArray = NDArray[np.float64]
 
 SAFETY_STATES = {
     State.DISCONNECTED: SafetyState.STATE_DISCONNECTED,
@@ -341,7 +339,7 @@ class ArmDriver:
         return message
 
 
-def _start_tolerance(description: RobotDescription) -> FloatArray:
+def _start_tolerance(description: RobotDescription) -> Floats:
     """How far a trajectory may begin from the commanded pose, [J], rad.
 
     Fingers that hold something are measured far from where they are commanded, and nobody but this driver knows the

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.robot_report import RobotReport
 from paramove.safety.gate_io import Fault
-
-FloatArray = NDArray[np.float64]
 
 START_TIMEOUT_S = 0.5
 SETTLE_TIMEOUT_S = 1.0
@@ -26,7 +24,7 @@ class Execution:
     """Rows [N, J] in rad of an accepted trajectory; row 0 is the pose before it, row i has the index start + i - 1."""
 
     trajectory_id: str
-    rows: FloatArray
+    rows: Floats
     dt_s: float
     start_index: int
     begun_ns: int
@@ -42,7 +40,7 @@ class Execution:
         """Index after the last row."""
         return self.start_index + len(self.rows) - 1
 
-    def window(self, next_index: int, guard: int, cover: int, ahead: int) -> tuple[FloatArray, FloatArray, int]:
+    def window(self, next_index: int, guard: int, cover: int, ahead: int) -> tuple[Floats, Floats, int]:
         """Rows to send now, those after them for the stop ramp, and the first one's index.
 
         Rows from `next_index` up to the guard are left alone, for they may be played before this batch arrives.

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots.description import RobotDescription
 from paramove.robots.joint_units import JointRangeError
 from paramove.safety.gate_io import Measured
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +25,9 @@ class RobotReport:
     playing: Hoap3State.Playing
     refused_batches: int
     refusal: str
-    positions: FloatArray
-    commanded: FloatArray
-    velocities: FloatArray
+    positions: Floats
+    commanded: Floats
+    velocities: Floats
     joint_names: tuple[str, ...]
 
     @classmethod

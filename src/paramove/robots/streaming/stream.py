@@ -12,11 +12,11 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.robots.description import RobotDescription
 
 Frames = NDArray[np.int16]
-FloatArray = NDArray[np.float64]
 
 MAX_FRAMES = 5000
 # Accelerations are judged over spans of this length, at least one frame: over 1 ms, rounding to counts is larger than
@@ -42,7 +42,7 @@ class StreamWriter:
         self._units = description.units
         self._period_us = description.stream.period_us
 
-    def batch(self, first_index: int, rows: FloatArray, ramp_rows: int) -> StreamBatch:
+    def batch(self, first_index: int, rows: Floats, ramp_rows: int) -> StreamBatch:
         """Encode rows, [N, J] rad, of which the last `ramp_rows` are the stop ramp.
 
         Raises:

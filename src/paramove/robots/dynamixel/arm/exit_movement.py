@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.robots.description import RobotDescription
-
-FloatArray = NDArray[np.float64]
 
 SLOW_SHARE = 0.5
 """Of the operating velocity."""
@@ -24,7 +22,7 @@ MARGIN_S = 0.5
 
 
 def movement_to(
-    description: RobotDescription, start: FloatArray, angles: Mapping[str, float], name: str
+    description: RobotDescription, start: Floats, angles: Mapping[str, float], name: str
 ) -> tuple[JointTrajectory, float]:
     """A straight movement in the joints that `angles` names, rad, from the pose `start` [J], rad, and its duration, s.
 

@@ -6,8 +6,8 @@ import time
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.limp_arm import LimpArm
@@ -33,7 +33,7 @@ class ArmWeight:
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=np.intp)
         self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=np.intp)
 
-    def torques(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    def torques(self, angles: Floats) -> Floats:
         """That hold the arm still: [J] of all joints for their angles [J], rad; N m."""
         self._data.qpos[self._qpos] = angles
         mujoco.mj_forward(self._model, self._data)
@@ -90,7 +90,7 @@ class FloatingArm(LimpArm):
                 self._chain.write(number, registers["Torque Enable"], 1)
                 self._chain.write(number, registers["Goal Current"], self._current(place, torques))
 
-    def measured(self) -> tuple[int, NDArray[np.float64]] | None:
+    def measured(self) -> tuple[int, Floats] | None:
         """As of a limp arm; where the arm is not known for 0.2 s, it carries nothing until it is."""
         found = super().measured()
         silent_s = time.monotonic() - self._commanded_s
@@ -120,11 +120,11 @@ class FloatingArm(LimpArm):
                 failed.append(f"{self._joints[place]}: {error}")
         return tuple(failed)
 
-    def _carry(self, torques: NDArray[np.float64]) -> None:
+    def _carry(self, torques: Floats) -> None:
         goals = {self._numbers[place]: self._current(place, torques) for place in self._carrying}
         self._chain.sync_write(self._models[self._carrying[0]].registers["Goal Current"], goals)
 
-    def _current(self, place: int, torques: NDArray[np.float64]) -> int:
+    def _current(self, place: int, torques: Floats) -> int:
         """Of one servo, in its units."""
         most = self._most[self._numbers[place]]
         return max(-most, min(most, round(float(self._per_torque[place] * torques[place]))))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
@@ -47,7 +47,7 @@ class LimpArm:
         """
         return ()
 
-    def measured(self) -> tuple[int, NDArray[np.float64]] | None:
+    def measured(self) -> tuple[int, Floats] | None:
         """When, ns of the monotonic clock, and the angles of all joints, [J], rad.
 
         None while an answer is missing, or says what cannot be true.

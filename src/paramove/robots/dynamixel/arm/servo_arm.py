@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.arm.servo_checks import (
     ENDS,
@@ -70,7 +71,7 @@ class ArmReading:
 
     at_ns: int
     counts: Counts
-    ages_s: NDArray[np.float64]
+    ages_s: Floats
 
 
 @dataclass

@@ -10,8 +10,8 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.emulated.loops import STEP_S
 from paramove.robots.dynamixel.emulated.motor import RAD_PER_PULSE, Effort
@@ -75,7 +75,7 @@ class MujocoMechanics:
         self._counts = np.array([joint.counts_per_rad for joint in joints], dtype=np.float64)
         self._zero = np.array([joint.zero_counts for joint in joints], dtype=np.float64)
         self._gear = self._counts * RAD_PER_PULSE  # radians of the shaft for one of the joint
-        self._own_damping: NDArray[np.float64] = self.model.dof_damping.copy()
+        self._own_damping: Floats = self.model.dof_damping.copy()
         for name, angle in (posture or {}).items():
             self.data.qpos[self.model.jnt_qposadr[self._joint(name)]] = angle
         self._place_followers()
