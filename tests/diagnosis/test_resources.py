@@ -16,7 +16,7 @@ from paramove.diagnosis.resources import (
     resources_findings,
     sockets_finding,
 )
-from paramove.supervision.limits import OPEN_FILES
+from paramove.supervision.environment import OPEN_FILES
 from tests.diagnosis.unprivileged import NOBODY, as_nobody, needs_root
 from tests.docs.markdown import ROOT
 

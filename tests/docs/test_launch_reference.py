@@ -5,10 +5,10 @@ import json
 import pytest
 
 from paramove.supervision import application
-from paramove.supervision.editor_schema import editor_schema
 from paramove.supervision.graph import graph_of
 from paramove.supervision.graph_svg import as_svg
 from paramove.supervision.launch_file import load
+from paramove.supervision.launch_schema import editor_schema
 from tests.docs.markdown import ROOT, table
 
 PAGE = ROOT / "docs" / "reference" / "launch_file.md"

@@ -11,8 +11,7 @@ from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.last_part_model import LastPartModel
-from paramove.pointing.window import PointingWindow
-from paramove.pointing.window_options import PointingWindowOptions
+from paramove.pointing.window import PointingWindow, PointingWindowOptions
 from tests.pointing.persons import NAMES, joined, performed, poses
 
 PLACES = [(0.2, 0.3), (0.75, 0.6), (0.5, 0.9)]

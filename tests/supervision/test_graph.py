@@ -14,9 +14,8 @@ from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.cli.main import build
 from paramove.supervision import application
-from paramove.supervision.graph import graph_of, running_graph
+from paramove.supervision.graph import as_mermaid, as_text, graph_of, running_graph
 from paramove.supervision.graph_svg import BOX_PX, LETTER_PX, as_svg
-from paramove.supervision.graph_text import as_mermaid, as_text
 from paramove.supervision.launch_file import load
 
 ROOT = Path(__file__).parents[2]

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.supervision.conftest import until
-from tests.supervision.test_interrupts import STUBBORN
+from tests.supervision.test_supervisor_interrupts import STUBBORN
 
 TWO = """
 nodes:

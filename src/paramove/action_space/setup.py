@@ -18,7 +18,7 @@ from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
-from paramove.cameras.measured_files import measured_cameras, measured_file
+from paramove.cameras.calibrated import measured_cameras, measured_file
 from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
 from paramove.observation.arm_body import ArmSizes

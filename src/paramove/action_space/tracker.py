@@ -21,7 +21,6 @@ from paramove.action_space.estimates import (
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.particle_filter import FilterOptions, Measurement, ParticleFilter, effective_number
 from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.progress_jumps import ProgressJumps
 from paramove.action_space.propagation import THESIS_RATE_HZ, Propagation, PropagationOptions, per_step
 from paramove.action_space.reached_place import ReachedPlace, reached_place
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
@@ -32,6 +31,10 @@ from paramove.documents.input_error import InputError
 from paramove.observation.arm_body import HAND
 from paramove.observation.presence import Presence
 
+LEAST_CONCENTRATION = 0.8
+"""Length of the mean of the progress as a direction, 0 (spread over all of the action) to 1."""
+JUMP = 0.25
+"""Of the progress, beyond what the time between two frames explains."""
 Measure = Callable[[Floats], Floats | None]
 
 
@@ -278,3 +281,30 @@ class ActionTracker:
                 "guesses and no target is detected until the arm is found in its base pose or elsewhere"
             )
         return ""
+
+
+class ProgressJumps:
+    """Counts them.
+
+    Attributes:
+        count: jumps so far, between frames with one action and a progress of which the filter was sure.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._last: tuple[str, float] | None = None
+
+    def update(self, action: str, tau: Floats, weights: Floats, advance: float) -> None:
+        """Takes progress (K,) and weights (K,) of the particles of the most probable action.
+
+        `advance`: what the progress gains on average in the time since the frame before. The end of an action is next
+        to its beginning.
+        """
+        mean = weights @ np.exp(2j * np.pi * tau) / max(float(weights.sum()), 1e-300)
+        if abs(mean) < LEAST_CONCENTRATION:
+            return
+        now = float(np.angle(mean)) / (2.0 * np.pi)
+        if self._last is not None and self._last[0] == action:
+            gained = (now - self._last[1] - advance + 0.5) % 1.0 - 0.5
+            self.count += abs(gained) > JUMP
+        self._last = action, now

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from paramove.applications.pointed_object import object_at
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from paramove.applications.stage import Mind, Place, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 
+NEAR = 0.035
+"""An object farther from the place is not meant, m; the objects stand at least 5 cm apart."""
+CLEARER_BY = 0.015
+"""The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
 HAND_PATIENCE_S = 6.0
 SETTLED_S = 1.0
@@ -188,3 +195,22 @@ class Applying(Stage):
             return ApplicationStage.STAGE_DONE
         self._ask()
         return None
+
+
+@dataclass(frozen=True)
+class PointedObject:
+    """Either the name of the object or the doubt why it cannot be told, a sentence; the other is empty."""
+
+    name: str = ""
+    doubt: str = ""
+
+
+def object_at(place: Place, standing: Mapping[str, Place]) -> PointedObject:
+    """The object that is meant with a place, m, of those that stand at places on the same plane."""
+    ordered = sorted(standing, key=lambda name: (math.dist(standing[name], place), name))
+    distances = [math.dist(standing[name], place) for name in ordered]
+    if not ordered or not distances[0] <= NEAR:  # NaN is not near either
+        return PointedObject(doubt=f"You point at {cm(place)}, but I see nothing that stands near there.")
+    if len(ordered) > 1 and distances[1] - distances[0] < CLEARER_BY:
+        return PointedObject(doubt=f"You point at {cm(place)}: that can be {ordered[0]} or {ordered[1]}.")
+    return PointedObject(name=ordered[0])

@@ -9,7 +9,6 @@ import logging
 import math
 from collections.abc import Callable
 
-from paramove.applications.arm_sight import ArmSight
 from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.conversation import Errand, Goals, Outbox
 from paramove.applications.relocator_options import RelocatorOptions
@@ -20,6 +19,7 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
 
+SILENT_S = 1.0
 _log = logging.getLogger(__name__)
 
 STAGE_PERIOD_S = 1.0
@@ -291,3 +291,45 @@ class Relocator:
         )
         message.captured.FromNanoseconds(round(self._now_s * 1e9))
         self._outbox.stages.append(message)
+
+
+class ArmSight:
+    """Follows the tracker's estimates.
+
+    Args:
+        frame: In which places are asked for.
+    """
+
+    def __init__(self, frame: str) -> None:
+        self._frame = frame
+        self._heard_s = float("-inf")
+        self._trouble = ""
+        self._hand: tuple[float, float] | None = None
+        self._near_s: dict[tuple[float, float], float] = {}
+
+    def on_estimate(self, estimate: ActionEstimate, now_s: float) -> None:
+        """Take in what is believed now; a hand told in another frame is nowhere."""
+        self._heard_s = now_s
+        if estimate.lost or estimate.degraded:
+            self._trouble = "the tracker has lost the arm" if estimate.lost else "no camera sees the arm"
+            self._hand = None
+        else:
+            self._trouble = ""
+            self._hand = (estimate.hand.x, estimate.hand.y) if estimate.frame == self._frame else None
+
+    def trouble(self, now_s: float) -> str:
+        """Why it is not known where the person points; empty while it is."""
+        if now_s - self._heard_s > SILENT_S:
+            return "the tracker is silent"
+        return self._trouble
+
+    def away_for(self, place: tuple[float, float], distance: float, now_s: float) -> float:
+        """How long the hand has been farther from a place than `distance`, m, as far as it was asked; s."""
+        away = (
+            not self.trouble(now_s)
+            and self._hand is not None
+            and math.dist(self._hand, place) > distance  # False for NaN
+        )
+        if not away or place not in self._near_s:
+            self._near_s = {place: now_s}
+        return now_s - self._near_s[place]

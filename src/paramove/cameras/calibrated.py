@@ -25,6 +25,7 @@ from paramove.documents.atomic_writing import replacing
 from paramove.documents.input_error import InputError
 from paramove.documents.positions import read_document
 
+MOST_CAMERAS = 4
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
 """Numbers of distortion coefficients that OpenCV knows."""
@@ -210,3 +211,19 @@ def _camera(path: Path, number: int, entry: Any) -> CalibratedCamera:
         return CalibratedCamera(str(entry["name"]), int(entry["width_px"]), int(entry["height_px"]), *arrays)
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: camera {number}: {error}") from error
+
+
+def measured_file(run_folder: Path, path: Path) -> Path:
+    """The file of the run's folder if there is one, else as given."""
+    return run_folder / path if (run_folder / path).is_file() else path
+
+
+def measured_cameras(run_folder: Path, path: Path) -> list[CalibratedCamera]:
+    """The cameras of a calibration file, named camera_1, camera_2, ... in their order, as their topics are.
+
+    Raises InputError for a file that is none, or more than `MOST_CAMERAS`.
+    """
+    found = read_cameras(measured_file(run_folder, path))
+    if len(found) > MOST_CAMERAS:
+        raise InputError(f"{path}: {len(found)} cameras found, at most {MOST_CAMERAS} are used")
+    return [replace(one, name=f"camera_{number}") for number, one in enumerate(found, start=1)]

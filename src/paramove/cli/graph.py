@@ -51,8 +51,8 @@ def graph(
     Exit codes: 0 done; 1 nothing is running; 66 no such launch file; 77 the output cannot be written; 78 the launch
     file is wrong.
     """
+    from paramove.supervision.graph import as_mermaid, as_text
     from paramove.supervision.graph_svg import as_svg
-    from paramove.supervision.graph_text import as_mermaid, as_text
 
     found = _running(domain) if live or name is None else _launched(name, overlays)
     text = {Format.TEXT: as_text, Format.MERMAID: as_mermaid, Format.SVG: as_svg}[form](found)

@@ -18,8 +18,7 @@ from paramove.bus.settings import default_folder
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
 from paramove.supervision.application import NoWorkspaceError, find_workspace
 from paramove.supervision.domain import LONGEST_FOLDER, DomainError, check_name
-from paramove.supervision.environment import DEFAULT_DOMAIN, examined
-from paramove.supervision.limits import OPEN_FILES
+from paramove.supervision.environment import DEFAULT_DOMAIN, OPEN_FILES, examined
 
 LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
 """Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from paramove.documents.array_types import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
-from paramove.motion.body_points import arm_of, points_of
-from paramove.motion.conversion import RobotMovement
+from paramove.motion.conversion import RobotMovement, arm_of, points_of
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement, TrainingTargets
 from paramove.motion.timing import minimum_jerk
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents.array_types import Floats
 from paramove.motion.reaching_movement import ArmPoses
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint
 
 
 @dataclass(frozen=True)
@@ -97,3 +99,14 @@ class PlannedMotion:
     holding: NDArray[np.bool_]
     phases: tuple[tuple[str, float], ...]
     elbow_turn: float
+
+
+def motion_message(name: str, joints: Sequence[str], motion: PlannedMotion, now_ns: int) -> JointTrajectory:
+    """The trajectory called `name` of these joints, in the order of the motion's angles."""
+    message = JointTrajectory(id=name, joints=joints)
+    message.captured.FromNanoseconds(now_ns)
+    message.points.extend(
+        TrajectoryPoint(time_s=t, position_rad=q) for t, q in zip(motion.times, motion.angles, strict=True)
+    )
+    message.phases.extend(TrajectoryPhase(name=name, start_s=start) for name, start in motion.phases)
+    return message

@@ -9,8 +9,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paramove.cameras.aligned_views import AlignedViews, Views
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.cameras.measured_files import measured_cameras
+from paramove.cameras.calibrated import CalibratedCamera, measured_cameras
 from paramove.cameras.watch import CameraWatch
 from paramove.documents.array_types import Image
 from paramove.documents.input_error import InputError

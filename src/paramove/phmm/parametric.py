@@ -1,5 +1,7 @@
 """The interface of all parametric HMMs: trained on labelled movements, evaluated at any parameter."""
 
+from __future__ import annotations
+
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -13,14 +15,19 @@ from numpy.typing import ArrayLike
 
 from paramove.documents.array_types import Floats, Ints
 from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
-from paramove.hmm.sequences import checked_sequence, checked_sequences
+from paramove.hmm.sequences import (
+    SequenceLengthError,
+    check_demonstrations,
+    check_length,
+    checked_sequence,
+    checked_sequences,
+)
 from paramove.hmm.synthesis import Path as PathKind
 from paramove.hmm.synthesis import Timing, at_progress
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
-from paramove.phmm.training_checks import check_training
 
 MOST_FRAMES = 100_000
 
@@ -279,3 +286,28 @@ class ParametricHMM(ABC):
 
 
 _CLASSES: dict[str, type[ParametricHMM]] = {}  # what a file may name; filled as the classes are defined
+
+
+def check_training(
+    recorded: Sequence[Floats], resampled: Sequence[Floats], theta: Floats, states: tuple[int, int, int], floor: float
+) -> None:
+    """Check movements as they were recorded and as they are trained on, (T_k, D) each, and theta (K, P).
+
+    Args:
+        states: n_states, d_min, d_max. floor: `floor_deviation` of the options.
+
+    Raises:
+        SequenceLengthError: for a length that the states do not allow, with the number of the sequence.
+        ValueError: for sequences that no model can learn from, and for one theta alone.
+    """
+    check_demonstrations(recorded, floor)
+    for index, sequence in enumerate(resampled):
+        try:
+            check_length(len(sequence), *states)
+        except SequenceLengthError as error:
+            raise SequenceLengthError(f"sequence {index}: {error}") from error
+    if (theta == theta[0]).all():
+        raise ValueError(
+            f"theta is {theta[0].tolist()} for every sequence: nothing shows how the movement depends on it; give "
+            "sequences with different theta, or train a LeftRightHMM, which has no parameters"
+        )

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from paramove.bus import topics
 from paramove.bus.topics import Topic
 from paramove.pointing.events import PointingEventOptions, PointingEvents
-from paramove.pointing.window_options import PointingWindowOptions
+from paramove.pointing.window import PointingWindowOptions
 
 if TYPE_CHECKING:
     from paramove.pointing.window import PointingWindow

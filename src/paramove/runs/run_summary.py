@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-
 import numpy as np
-
 from paramove.bus import topics
 from paramove.runs.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
 from paramove.runs.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
@@ -20,10 +18,13 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
 from paramove.runs.spread import spread
 from paramove.runs.traffic import speakers
-from paramove.runs.training_hull import by_hull
 from paramove.msgs.rule_pb2 import Speech
 from paramove.robots.description import RobotDescription
+from collections.abc import Iterable
+from typing import Any
+from paramove.runs.relocations import Relocation
 
+WHERE = ("inside", "outside")
 DECIMALS = 6
 PACKAGES = ("mujoco", "numpy", "scipy", "opencv-contrib-python-headless", "numba", "protobuf", "pyzmq")
 
@@ -277,3 +278,23 @@ def _versions(facts: dict[str, Any]) -> dict[str, str]:
         except importlib.metadata.PackageNotFoundError:
             found[package] = ""
     return found
+
+
+def by_hull(goals: Iterable[Relocation]) -> dict[str, Any]:
+    """Counts of the goals to fetch something, by where they fetch it (`from`) and where they bring it (`to`)."""
+    fetching = [goal for goal in goals if goal.fetches]
+    return {
+        place: {
+            where: _counts([goal for goal in fetching if getattr(goal, place + "_hull") == where]) for where in WHERE
+        }
+        for place in ("from", "to")
+    }
+
+
+def _counts(goals: list[Relocation]) -> dict[str, int]:
+    tried = [goal for goal in goals if goal.result != "refused"]
+    return {
+        "tried": len(tried),
+        "succeeded": sum(goal.result == "succeeded" for goal in tried),
+        "refused": len(goals) - len(tried),
+    }

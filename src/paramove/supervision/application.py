@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from paramove.supervision.domain import held_domain
-from paramove.supervision.environment import DEFAULT_DOMAIN
+from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
-from paramove.supervision.limits import allow_open_files
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces

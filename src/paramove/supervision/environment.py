@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import sys
 import tempfile
 import zoneinfo
@@ -16,6 +17,8 @@ from platformdirs import user_cache_path
 from paramove.bus.settings import default_folder
 from paramove.supervision.domain import check_name
 
+OPEN_FILES = 256
+"""A node has two or three for each topic; the recorder, which hears nearly all, about a hundred."""
 DEFAULT_DOMAIN = "default"
 NEEDED = "paramove av cv2 dynamixel_sdk google matplotlib mcap mujoco numba numpy PIL platformdirs psutil pydantic rich"
 NEEDED += " ruamel scipy serial typer zmq zstandard"
@@ -124,3 +127,23 @@ def _owner(workspace: Path) -> Iterator[str]:
     owner = workspace.stat().st_uid
     if os.geteuid() == 0 and owner != 0:
         yield f"run as root in a clone of user {owner}: the folder of this run will belong to root"
+
+
+class LimitError(RuntimeError):
+    """The operating system allows less than a run needs; the text says how to raise the limit."""
+
+
+def allow_open_files(needed: int = OPEN_FILES) -> None:
+    """Raises this process's limit of open files if it is too low; nodes inherit it.
+
+    Raises LimitError if the hard limit, which only a privileged user raises, is too low.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or soft >= needed:
+        return
+    if hard != resource.RLIM_INFINITY and hard < needed:
+        raise LimitError(
+            f"a process may have {soft} files open here (hard limit {hard}), a run needs {needed}; raise the limit: "
+            f"`ulimit -Hn {needed}` as root, `nofile` in /etc/security/limits.conf, or LimitNOFILE= of the service"
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))

@@ -10,7 +10,8 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from types import FrameType, TracebackType
+from typing import Any, Protocol, Self
 
 from paramove.documents import exit_codes
 from paramove.linear_algebra_threads import ONE_THREAD
@@ -19,7 +20,6 @@ from paramove.supervision import by_hand
 from paramove.supervision.control import Answer, ControlServer
 from paramove.supervision.domain import Domain
 from paramove.supervision.events import EventLog, signal_name
-from paramove.supervision.interrupts import Interrupts
 from paramove.supervision.launch_file import Launch, start_waves
 from paramove.supervision.launch_schema import LaunchFile
 from paramove.supervision.listener import Listener
@@ -27,6 +27,8 @@ from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervised_node import ENDED, STOP_S, State, SupervisedNode
 
+_ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SUSPENDS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 TURN_S = 0.05
 """Longest wait between two looks at the bus; the end of a process is seen at once."""
 STOP_ALL_S = 10.0
@@ -304,3 +306,53 @@ def _drain(wake_fd: int) -> None:
         os.eventfd_read(wake_fd)
     except BlockingIOError:
         return
+
+
+class Interrupts:
+    """While the block lasts, the signals that end a run are counted instead of ending the process.
+
+    Those by which a terminal suspends a process do not suspend it: the nodes would go on, with nobody to end them.
+
+    Attributes:
+        first: The first of these signals, None before.
+        urgent: Whether SIGINT or SIGTERM came once more: end everything at once. A closed terminal may send several
+            SIGHUP, so these do not count.
+        suspended: Whether somebody has pressed Ctrl-Z; reset by whoever says why that does nothing.
+        wake_fd: Readable after a signal, and when a child process has ended, was stopped (SIGSTOP) or goes on.
+    """
+
+    def __init__(self) -> None:
+        self.first: signal.Signals | None = None
+        self.urgent = False
+        self.suspended = False
+        self.wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in _ENDS:
+            self._before[number] = signal.signal(number, self._handle)
+        for number in _SUSPENDS:
+            self._before[number] = signal.signal(number, self._suspend)
+        self._before[signal.SIGCHLD] = signal.signal(signal.SIGCHLD, self._wake)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        os.close(self.wake_fd)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.first is None:
+            self.first = signal.Signals(number)
+        elif number != signal.SIGHUP:
+            self.urgent = True
+        self._wake(number, frame)
+
+    def _suspend(self, number: int, frame: FrameType | None) -> None:
+        self.suspended = True
+        self._wake(number, frame)
+
+    def _wake(self, number: int, frame: FrameType | None) -> None:
+        os.eventfd_write(self.wake_fd, 1)

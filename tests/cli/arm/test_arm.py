@@ -11,8 +11,7 @@ from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.robots.dynamixel.bus.servo_models import MODELS
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
-from paramove.robots.dynamixel.calibration.path import calibration_path
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, calibration_path
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from paramove.safety.gate_io import PERSON_STOP
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest

@@ -28,8 +28,8 @@ def calibrate(
     77 the data folder cannot be written, which is told at the start; 78 what was shown does not fit the description,
     with the cause; 130 Ctrl-C, and the old file stays.
     """
+    from paramove.robots.dynamixel.calibration.arm_calibration import check_can_be_kept
     from paramove.robots.dynamixel.calibration.arm_plan import load_plan
-    from paramove.robots.dynamixel.calibration.path import check_can_be_kept
     from paramove.robots.dynamixel.calibration.procedure import ArmCalibrator
 
     with explained():

@@ -24,7 +24,7 @@ from paramove.robots.dynamixel.emulated.arm import emulated_servos
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.person import PATIENT_S, Person
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 ROBOT = RobotDescription.load(ROOT / "robot_description" / "open_manipulator_x")
 SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=1.0, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""

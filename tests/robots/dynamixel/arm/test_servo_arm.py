@@ -225,7 +225,7 @@ def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port)
 
 
 def test_the_loop_does_not_wait_for_an_arm_that_is_silent(arm, emulator, port, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.bus.late_answers.REST_S", 100.0)
+    monkeypatch.setattr("paramove.robots.dynamixel.bus.servo_chain.REST_S", 100.0)
     arm.measured()
     sound = arm.measured()
     port.latency_s = 0.005

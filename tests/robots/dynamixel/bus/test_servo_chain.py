@@ -185,7 +185,7 @@ def silenced(chain: ServoChain) -> None:
 
 
 def test_silent_servos_are_asked_less_often_and_are_heard_as_soon_as_they_talk_again(chain, emulator, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.bus.late_answers.REST_S", 100.0)
+    monkeypatch.setattr("paramove.robots.dynamixel.bus.servo_chain.REST_S", 100.0)
     with emulator.lock:
         silenced(chain)
         asked = chain.counts.asked

@@ -7,13 +7,14 @@ from hypothesis import strategies as st
 
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.calibration.arm_calibration import (
+    VARIABLE,
     ArmCalibration,
     CalibratedBus,
     CalibrationError,
     JointCalibration,
+    calibration_path,
     sign_again,
 )
-from paramove.robots.dynamixel.calibration.path import VARIABLE, calibration_path
 
 SERIAL = "FT6Z5NCH"
 ELBOW = JointCalibration(

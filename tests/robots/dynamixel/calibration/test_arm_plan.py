@@ -9,7 +9,7 @@ from paramove.documents.input_error import InputError
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.calibration.arm_plan import PITCH, ROLL, ROOM, YAW, load_plan
 
-DESCRIPTIONS = Path(__file__).parents[3] / "robot_description"
+DESCRIPTIONS = Path(__file__).parents[4] / "robot_description"
 ARMS = ["koch_v1_1", "open_manipulator_x"]
 
 

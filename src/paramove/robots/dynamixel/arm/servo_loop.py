@@ -17,10 +17,10 @@ from typing import Self
 
 import numpy as np
 
+from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
-from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.exit_movement import LONGEST_S, MARGIN_S, movement_to
 from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, Patience, ServoArm
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
@@ -31,6 +31,15 @@ from paramove.robots.streaming.stream import StreamReader
 from paramove.robots.this_launch import RESTARTED, ThisLaunch
 from paramove.safety.gate_io import Fault, State
 
+SLOW_SHARE = 0.5
+"""Of the operating velocity."""
+PEAK = 1.875
+"""Highest velocity of a movement with smooth ends, of its mean."""
+SHORTEST_S = 0.5
+LONGEST_S = 4.0
+"""With all that belongs to it: a launcher kills a driver 5 s after it was asked to end."""
+MARGIN_S = 0.5
+"""Until the arm has settled and every servo has heard the last word."""
 _log = logging.getLogger(__name__)
 
 MOVING = (State.ARMED, State.STOPPING)
@@ -333,3 +342,20 @@ class ServoLoop:
             self.lost = str(error)
         if not self.lost:
             self._let_go(self._settings.torque_off if self._settings.rest is None else rests)
+
+
+def movement_to(
+    description: RobotDescription, start: Floats, angles: Mapping[str, float], name: str
+) -> tuple[JointTrajectory, float]:
+    """A straight movement in the joints that `angles` names, rad, from the pose `start` [J], rad, and its duration, s.
+
+    It is judged by the safety gate as any other.
+    """
+    places = [description.index(joint) for joint in angles]
+    goal = np.array(list(angles.values()))
+    slow = SLOW_SHARE * description.operating_velocity[places]
+    duration_s = float(max(SHORTEST_S, (PEAK * np.abs(goal - start[places]) / slow).max(initial=0.0)))
+    message = JointTrajectory(id=name, joints=list(angles))
+    for time_s, point in ((0.0, start[places]), (duration_s, goal)):
+        message.points.add(time_s=time_s, position_rad=point.tolist())
+    return message, duration_s

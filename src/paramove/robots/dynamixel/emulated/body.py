@@ -8,10 +8,17 @@ from enum import IntFlag
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_memory import CURRENT_MODE, PWM_MODE, TRIPPED, ServoMemory
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
-from paramove.robots.dynamixel.emulated.hand import Hand
 from paramove.robots.dynamixel.emulated.loops import PROFILE_ONGOING, STEP_S, VELOCITY_UNIT, Loops
 from paramove.robots.dynamixel.emulated.motor import LIMP, RAD_PER_PULSE, Effort, Motor
 
+SPEED = 1.0 / RAD_PER_PULSE
+"""Pulses per second, 57 degrees: slow enough to be watched."""
+STIFFNESS, DAMPING = 30.0, 1.0
+"""N m/rad and N m s/rad between hand and shaft; an estimate of a loose grip."""
+STRONGEST = 3.0
+"""N m; 15 N at a lever of 20 cm. A servo that holds gives way to it or not, as its torque says."""
+KEENNESS = 2.0
+"""1/s; so fast the hand makes up for what weight takes away from the place."""
 WATCHDOG_UNIT_S = 0.020
 REVERSE = 0x01
 """Bit of Drive Mode (10)."""
@@ -236,3 +243,37 @@ class ServoBody:
             memory["Present Current"] = round(self.motor.amperes(self.torque) / model.current_unit)
         memory["Present Input Voltage"] = max(0, round(10.0 * self.voltage))
         memory["Present Temperature"] = round(self.temperature)
+
+
+class Hand:
+    """Takes hold of the shaft of a servo and leads it to a target. All in pulses of the shaft's encoder.
+
+    Args:
+        shaft: Where it takes hold.
+        target: Where it leads the shaft, and then keeps it.
+    """
+
+    def __init__(self, shaft: float, target: float) -> None:
+        self._place, self._target = shaft, target
+        self._arrived = False
+
+    def led(self) -> float:
+        """One millisecond: where a shaft that resists nothing is afterwards."""
+        self._place += self._step()
+        return self._place
+
+    def effort(self, shaft: float, velocity: float) -> Effort:
+        """One millisecond: what it does at a shaft that is there and turns so fast, pulses per second."""
+        before, reach = self._place, STRONGEST / STIFFNESS / RAD_PER_PULSE
+        moved = KEENNESS * (self._target - shaft) * STEP_S if self._arrived else self._step()
+        self._place = max(shaft - reach, min(shaft + reach, before + moved))
+        damped = DAMPING * RAD_PER_PULSE * (self._place - before) / STEP_S
+        pull = STIFFNESS * RAD_PER_PULSE * (self._place - shaft) + damped
+        torque = pull - DAMPING * RAD_PER_PULSE * velocity
+        return Effort(math.copysign(STRONGEST, torque)) if abs(torque) > STRONGEST else Effort(pull, DAMPING)
+
+    def _step(self) -> float:
+        """Towards the target; once it is there, that is remembered."""
+        left = self._target - self._place
+        self._arrived = abs(left) <= SPEED * STEP_S
+        return left if self._arrived else math.copysign(SPEED * STEP_S, left)

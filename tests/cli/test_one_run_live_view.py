@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from paramove.cli import live_view
+from paramove.cli import one_run as live_view
 from paramove.dashboard.link_file import LinkFile
 from paramove.supervision import application
 from paramove.supervision.launch_file import load

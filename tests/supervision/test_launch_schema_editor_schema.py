@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.documents.positions import DocumentError, read_mapping
-from paramove.supervision.editor_schema import FILES, as_text, editor_schema
 from paramove.supervision.launch_file import load, validated
+from paramove.supervision.launch_schema import FILES, as_text, editor_schema
 
 ROOT = Path(__file__).parents[2]
 LAUNCH = ROOT / "launch"

@@ -7,7 +7,7 @@ import pytest
 from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from paramove.applications.settled_joints import SettledJoints
+from paramove.applications.reach_task import SettledJoints
 
 PERIOD_NS = 66_666_667
 

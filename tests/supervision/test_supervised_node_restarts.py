@@ -3,7 +3,7 @@
 import pytest
 
 from paramove.supervision.launch_schema import NodeSettings, RestartBudget
-from paramove.supervision.restarts import RestartPolicy
+from paramove.supervision.supervised_node import RestartPolicy
 
 
 def policy(restart="on-failure", backoff_s=1.0, restarts=5, window_s=300.0):

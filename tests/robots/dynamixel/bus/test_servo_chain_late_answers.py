@@ -2,8 +2,8 @@
 
 import pytest
 
-from paramove.robots.dynamixel.bus import late_answers
-from paramove.robots.dynamixel.bus.late_answers import MANY_OWED, MOST_OWED, REST_S, LateAnswers
+from paramove.robots.dynamixel.bus import servo_chain as late_answers
+from paramove.robots.dynamixel.bus.servo_chain import MANY_OWED, MOST_OWED, REST_S, LateAnswers
 
 
 @pytest.fixture

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paramove.cameras.calibrated import write_cameras
-from paramove.cameras.measured_files import measured_cameras, measured_file
+from paramove.cameras.calibrated import measured_cameras, measured_file, write_cameras
 from paramove.documents.input_error import InputError
 from tests.observation.views import four_cameras
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from paramove.motion.elbow_interpolation import carried_over, interpolated_elbow
+from paramove.motion.conversion import carried_over, interpolated_elbow
 
 UPPER_ARM, FOREARM = 0.093, 0.145
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paramove.action_space.progress_jumps import ProgressJumps
+from paramove.action_space.tracker import ProgressJumps
 
 
 def counted(progress, advance=0.04, spread=0.02, actions=None):

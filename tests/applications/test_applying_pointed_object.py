@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from paramove.applications.pointed_object import object_at
+from paramove.applications.applying import object_at
 
 STANDING = {"yellow": (0.17, 0.05), "green": (0.18, -0.08), "blue": (0.175, -0.03)}
 
