@@ -25,7 +25,7 @@ from paramove.bus import topics
 from paramove.bus.budget import RateBudget
 from paramove.bus.envelope import SIZE, Envelope, RefusedError, pack, unpack
 from paramove.bus.lockstep import to_marks
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import SequenceCounter
 from paramove.msgs.clock_pb2 import TickDone
 

@@ -23,7 +23,7 @@ from paramove.documents.array_types import Floats
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import ArmWord, Fault, Inputs, Measured, Proposal, SafetySettings, State, Targets
 from paramove.safety.limits import MotionLimits
-from paramove.safety.stop_ramp import longest_path_s, straight_move
+from paramove.safety.stopping import longest_path_s, straight_move
 
 STEPS_PER_EPISODE = 200
 EPOCH = 5

@@ -24,7 +24,7 @@ from paramove.documents.array_types import Floats
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.robots.description import RobotDescription
 from paramove.robots.streaming.stream import StreamReader, StreamWriter
-from paramove.safety.stop_ramp import longest_path_s, stop_ramp
+from paramove.safety.stopping import longest_path_s, stop_ramp
 
 EPOCH = 3
 TICK = 67

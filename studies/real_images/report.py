@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.documents.array_types import Floats
-from paramove.documents.report_page import report_page, section
+from paramove.documents.reports import report_page, section
 from studies.chapter4.drawing import drawn
 from studies.real_images.experiment import JUDGED, Replay
 from studies.real_images.scores import GOAL_PX, RANGES, middle_of_hand

@@ -13,7 +13,7 @@ import zmq
 
 from paramove.bus.endpoint import socket_path
 from paramove.bus.envelope import Envelope, pack
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.topics import Topic
 
 

@@ -19,7 +19,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.envelope import Envelope, pack
 from paramove.bus.lockstep import SERVICE
 from paramove.bus.publisher import Publisher
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Subscriber
 from paramove.msgs.clock_pb2 import TickDone

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.bus.envelope import MAGIC, SIZE, Envelope, Reason, RefusedError, pack, publisher_id, unpack
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
 

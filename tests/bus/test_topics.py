@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.schema_hash import hash_of, schema_hash, type_of_hash
+from paramove.bus.schemas import hash_of, schema_hash, type_of_hash
 from paramove.bus.topics import Profile
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.node_status_pb2 import NodeStatus

@@ -14,7 +14,7 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.envelope import Reason
-from paramove.bus.schema_hash import hash_of, schema_hash
+from paramove.bus.schemas import hash_of, schema_hash
 from paramove.bus.subscriber import Heard, Subscriber
 from paramove.bus.topics import Topic
 from paramove.msgs.clock_pb2 import Clock

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from google.protobuf import descriptor_pb2
 
-from paramove.bus.schema_hash import GENERATIONS
+from paramove.bus.schemas import GENERATIONS
 from tests.msgs.released import FOLDER, classes_of, is_repeated, present_schemas, present_types
 
 RELEASES = sorted(path for path in FOLDER.iterdir() if path.is_dir())
@@ -98,7 +98,7 @@ def test_a_schema_changed_only_in_ways_that_both_sides_survive_or_got_a_new_gene
 ) -> None:
     changes = incompatible(released_class(version, path.stem).DESCRIPTOR, PRESENT[path.stem].DESCRIPTOR)
     assert changes == [] or GENERATIONS.get(path.stem, 1) > 1, (
-        "use a new field number and reserve the old one, or raise the type in paramove.bus.schema_hash.GENERATIONS"
+        "use a new field number and reserve the old one, or raise the type in paramove.bus.schemas.GENERATIONS"
     )
 
 

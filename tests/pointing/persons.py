@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from paramove.demonstrations import POINT_NAMES, SAMPLE_RATE_HZ, table_place
-from paramove.demonstrations.last_parts import Person
+from paramove.demonstrations.movement_ends import Person
 from paramove.msgs.arm_pose_pb2 import ArmPose
 
 NAMES = ("elbow", "wrist", "index")

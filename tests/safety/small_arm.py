@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.safety_steps import EPOCH, MECHANICAL, MS, NAMES, limits_at
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import ArmWord, Clearance, Inputs, Measured, Proposal, SafetySettings, State, Targets
-from paramove.safety.stop_ramp import straight_move
+from paramove.safety.stopping import straight_move
 
 LIMITS = limits_at(0.01)
 START_NS = 5_000 * MS

@@ -6,7 +6,7 @@ import numpy as np
 
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.gate_io import Measured
-from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.stopping import stop_ramp
 from tests.safety.small_arm import HOME, LIMITS, PATH
 
 NOTHING = PATH[:0]

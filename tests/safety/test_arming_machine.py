@@ -10,7 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule
 from benchmarks.safety_steps import EPOCH, MECHANICAL, MS, Checker
 from paramove.safety.core import SafetyCore
 from paramove.safety.gate_io import ArmWord, Fault, Proposal, SafetySettings, State, Targets
-from paramove.safety.stop_ramp import straight_move
+from paramove.safety.stopping import straight_move
 from tests.safety.small_arm import HOME, LIMITS, SmallArm
 
 SETTINGS = SafetySettings(emergency_timeout_ms=500.0, words_per_s=None)

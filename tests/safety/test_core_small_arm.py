@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.safety_steps import MS
 from paramove.safety.gate_io import ArmWord, Fault, SafetySettings, State
-from paramove.safety.stop_ramp import stop_ramp, straight_move
+from paramove.safety.stopping import stop_ramp, straight_move
 from tests.safety.small_arm import HOME, LIMITS, PATH, SmallArm
 
 VOLTAGE, MODEL = Fault("voltage", "", "9.1 V, allowed 11 to 13 V"), Fault("model", "wrist", "XL430, allowed XM430")

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from paramove.cli.main import build
 from paramove.documents.positions import DocumentError, read_mapping
 from paramove.supervision.launch_file import load, validated
-from paramove.supervision.launch_schema import FILES, as_text, editor_schema
+from paramove.supervision.launch_schema import FILES, editor_schema, schema_as_text
 
 ROOT = Path(__file__).parents[2]
 LAUNCH = ROOT / "launch"
@@ -76,14 +76,14 @@ KEYWORDS |= {"additionalProperties", "patternProperties", "propertyNames", "minP
 @pytest.mark.parametrize("kind", FILES)
 def test_committed_schema_is_that_of_the_code(kind):
     """To renew it: `paramove launch --schema launch > launch/launch.schema.json`, and so for `overlay`."""
-    assert (LAUNCH / FILES[kind]).read_text(encoding="utf-8") == as_text(editor_schema(kind))
+    assert (LAUNCH / FILES[kind]).read_text(encoding="utf-8") == schema_as_text(editor_schema(kind))
 
 
 @pytest.mark.parametrize("kind", FILES)
 def test_command_prints_the_schema(kind):
     answer = CliRunner().invoke(build("launch"), ["launch", "--schema", kind])
     assert answer.exit_code == 0
-    assert answer.stdout == as_text(editor_schema(kind))
+    assert answer.stdout == schema_as_text(editor_schema(kind))
 
 
 def test_command_names_the_kinds_that_there_are():

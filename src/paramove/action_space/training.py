@@ -18,7 +18,7 @@ from paramove.documents.input_error import InputError
 from paramove.hmm import TrainingOptions
 from paramove.observation.arm_body import BENT_POSE_POINTS
 from paramove.phmm import MovementDescription, PolynomialPHMM, QuadraticPHMM
-from paramove.phmm.kept_model import kept_model
+from paramove.phmm.model_cache import cached_model
 
 STATES = 80
 TRACKED_POINTS = ("shoulder", "elbow", "index")
@@ -76,7 +76,7 @@ def cached_action(
 
     told = f"{source}, {kind.__name__}, {n_states} states"
     shown_by = show.func if isinstance(show, partial) else show
-    model = kept_model(PolynomialPHMM, name, told, train, folder, [shown_by.__module__])
+    model = cached_model(PolynomialPHMM, name, told, train, folder, [shown_by.__module__])
     return ActionModel.from_file_model(model, target)
 
 

@@ -24,7 +24,7 @@ from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_pa
 from paramove.bus.envelope import Reason, RefusedError, unpack
 from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
 from paramove.bus.monitor import ForeignConnections
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.subscriber import Heard
 from paramove.bus.turns import TICK_PERIOD_NS
 from paramove.msgs.clock_pb2 import Clock, TickDone

@@ -28,7 +28,7 @@ import struct
 import zlib
 from typing import NamedTuple
 
-from paramove.bus.schema_hash import type_of_hash
+from paramove.bus.schemas import type_of_hash
 
 MAGIC = 0x4D50
 VERSION = 1

@@ -25,7 +25,7 @@ from paramove.bus import topics
 from paramove.bus.endpoint import socket_path
 from paramove.bus.envelope import Envelope, pack, publisher_id
 from paramove.bus.exchange import Exchange, Marks
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.turns import LONGEST_WAIT_S, Tick, Turn
 from paramove.msgs.clock_pb2 import Clock, TickDone, TopicMark
 

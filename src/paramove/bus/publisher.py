@@ -11,7 +11,7 @@ import zmq
 from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
 from paramove.bus.envelope import FLAG_LAST_VALUE, FLAG_WELCOME, Envelope, pack, publisher_id
 from paramove.bus.monitor import ForeignConnections
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.topics import Profile, Topic
 
 _NOBLOCK = int(zmq.NOBLOCK)

@@ -15,7 +15,7 @@ from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
 from paramove.bus.endpoint import can_read, holder_of, socket_path
 from paramove.bus.envelope import SIZE, Envelope, Reason, RefusedError, unpack
 from paramove.bus.monitor import Monitor
-from paramove.bus.schema_hash import schema_hash
+from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
 from paramove.bus.soundness import unsound
 from paramove.bus.topics import Topic

@@ -13,7 +13,7 @@ import typer
 from paramove.diagnosis.finding import Finding, Level, Machine, Part
 from paramove.documents import exit_codes
 from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE
+from paramove.robots.dynamixel.bus.serial_adapters import BY_ID_VARIABLE
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -34,7 +34,7 @@ def doctor(
         typer.Option(
             "--by-id",
             metavar="FOLDER",
-            envvar=VARIABLE,
+            envvar=BY_ID_VARIABLE,
             help="look at the serial ports alone to which links in it lead; default: those of all USB adapters",
         ),
     ] = None,

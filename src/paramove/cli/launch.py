@@ -15,11 +15,11 @@ app = typer.Typer(add_completion=False)
 def _print_schema(kind: str | None) -> None:
     if kind is None:
         return
-    from paramove.supervision.launch_schema import FILES, as_text, editor_schema
+    from paramove.supervision.launch_schema import FILES, editor_schema, schema_as_text
 
     if kind not in FILES:
         raise typer.BadParameter(f"there are schemas of: {', '.join(FILES)}")
-    typer.echo(as_text(editor_schema(kind)), nl=False)
+    typer.echo(schema_as_text(editor_schema(kind)), nl=False)
     raise typer.Exit
 
 

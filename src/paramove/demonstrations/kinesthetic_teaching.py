@@ -1,6 +1,6 @@
 """A person leads a servo arm by hand: each segment becomes a movement of a demonstration set. Without a clock.
 
-The points are those of `robots/arm_points.py`, and theta is the place where the end effector is at the end.
+The points are those of `robots/pose_points.py`, and theta is the place where the end effector is at the end.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, Take, write_set
 from paramove.documents.array_types import Floats
 from paramove.documents.atomic_writing import replacing
-from paramove.robots.arm_points import ARM_BASE, POINT_NAMES, arm_points
 from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots.pose_points import ARM_BASE, POINT_NAMES, arm_points
 
 PARAMETERS = ("target_x", "target_y", "target_z")
 RESTS_WITHIN_M = 0.002

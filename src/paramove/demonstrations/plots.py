@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.documents.array_types import Floats
-from paramove.documents.report_page import image, report_page
+from paramove.documents.reports import image, report_page
 from paramove.documents.wording import nearest
 
 DPI = 110

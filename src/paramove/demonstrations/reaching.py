@@ -10,7 +10,7 @@ from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
 from paramove.documents.array_types import Floats
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
-from paramove.phmm.kept_model import stored_model
+from paramove.phmm.model_cache import stored_model
 from paramove.source_code import code_digest
 
 

@@ -14,7 +14,7 @@ from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, appen
 from paramove.demonstrations.movement import DemonstrationError, Movement, Side
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
 from paramove.documents.array_types import Floats
-from paramove.documents.findings import findings
+from paramove.documents.key_findings import findings
 
 LIBRARY = "paramove demonstrations"
 BETWEEN_NS = 2 * BILLION

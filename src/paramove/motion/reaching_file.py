@@ -13,7 +13,7 @@ from paramove.motion.conversion import RobotMovement
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.reaching_movement import ReachingMovement
 from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParametricHMM
-from paramove.robots.arm_points import ARM_BASE
+from paramove.robots.pose_points import ARM_BASE
 
 REMEDY = (
     "train it again: leave out the node's parameter movement.file to have a model trained from synthetic "

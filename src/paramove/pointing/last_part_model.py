@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.last_parts import FRAMES, last_parts
+from paramove.demonstrations.movement_ends import FRAMES, last_parts
 from paramove.demonstrations.synthetic import FRAME, Action
 from paramove.documents.array_types import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import MovementDescription, QuadraticPHMM
-from paramove.phmm.kept_model import kept_model
+from paramove.phmm.model_cache import cached_model
 
 STATES = 8
 PERSONS = 8
@@ -95,4 +95,4 @@ def _trained(action: Action, points: Sequence[str], folder: Path | None) -> Quad
         return model.fit(shown.sequences, shown.theta, shown.groups)
 
     source = f"last parts of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
-    return kept_model(QuadraticPHMM, f"last_part_{action}", source, train, folder)
+    return cached_model(QuadraticPHMM, f"last_part_{action}", source, train, folder)

@@ -18,7 +18,7 @@ from paramove.action_space.messages import BALL_M, ball_colour, certainty
 from paramove.action_space.placement import PersonPlacement
 from paramove.cameras.calibrated import WORLD_FRAME
 from paramove.demonstrations import table_place
-from paramove.demonstrations.last_parts import FRAMES, at_times
+from paramove.demonstrations.movement_ends import FRAMES, at_times
 from paramove.documents.array_types import Floats
 from paramove.documents.input_error import InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose

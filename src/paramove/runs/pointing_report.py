@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from paramove.demonstrations.reaching import table_place
-from paramove.documents.report_page import film, report_page, section
+from paramove.documents.reports import film, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing_run import PointingRun
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
-from paramove.documents.report_page import film, image, report_page, section
+from paramove.documents.reports import film, image, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing_video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in

@@ -7,7 +7,7 @@ import numpy as np
 from paramove.documents.array_types import Floats
 from paramove.safety.gate_io import Measured, Targets
 from paramove.safety.limits import MotionLimits
-from paramove.safety.stop_ramp import stop_ramp, straight_move
+from paramove.safety.stopping import stop_ramp, straight_move
 
 
 class AcceptedRows:

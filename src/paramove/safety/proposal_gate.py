@@ -9,7 +9,7 @@ from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.clearance import clearance_fault
 from paramove.safety.gate_io import Clearance, Fault, Measured, Proposal, SafetySettings
 from paramove.safety.limits import MotionLimits
-from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.stopping import stop_ramp
 from paramove.safety.watches import RateWatch
 
 MAX_ROWS = 5000

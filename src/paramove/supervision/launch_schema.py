@@ -115,7 +115,7 @@ def editor_schema(kind: str) -> dict[str, Any]:
     return {"launch": _launch, "overlay": _overlay}[kind]()
 
 
-def as_text(schema: dict[str, Any]) -> str:
+def schema_as_text(schema: dict[str, Any]) -> str:
     """The schema as it lies in the repository."""
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 

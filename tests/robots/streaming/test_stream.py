@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.robots.joint_units import JointRangeError
 from paramove.robots.streaming.stream import StreamReader, StreamWriter
-from paramove.safety.stop_ramp import stop_ramp
+from paramove.safety.stopping import stop_ramp
 from tests.robots.hoap3.movements import HOAP3, swing
 
 EPOCH = 7

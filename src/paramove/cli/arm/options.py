@@ -15,10 +15,8 @@ import typer
 from paramove.documents import exit_codes
 from paramove.documents.input_error import InputError
 from paramove.documents.wording import printable
-from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE as BY_ID_VARIABLE
-from paramove.robots.dynamixel.bus.serial_adapters import SerialAdapter, serial_adapter
-from paramove.robots.dynamixel.calibration.arm_calibration import VARIABLE as DATA_VARIABLE
-from paramove.robots.dynamixel.calibration.arm_calibration import calibration_path
+from paramove.robots.dynamixel.bus.serial_adapters import BY_ID_VARIABLE, SerialAdapter, serial_adapter
+from paramove.robots.dynamixel.calibration.arm_calibration import DATA_VARIABLE, calibration_path
 
 if TYPE_CHECKING:
     from paramove.robots.dynamixel.bus.servo_chain import ServoChain

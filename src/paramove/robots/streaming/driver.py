@@ -24,7 +24,7 @@ from paramove.robots.streaming.robot_report import RobotReport
 from paramove.robots.streaming.stream import StreamWriter
 from paramove.safety.core import TOUCHED, SafetyCore
 from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
-from paramove.safety.stop_ramp import longest_path_s
+from paramove.safety.stopping import longest_path_s
 from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
 
 SAFETY_STATES = {

@@ -3,7 +3,7 @@
 import pytest
 
 from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.bus.serial_adapters import VARIABLE, serial_adapter, serial_adapters, serial_of
+from paramove.robots.dynamixel.bus.serial_adapters import BY_ID_VARIABLE, serial_adapter, serial_adapters, serial_of
 
 
 def plugged(folder, *names):
@@ -44,7 +44,7 @@ def test_nothing_plugged_in_is_told_with_what_helps(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"no serial adapter in .*plug in.*dialout") as told:
         serial_adapter("", tmp_path / "by-id")
     assert told.value.missing
-    monkeypatch.setenv(VARIABLE, str(plugged(tmp_path / "by-id", "usb-FTDI_Converter_A1-if00-port0")))
+    monkeypatch.setenv(BY_ID_VARIABLE, str(plugged(tmp_path / "by-id", "usb-FTDI_Converter_A1-if00-port0")))
     assert serial_adapter().serial == "A1"
 
 

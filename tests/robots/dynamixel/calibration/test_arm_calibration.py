@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.calibration.arm_calibration import (
-    VARIABLE,
+    DATA_VARIABLE,
     ArmCalibration,
     CalibratedBus,
     CalibrationError,
@@ -57,9 +57,9 @@ def test_it_is_read_as_it_was_written(path):
 
 def test_places(tmp_path, monkeypatch):
     assert calibration_path("A/../b c", tmp_path) == tmp_path / "calibration" / "arm_A_.._b_c.yaml"
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "mine"))
+    monkeypatch.setenv(DATA_VARIABLE, str(tmp_path / "mine"))
     assert calibration_path("A1") == tmp_path / "mine" / "calibration" / "arm_A1.yaml"
-    monkeypatch.delenv(VARIABLE)
+    monkeypatch.delenv(DATA_VARIABLE)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     assert calibration_path("A1") == tmp_path / "paramove" / "calibration" / "arm_A1.yaml"
 

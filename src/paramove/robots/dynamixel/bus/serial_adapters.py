@@ -11,7 +11,7 @@ from pathlib import Path
 from paramove.documents.input_error import InputError
 
 BY_ID = Path("/dev/serial/by-id")
-VARIABLE = "PARAMOVE_SERIAL_BY_ID"
+BY_ID_VARIABLE = "PARAMOVE_SERIAL_BY_ID"
 INTERFACE = re.compile(r"-if\d+(-port\d+)?$")
 NOTHING_FOUND = (
     "plug in the adapter and switch on its power; `ls /dev/ttyUSB* /dev/ttyACM*` shows whether the system sees it, "
@@ -39,7 +39,7 @@ class SerialAdapter:
 
 def default_by_id() -> Path:
     """Folder of the links: $PARAMOVE_SERIAL_BY_ID, else /dev/serial/by-id."""
-    return Path(os.environ.get(VARIABLE) or BY_ID)
+    return Path(os.environ.get(BY_ID_VARIABLE) or BY_ID)
 
 
 def serial_of(name: str) -> str:

@@ -25,13 +25,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 
 from paramove.documents.atomic_writing import replacing
-from paramove.documents.findings import findings
 from paramove.documents.input_error import InputError
+from paramove.documents.key_findings import findings
 from paramove.documents.positions import read_document
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.joint_units import JointUnits
 
-VARIABLE = "PARAMOVE_DATA"
+DATA_VARIABLE = "PARAMOVE_DATA"
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
 CURRENT_BASED: Literal[5] = 5
@@ -244,7 +244,7 @@ def calibration_path(serial: str, data: Path | None = None) -> Path:
         serial: USB serial number of the adapter.
         data: Folder; default $PARAMOVE_DATA, else that of the system for the user's data.
     """
-    folder = data or Path(os.environ.get(VARIABLE) or user_data_path("paramove"))
+    folder = data or Path(os.environ.get(DATA_VARIABLE) or user_data_path("paramove"))
     return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
 
 

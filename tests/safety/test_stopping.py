@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.safety.stop_ramp import longest_path_s, stop_ramp, straight_move
+from paramove.safety.stopping import longest_path_s, stop_ramp, straight_move
 from tests.robots.hoap3.movements import HOAP3, swing
 
 LIMITS = HOAP3.motion_limits

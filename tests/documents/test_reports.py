@@ -3,7 +3,7 @@
 import base64
 from html.parser import HTMLParser
 
-from paramove.documents.report_page import film, folded, image, report_page, section, table
+from paramove.documents.reports import film, folded, image, report_page, section, table
 
 
 class Seen(HTMLParser):

@@ -30,7 +30,7 @@ def stored_model(kind: type[Model], path: Path | None) -> Model | None:
         return None
 
 
-def kept_model(
+def cached_model(
     kind: type[Model], name: str, source: str, train: Callable[[], Model], folder: Path | None = None,
     modules: Sequence[str] = (),
 ) -> Model:  # fmt: skip

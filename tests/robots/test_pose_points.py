@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from paramove.robots.arm_points import CLOSED_M, OPEN_M, POINT_NAMES, arm_points
 from paramove.robots.description import RobotDescription
+from paramove.robots.pose_points import CLOSED_M, OPEN_M, POINT_NAMES, arm_points
 from tests.robots.dynamixel.koch_arm import KOCH
 
 ARMS = [KOCH, KOCH.parent / "open_manipulator_x"]

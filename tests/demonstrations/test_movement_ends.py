@@ -3,7 +3,7 @@
 import numpy as np
 
 from paramove.demonstrations import table_place
-from paramove.demonstrations.last_parts import FRAMES, last_parts
+from paramove.demonstrations.movement_ends import FRAMES, last_parts
 
 
 def test_last_parts_end_where_they_point():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from paramove.phmm import LinearPHMM, MovementDescription
-from paramove.phmm import kept_model as kept_models
-from paramove.phmm.kept_model import kept_model, stored_model
+from paramove.phmm import cached_model as kept_models
+from paramove.phmm.model_cache import cached_model, stored_model
 from paramove.source_code import code_digest
 
 CODE = f"code {code_digest(__name__)}"
@@ -31,34 +31,36 @@ def train():
 
 
 def test_a_model_is_trained_once_for_each_source(train, tmp_path):
-    first = kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
-    again = kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    first = cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    again = cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
     assert train.times == 1
     assert first.description == again.description == MovementDescription("waving", source=f"one person, {CODE}")
     np.testing.assert_array_equal(first.coefficients_, again.coefficients_)
-    assert kept_model(LinearPHMM, "waving", "two persons", train, tmp_path).description.source == f"two persons, {CODE}"
+    assert (
+        cached_model(LinearPHMM, "waving", "two persons", train, tmp_path).description.source == f"two persons, {CODE}"
+    )
     assert train.times == 2
     assert len(list(tmp_path.glob("waving_*.npz"))) == 2
 
 
 def test_a_file_that_is_damaged_or_of_another_source_is_replaced(train, tmp_path, caplog):
-    first = kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    first = cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
     (path,) = tmp_path.glob("*.npz")
     path.write_bytes(path.read_bytes()[:200])
     assert stored_model(LinearPHMM, path) is None
     assert "training again, the cached model does not fit" in caplog.text
-    kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
     assert train.times == 2
     first.description = replace(first.description, source="somebody else")
     first.save(path)
-    assert kept_model(LinearPHMM, "waving", "one person", train, tmp_path).description.source == f"one person, {CODE}"
+    assert cached_model(LinearPHMM, "waving", "one person", train, tmp_path).description.source == f"one person, {CODE}"
     assert train.times == 3
 
 
 def test_a_model_of_other_code_is_replaced(train, tmp_path, monkeypatch):
-    kept_model(LinearPHMM, "waving", "one person", train, tmp_path)
+    cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
     monkeypatch.setattr(kept_models, "code_digest", lambda *modules: " ".join(modules))
-    model = kept_model(LinearPHMM, "waving", "one person", train, tmp_path, modules=["paramove.hmm"])
+    model = cached_model(LinearPHMM, "waving", "one person", train, tmp_path, modules=["paramove.hmm"])
     assert model.description.source == f"one person, code {__name__} paramove.hmm"
     assert train.times == 2
     assert len(list(tmp_path.iterdir())) == 1
@@ -66,7 +68,7 @@ def test_a_model_of_other_code_is_replaced(train, tmp_path, monkeypatch):
 
 def test_a_folder_that_cannot_be_made_costs_the_file_only(train, tmp_path, caplog):
     (tmp_path / "file").write_text("")
-    model = kept_model(LinearPHMM, "waving", "one person", train, tmp_path / "file" / "actions")
+    model = cached_model(LinearPHMM, "waving", "one person", train, tmp_path / "file" / "actions")
     assert model.description.source == f"one person, {CODE}"
     assert "the trained model is not kept" in caplog.text
 
