@@ -37,15 +37,21 @@ import serial
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
-from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
-from paramove.robots.dynamixel.arm.servo_arm import Patience
-from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
-from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
-from paramove.robots.dynamixel.bus.packets import Instruction, Packet, encoded
-from paramove.robots.dynamixel.emulated.arm import EmulatedArm, emulated_servos
-from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
-from paramove.safety.gate_io import State
+from paramove.robots import RobotDescription
+from paramove.robots.dynamixel import (
+    DrivenArm,
+    DynamixelEmulator,
+    EmulatedArm,
+    Instruction,
+    LoopSettings,
+    Packet,
+    Patience,
+    emulated_servos,
+    encoded,
+    joint_servos,
+    servo_port,
+)
+from paramove.safety import State
 
 ROOT = Path(__file__).resolve().parent.parent
 GOALS_MS = {"command loss": 100.0, "driver killed": 120.0, "stop": 20.0, "unplugged": 50.0}

@@ -32,9 +32,7 @@ import zmq
 from bus_peers import PAYLOAD_BYTES, PEERS, describe, installed, paced
 from bus_soak import VARIANTS, batch, sentences, soak
 
-from paramove.bus import topics
-from paramove.bus.publisher import Publisher
-from paramove.bus.subscriber import Subscriber
+from paramove.bus import Publisher, Subscriber, topics
 
 
 def speak_bus(folder: Path, messages: int) -> None:

@@ -20,10 +20,7 @@ import psutil
 import zmq
 from bus_peers import PAYLOAD_BYTES, paced
 
-from paramove.bus import topics
-from paramove.bus.bus import Bus
-from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus import Bus, BusSettings, Heard, Subscriber, topics
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 
 SMALL = topics.WIRE_HOAP3_STREAM

@@ -21,12 +21,18 @@ from typing import Any
 
 from google.protobuf.message import DecodeError
 
-from paramove.bus import topics
-from paramove.bus.budget import RateBudget
-from paramove.bus.envelope import SIZE, Envelope, RefusedError, pack, unpack
-from paramove.bus.lockstep import to_marks
-from paramove.bus.schemas import schema_hash
-from paramove.bus.sequence import SequenceCounter
+from paramove.bus import (
+    SIZE,
+    Envelope,
+    RateBudget,
+    RefusedError,
+    SequenceCounter,
+    pack,
+    schema_hash,
+    to_marks,
+    topics,
+    unpack,
+)
 from paramove.msgs.clock_pb2 import TickDone
 
 MAX_BYTES = 2**16

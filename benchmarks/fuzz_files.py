@@ -41,9 +41,8 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))  # run as a program, only this folder is known
 
 from benchmarks.fuzz_bus import mutate  # noqa: E402
-from paramove.cameras.frames import FrameError  # noqa: E402
-from paramove.documents.input_error import InputError  # noqa: E402
-from paramove.documents.positions import DocumentError  # noqa: E402
+from paramove.cameras import FrameError  # noqa: E402
+from paramove.documents import DocumentError, InputError  # noqa: E402
 
 MOST_S = 5.0
 HANGS_S = 30.0
@@ -70,9 +69,8 @@ class Kind(NamedTuple):
 
 
 def _import(path: Path) -> object:
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.demonstrations import DemonstrationSet, write_set
     from paramove.demonstrations.importing import ImportOptions, import_file
-    from paramove.demonstrations.writing import write_set
 
     imported = import_file(path, ImportOptions(unit="mm"))
     folder = path.with_suffix(".set")
@@ -84,9 +82,8 @@ def _import(path: Path) -> object:
 
 
 def _recording(path: Path) -> object:
-    from paramove.demonstrations.pose_recording import read_poses
-    from paramove.recording.reader import read
-    from paramove.recording.recovery import recover
+    from paramove.demonstrations import read_poses
+    from paramove.recording import read, recover
 
     goal = path.with_suffix(".whole.mcap")
     with contextlib.suppress(InputError):
@@ -104,43 +101,43 @@ def _model(path: Path) -> object:
 
 
 def _labels(path: Path) -> object:
-    from paramove.demonstrations.labels import load_labels
+    from paramove.demonstrations import load_labels
 
     return load_labels(path)
 
 
 def _launch(path: Path) -> object:
-    from paramove.supervision.launch_file import load
+    from paramove.supervision import load
 
     return load(ROOT / "launch", str(path), overlays=[])
 
 
 def _robot(path: Path) -> object:
-    from paramove.robots.description import RobotDescription
+    from paramove.robots import RobotDescription
 
     return RobotDescription.load(path)
 
 
 def _calibration(path: Path) -> object:
-    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel import ArmCalibration
 
     return ArmCalibration.read(path)
 
 
 def _cameras(path: Path) -> object:
-    from paramove.cameras.calibrated import read_cameras
+    from paramove.cameras import read_cameras
 
     return read_cameras(path)
 
 
 def _person(path: Path) -> object:
-    from paramove.action_space.setup import read_person
+    from paramove.action_space import read_person
 
     return read_person(path)
 
 
 def _grammar(path: Path) -> object:
-    from paramove.action_space.grammar_file import read_grammar
+    from paramove.action_space import read_grammar
 
     return read_grammar(path)
 
@@ -152,22 +149,20 @@ def _mapping(path: Path) -> object:
 
 
 def _node(path: Path) -> object:
-    from paramove.bus.node import NodeConfig, read_node_file
+    from paramove.bus import NodeConfig, read_node_file
 
     return read_node_file(path, NodeConfig)
 
 
 def _picture(path: Path) -> object:
-    from paramove.cameras.calibration_images import file_source
-    from paramove.cameras.frame_sources import open_source
-    from paramove.cameras.replayed_frames import PICTURES
+    from paramove.cameras import PICTURES, file_source, open_source
 
     found = file_source(path.parent).held()
     return open_source(f"folder:{path.parent}@10", 64, 48).frame(0) if path.suffix in PICTURES else found
 
 
 def _video(path: Path) -> object:
-    from paramove.cameras.frame_sources import FileFrames
+    from paramove.cameras import FileFrames
 
     frames = FileFrames(path)
     try:
@@ -381,9 +376,8 @@ def _demonstrations(folder: Path) -> tuple[dict[str, list[bytes]], bytes, bytes]
     """A movement of three points as every kind of file, as a recording, and the labels of that."""
     import ezc3d
 
+    from paramove.demonstrations import Label, RecordingsError, data_folder, write_set
     from paramove.demonstrations.importing import ImportOptions, import_file
-    from paramove.demonstrations.recorded_people import RecordingsError, data_folder
-    from paramove.demonstrations.writing import Label, write_set
 
     names = ("shoulder", "elbow", "wrist")
     time_s = np.arange(120) * 0.01
@@ -427,7 +421,7 @@ def models(folder: Path) -> list[bytes]:
 
 
 def _arm(folder: Path) -> bytes:
-    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
+    from paramove.robots.dynamixel import ArmCalibration, CalibratedBus, JointCalibration
 
     joint: dict[str, Any] = {"model": "xl430_w250", "firmware": 45, "sign": 1, "operating_mode": 3}
     joint |= {"homing_offset": 0, "zero_counts": 2048, "min_counts": 1000, "max_counts": 3000}
@@ -439,7 +433,7 @@ def _arm(folder: Path) -> bytes:
 
 
 def _two_cameras(folder: Path) -> bytes:
-    from paramove.cameras.calibrated import CalibratedCamera, write_cameras
+    from paramove.cameras import CalibratedCamera, write_cameras
 
     matrix = np.array([[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]])
     two = [CalibratedCamera(name, 640, 480, matrix, np.zeros(5), np.eye(4)) for name in ("left", "right")]

@@ -18,11 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from paramove.bus import topics
-from paramove.bus.barrier import LockstepBarrier
-from paramove.bus.bus import Bus
-from paramove.bus.settings import BusSettings
-from paramove.bus.turns import TICK_PERIOD_NS, Tick
+from paramove.bus import TICK_PERIOD_NS, Bus, BusSettings, LockstepBarrier, Tick, topics
 
 CHAIN = (
     topics.OBJECTS_TRACKED,

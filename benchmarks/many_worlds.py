@@ -27,18 +27,15 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from paramove.cameras.frames import Frame, decode, encode
-from paramove.documents.array_types import Floats
-from paramove.motion.clear_plans import ClearPlans, NoClearPlanError
-from paramove.motion.setup import MovementSource, SurfaceParameters, plans_for
+from paramove.cameras import Frame, decode, encode
+from paramove.documents import Floats
+from paramove.motion import ClearPlans, MovementSource, NoClearPlanError, SurfaceParameters, plans_for
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
-from paramove.objects.colour_tracker import ColourTracker
-from paramove.objects.homography import PlaneHomography
-from paramove.objects.recognizer import Recognizer
-from paramove.robots.description import RobotDescription
-from paramove.runs.batch import seeds_of
+from paramove.objects import ColourTracker, PlaneHomography, Recognizer
+from paramove.robots import RobotDescription
+from paramove.runs import seeds_of
 from sim import looks, places, scene, tool_box
 from sim.camera import Eye, Sensor
 from sim.hand_path import minimum_jerk

@@ -25,10 +25,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from paramove.bus import topics  # noqa: E402
-from paramove.bus.bus import Bus  # noqa: E402
-from paramove.bus.settings import BusSettings  # noqa: E402
-from paramove.recording.reader import read  # noqa: E402
+from paramove.bus import Bus, BusSettings, topics  # noqa: E402
+from paramove.recording import read  # noqa: E402
 
 ALLOWED_S = 0.5
 SMALL, IMAGE, STATUS = topics.GESTURES, topics.CAMERA_IMAGE, topics.status("recorder")

@@ -19,11 +19,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import ArmWord, Fault, Inputs, Measured, Proposal, SafetySettings, State, Targets
-from paramove.safety.limits import MotionLimits
-from paramove.safety.stopping import longest_path_s, straight_move
+from paramove.documents import Floats
+from paramove.safety import (
+    ArmWord,
+    Fault,
+    Inputs,
+    Measured,
+    MotionLimits,
+    Proposal,
+    SafetyCore,
+    SafetySettings,
+    State,
+    Targets,
+    longest_path_s,
+    straight_move,
+)
 
 STEPS_PER_EPISODE = 200
 EPOCH = 5

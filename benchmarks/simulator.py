@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the workspace is no installed package
 
 from paramove.msgs.rule_pb2 import Speech
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from sim import scene, truth
 from sim.simulation import Simulation
 

@@ -23,11 +23,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from paramove.bus import topics  # noqa: E402
-from paramove.bus.bus import Bus  # noqa: E402
-from paramove.bus.settings import BusSettings  # noqa: E402
-from paramove.bus.turns import Tick  # noqa: E402
-from paramove.dashboard.link_file import NAME, link_in  # noqa: E402
+from paramove.bus import Bus, BusSettings, Tick, topics  # noqa: E402
+from paramove.dashboard import NAME, link_in  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
 from tests.dashboard.conftest import Visitor  # noqa: E402
 from tests.robots.hoap3.movements import HOAP3  # noqa: E402

@@ -20,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
-from paramove.robots.description import RobotDescription
-from paramove.robots.streaming.stream import StreamReader, StreamWriter
-from paramove.safety.stopping import longest_path_s, stop_ramp
+from paramove.robots import RobotDescription
+from paramove.robots.streaming import StreamReader, StreamWriter
+from paramove.safety import longest_path_s, stop_ramp
 
 EPOCH = 3
 TICK = 67

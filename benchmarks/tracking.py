@@ -28,11 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import cv2
 import numpy as np
 
-from paramove.action_space.grammar import Grammar
-from paramove.action_space.particle_filter import FilterOptions
-from paramove.action_space.tracker import ActionTracker, TrackerOptions
-from paramove.action_space.training import table_action
-from paramove.action_space.vocabulary import Vocabulary
+from paramove.action_space import ActionTracker, FilterOptions, Grammar, TrackerOptions, Vocabulary, table_action
 from paramove.observation import ArmObserver, ObservationOptions
 from sim.performances import Studio
 from sim.persons.performances import kind_named, perform

@@ -20,7 +20,7 @@ import tempfile
 from pathlib import Path
 
 from paramove.bus import topics
-from paramove.recording.reader import read
+from paramove.recording import read
 
 ROOT = Path(__file__).resolve().parent.parent
 GOAL_MS = 15.0

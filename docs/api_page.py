@@ -14,13 +14,10 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "reference" / "api.md"
-PACKAGES = (
-    "paramove.phmm",
-    "paramove.hmm",
-    "paramove.alignment",
-    "paramove.demonstrations",
-    "paramove.action_space",
-    "paramove.observation",
+PACKAGES = sorted(
+    ".".join(stub.parent.relative_to(ROOT / "src").parts)
+    for stub in (ROOT / "src").rglob("__init__.pyi")
+    if stub.parent.name != "cli"  # commands have their own help
 )
 HEAD = """\
 # API
@@ -55,10 +52,12 @@ def api_page() -> str:
         for public in public_names(package):
             thing = getattr(package, public)
             shown = f"`{public}`"
-            if hasattr(thing, "__module__"):
+            ours = getattr(thing, "__module__", "").startswith("paramove")
+            if ours:
                 file = Path(inspect.getfile(importlib.import_module(thing.__module__))).relative_to(ROOT)
                 shown = f"[{shown}](../../{file})"
-            sentence = first_sentence(thing) if callable(thing) else f"{thing!r}"
+            described = ours or inspect.ismodule(thing)
+            sentence = first_sentence(thing) if described else f"`{inspect.formatannotation(thing):.120}`"
             parts.append(f"| {shown} | {sentence.replace('|', '&#124;')} |\n")
     return "".join(parts)
 

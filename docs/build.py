@@ -23,13 +23,10 @@ from urllib.parse import unquote
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = (
-    "paramove.hmm",
-    "paramove.phmm",
-    "paramove.alignment",
-    "paramove.demonstrations",
-    "paramove.action_space",
-    "paramove.observation",
+PACKAGES = sorted(
+    ".".join(stub.parent.relative_to(ROOT / "src").parts)
+    for stub in (ROOT / "src").rglob("__init__.pyi")
+    if stub.parent.name != "cli"  # commands have their own help
 )
 MARK = ".built-from-docs"
 """File in the output, which may be made anew only where it lies."""

@@ -8,11 +8,9 @@ Says    action/estimate                   ActionEstimate              15 Hz   ta
         action/scene                      foxglove.SceneUpdate        15 Hz   table, or that of `table_place`
 """
 
-from paramove.action_space.messages import arm_pose_message, estimate_message, outline_message, scene_message
-from paramove.action_space.setup import TrackingSetup
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.cameras.frames import FrameError, decode
+from paramove.action_space import TrackingSetup, arm_pose_message, estimate_message, outline_message, scene_message
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.cameras import FrameError, decode
 
 HEARS = topics.CAMERA_IMAGES
 SAYS = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)

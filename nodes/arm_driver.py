@@ -15,11 +15,9 @@ Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint 
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.robots.description import RobotDescription
-from paramove.robots.streaming.driver import ArmDriver
-from paramove.robots.this_launch import ThisLaunch
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.robots import RobotDescription, ThisLaunch
+from paramove.robots.streaming import ArmDriver
 
 HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
 SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)

@@ -7,11 +7,9 @@ Says    human/arm_pose                    ArmPose                     15 Hz   ta
         action/scene                      foxglove.SceneUpdate        15 Hz   table
 """
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.cameras.frames import FrameError, decode
-from paramove.observation.body_messages import arm_pose_message, outline_message, scene_message
-from paramove.observation.body_tracking import BodyTrackingSetup
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.cameras import FrameError, decode
+from paramove.observation import BodyTrackingSetup, arm_pose_message, outline_message, scene_message
 
 HEARS = topics.CAMERA_IMAGES
 SAYS = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)

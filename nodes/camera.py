@@ -6,10 +6,8 @@ Says    camera/image   foxglove.CompressedImage   15 Hz   camera_optical
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.cameras.frame_sources import open_source
-from paramove.cameras.frames import EndOfFrames, FrameChecks, FrameError, encode
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.cameras import EndOfFrames, FrameChecks, FrameError, encode, open_source
 
 HEARS = (topics.CAMERA_LIGHT,)
 SAYS = (topics.CAMERA_IMAGE,)

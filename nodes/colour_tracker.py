@@ -4,10 +4,9 @@ Hears   camera/image     foxglove.CompressedImage   15 Hz   camera_optical
 Says    objects/tracked  TrackedObjects             15 Hz   image plane, pixels
 """
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.cameras.frames import FrameError, decode
-from paramove.objects.colour_tracker import DEFAULT_COLOURS, Colour, ColourTracker
+from paramove.bus import Bus, NodeConfig, main, topics
+from paramove.cameras import FrameError, decode
+from paramove.objects import DEFAULT_COLOURS, Colour, ColourTracker
 
 HEARS = (topics.CAMERA_IMAGE,)
 SAYS = (topics.OBJECTS_TRACKED,)

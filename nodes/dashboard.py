@@ -9,13 +9,9 @@ from pathlib import Path
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.dashboard.live_picture import LivePicture, Surface
-from paramove.dashboard.node_table import hear_nodes
-from paramove.dashboard.server import PageServer
-from paramove.dashboard.stop_button import StopButton
-from paramove.robots.description import RobotDescription
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, hear_nodes
+from paramove.robots import RobotDescription
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)

@@ -6,10 +6,9 @@ Says    operator/arm_at_start   ArmRequest    until armed, latched
 
 from pydantic import field_validator
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.operator.arming_at_start import REAL_ROBOT, Operator
-from paramove.robots.this_launch import started_before
+from paramove.bus import Bus, NodeConfig, main, topics
+from paramove.operator import REAL_ROBOT, Operator
+from paramove.robots import started_before
 
 HEARS = (topics.ARM_SAFETY,)
 SAYS = (topics.OPERATOR_ARM_AT_START,)

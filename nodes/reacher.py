@@ -9,12 +9,10 @@ Says    arm/trajectory          JointTrajectory         event   rad
 
 from pathlib import Path
 
-from paramove.applications.reach_task import ReachStep, ReachTask
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
-from paramove.motion.servo_arm_reaching import ServoArmReaching
-from paramove.motion.setup import MovementSource
-from paramove.robots.description import RobotDescription
+from paramove.applications import ReachStep, ReachTask
+from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
+from paramove.motion import MovementSource, ServoArmReaching
+from paramove.robots import RobotDescription
 
 HEARS = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)
 SAYS = (topics.ARM_TRAJECTORY, topics.SPEECH)

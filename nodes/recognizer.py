@@ -8,14 +8,17 @@ Says    gestures            Gesture            event   pixels, and metres once c
         gestures/scene      SceneUpdate        15 Hz   table; the ball where arm poses point
 """
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, main
+from paramove.bus import Bus, NodeConfig, main, topics
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
-from paramove.objects.homography import HomographyError, PlaneHomography
-from paramove.objects.object_motion import MotionThresholds
-from paramove.objects.pointing import PointingThresholds
-from paramove.objects.recognizer import Recognizer, RecognizerOptions
-from paramove.pointing.source import PointingSetup
+from paramove.objects import (
+    HomographyError,
+    MotionThresholds,
+    PlaneHomography,
+    PointingThresholds,
+    Recognizer,
+    RecognizerOptions,
+)
+from paramove.pointing import PointingSetup
 
 HEARS = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE, topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE)
 SAYS = (topics.GESTURES, topics.GESTURES_SCENE)

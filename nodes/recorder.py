@@ -5,9 +5,8 @@ When its process is started again, or the disk was full, it goes on in `recordin
 Hears   every topic that the topic table marks as recorded
 """
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.recording.recorder import Recorder
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.recording import Recorder
 
 HEARS = topics.RECORDED
 SAYS = ()

@@ -9,10 +9,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
         speech               Speech             event
 """
 
-from paramove.applications.relocator import Relocator
-from paramove.applications.relocator_options import RelocatorOptions
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
+from paramove.applications import Relocator, RelocatorOptions
+from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
 
 HEARS = (topics.GESTURES, topics.ACTION_ESTIMATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 SAYS = (topics.RELOCATION_GOAL, topics.APPLICATION_STAGE, topics.SPEECH)

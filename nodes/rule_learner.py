@@ -10,11 +10,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
         speech               Speech             event
 """
 
-from paramove.applications.rule_learner import RuleLearner
-from paramove.applications.stage import Pointing, RuleLearnerOptions
-from paramove.applications.table import Surface
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main, publish_each
+from paramove.applications import Pointing, RuleLearner, RuleLearnerOptions, Surface
+from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
 
 HEARS = (topics.GESTURES, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 SAYS = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH)

@@ -12,11 +12,9 @@ Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
         arm/motors              MotorStatus            1 Hz
 """
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
-from paramove.robots.dynamixel.arm.setup import ServoArmSetup
-from paramove.robots.this_launch import ThisLaunch
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.robots import ThisLaunch
+from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
 
 HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)

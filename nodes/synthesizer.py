@@ -9,9 +9,8 @@ Says    arm/trajectory          JointTrajectory         event   rad
 
 from pathlib import Path
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.motion.setup import MovementSource, SurfaceParameters, synthesizer_for
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.motion import MovementSource, SurfaceParameters, synthesizer_for
 
 HEARS = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
 SAYS = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)

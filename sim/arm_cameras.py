@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats, Image
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, Image
 from sim.camera import Eye
 from sim.human import camera_frame
 from sim.performances import Lens

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.hand_path import minimum_jerk

@@ -7,9 +7,8 @@ Writes `truth.mcap` into the run folder, and goes on in `truth.2.mcap`, … when
 
 from __future__ import annotations
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.recording.recorder import Recorder
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.recording import Recorder
 
 HEARS = (topics.TRUTH_ARM,)
 SAYS = ()

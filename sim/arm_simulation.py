@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.cameras.calibrated import write_cameras
-from paramove.documents.array_types import Floats
+from paramove.cameras import write_cameras
+from paramove.documents import Floats
 from paramove.msgs.truth_pb2 import TruthArm
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from sim import scene
 from sim.arm_cameras import ArmCameras, add_arm_cameras, calibrated, draw_arm_cameras
 from sim.arm_instructor import ELBOW, SHOULDER, TIP, WRIST, ArmInstructor

@@ -22,8 +22,7 @@ from functools import partial
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, main
+from paramove.bus import Bus, main, topics
 from sim import simulator
 from sim.arm_simulation import ArmSimulation
 from sim.simulation import Simulation

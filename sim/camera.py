@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.diagnosis.graphics import graphics_backend
-from paramove.documents.array_types import Image
+from paramove.diagnosis import graphics_backend
+from paramove.documents import Image
 from sim import looks, scene
 from sim.looks import Camera
 

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import tool_box
 
 PAUSE_STEPS = 50  # a pair that parts for less than this is one contact

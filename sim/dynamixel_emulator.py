@@ -7,10 +7,9 @@ from pathlib import Path
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, NodeConfig, Tick, main
-from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.emulated.arm import EmulatedArm
+from paramove.bus import Bus, NodeConfig, Tick, main, topics
+from paramove.robots import RobotDescription
+from paramove.robots.dynamixel import EmulatedArm
 
 HEARS = ()
 SAYS = (topics.TRUTH_STATE,)

@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.observation.arm_body import ArmSizes
+from paramove.documents import Floats
+from paramove.observation import ArmSizes
 from sim.camera import Eye
 from sim.scene import quaternion_of
 

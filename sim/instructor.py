@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import places, tool_box
 from sim.hand_path import HandPath, minimum_jerk, natural_bulge

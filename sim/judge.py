@@ -23,11 +23,9 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.documents.atomic_writing import replacing
-from paramove.recording.parts import PartedRecording
-from paramove.recording.recorder import Recorder
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.documents import replacing
+from paramove.recording import PartedRecording, Recorder
 from sim.verdict import Verdict
 
 _log = logging.getLogger(__name__)

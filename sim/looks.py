@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import tool_box
 
 PURPOSES = ("camera", "light", "noise", "rules", "places", "order", "paths", "gaps")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 TILE_HALF = 0.027  # of the square around an opening that the wedges fill, m
 

@@ -19,11 +19,9 @@ import mujoco
 import numpy as np
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.demonstrations.recorded_people import RecordingsError
-from paramove.demonstrations.synthetic import RESTING_STERNUM, SAMPLE_RATE_HZ
-from paramove.documents.array_types import Floats, Image
-from paramove.documents.input_error import InputError
+from paramove.cameras import CalibratedCamera
+from paramove.demonstrations import RESTING_STERNUM, SAMPLE_RATE_HZ, RecordingsError
+from paramove.documents import Floats, Image, InputError
 from sim.camera import Eye
 from sim.human import place_arm, place_torso
 from sim.performances_scene import MARGIN_PX, Room, as_calibrated, build, draw_cameras, rendered_px

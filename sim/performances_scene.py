@@ -11,8 +11,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats
 from sim.human import Pattern, PersonLook, add_person, camera_frame
 from sim.persons.performances import Performance
 from sim.worn_markers import add_markers, mute

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from paramove.demonstrations.reaching import table_place
-from paramove.documents.array_types import Floats
+from paramove.demonstrations import table_place
+from paramove.documents import Floats
 from paramove.msgs.rule_pb2 import Speech
 from sim import tool_box
 from sim.arm_instructor import ELBOW, SHOULDER, WRIST, ArmInstructor

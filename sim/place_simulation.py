@@ -7,7 +7,7 @@ from typing import BinaryIO
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from sim import tool_box
 from sim.arm_simulation import POINTING, ArmSimulation
 from sim.place_instructor import OBJECT, START, PlaceInstructor

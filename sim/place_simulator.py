@@ -17,8 +17,7 @@ Writes what people would measure beforehand into the run folder: `cameras.yaml` 
 
 from __future__ import annotations
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, main
+from paramove.bus import Bus, main, topics
 from sim import arm_simulator, simulator
 from sim.place_simulation import PlaceSimulation
 

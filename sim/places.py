@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import tool_box
 
 STRIP_X = (0.168, 0.186)

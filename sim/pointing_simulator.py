@@ -15,9 +15,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.barrier import LockstepBarrier
-from paramove.bus.node import Bus, NodeConfig, main
+from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
 from sim.pointing_world import PointingWorld
 
 HEARS = ()

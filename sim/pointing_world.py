@@ -10,9 +10,9 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from ruamel.yaml import YAML
 
-from paramove.cameras.calibrated import write_cameras
-from paramove.demonstrations.reaching import table_place
-from paramove.documents.array_types import Image
+from paramove.cameras import write_cameras
+from paramove.demonstrations import table_place
+from paramove.documents import Image
 from paramove.msgs.truth_pb2 import TruthArm
 from sim.performances import Studio
 from sim.persons.performances import Performance, assembled, kind_named, pointed_once

@@ -14,10 +14,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 from paramove.msgs.rule_pb2 import Speech
-from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.firmware import Firmware
+from paramove.robots import RobotDescription
+from paramove.robots.hoap3 import Firmware
 from sim import looks, scene
 from sim.camera import Eye, Sensor
 from sim.instructor import Instructor

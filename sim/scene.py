@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import looks, opening, places, tool_box
 from sim.looks import Looks
 

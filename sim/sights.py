@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import places, tool_box
 from sim.tool_box import Opening
 

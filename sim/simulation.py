@@ -10,13 +10,12 @@ from typing import BinaryIO
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.bus import topics
-from paramove.bus.subscriber import Heard
-from paramove.documents.array_types import Floats, Image
+from paramove.bus import Heard, topics
+from paramove.documents import Floats, Image
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
-from paramove.robots.description import RobotDescription
-from paramove.robots.hoap3.firmware import Firmware
-from paramove.robots.streaming.stream import StreamReader
+from paramove.robots import RobotDescription
+from paramove.robots.hoap3 import Firmware
+from paramove.robots.streaming import StreamReader
 from sim import looks, scene
 from sim.camera import Eye, Sensor
 from sim.instructor import Instructor

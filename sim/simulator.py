@@ -20,10 +20,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.barrier import LockstepBarrier
-from paramove.bus.node import Bus, NodeConfig, main
-from paramove.robots.description import RobotDescription
+from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
+from paramove.robots import RobotDescription
 from sim import truth
 from sim.simulation import CAMERA_HZ, Simulation
 from sim.tool_box import NOMINAL, Measures

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 
-from paramove.demonstrations.synthetic import SAMPLE_RATE_HZ
-from paramove.documents.array_types import Floats
-from paramove.observation.arm_body import ArmSizes
+from paramove.demonstrations import SAMPLE_RATE_HZ
+from paramove.documents import Floats
+from paramove.observation import ArmSizes
 from sim import tool_box
 from sim.persons.performances import pointed_once
 from sim.persons.performers import ELBOW, INDEX, SHOULDER, WRIST, Performer, draw_performer, in_person

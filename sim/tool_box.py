@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim import opening
 
 SURFACE_Z = -0.134  # the working plane

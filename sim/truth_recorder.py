@@ -14,9 +14,8 @@ from __future__ import annotations
 import cv2
 from pydantic import Field
 
-from paramove.bus import topics
-from paramove.bus.node import Bus, Heard, NodeConfig, main
-from paramove.recording.recorder import Recorder
+from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.recording import Recorder
 from sim.judge import compressed
 
 HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_ARM, topics.TRUTH_VIEW)

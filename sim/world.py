@@ -9,8 +9,8 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.robots.description import RobotDescription
+from paramove.documents import Floats
+from paramove.robots import RobotDescription
 from sim import places, scene, tool_box
 from sim.contact_watch import ContactRecord, ContactWatch
 from sim.looks import Looks

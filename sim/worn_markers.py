@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
-from paramove.observation.arm_body import ArmSizes
+from paramove.documents import Floats
+from paramove.observation import ArmSizes
 from sim.human import LOOKS_ONLY
 
 COLOURS = {

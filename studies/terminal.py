@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from paramove.cli.evaluation_io import PROGRESS
+from paramove.cli import PROGRESS
 from paramove.documents import exit_codes
 
 _COLOURS = {"yes": "green", "in part": "yellow", "no": "red", "–": "bright_black"}

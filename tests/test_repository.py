@@ -3,9 +3,8 @@
 import ast
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 from paramove.bus import topics
 from paramove.supervision.interfaces import read_interface
@@ -45,38 +44,38 @@ def lines(path):
     return path.read_text(encoding="utf-8").splitlines()
 
 
+@cache
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 LAYOUT = "README.md CHANGELOG.md CONTRIBUTING.md LICENSE Makefile pyproject.toml requirements.lock .ci/run"
 LAYOUT += " src/paramove nodes msgs launch sim tests docker robot_description"
 
 
-@pytest.mark.parametrize("path", LAYOUT.split())
-def test_layout(path):
-    assert (ROOT / path).exists()
+def test_layout():
+    assert [path for path in LAYOUT.split() if not (ROOT / path).exists()] == []
 
 
-@pytest.mark.parametrize("path", NODES, ids=name)
-def test_node_is_plumbing(path):
-    assert len(lines(path)) < 60
+def test_nodes_are_plumbing():
+    assert {name(path): len(lines(path)) for path in NODES if len(lines(path)) >= 60} == {}
 
 
-@pytest.mark.parametrize("path", PROCESSES, ids=name)
-def test_node_says_what_it_hears_and_says(path):
+def test_headers_of_nodes_name_their_topics():
     """Every topic of HEARS and SAYS is in the table, and the header tells of it."""
-    module = f"{path.parent.name}.{path.stem}"
-    interface = read_interface(module, ROOT)
-    header = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    known = {topic.name for topic in topics.TOPICS}
-    for topic in (*interface.hears, *interface.says):
-        assert topic.name in known
-    if len(interface.hears) < 10:  # one that hears nearly everything says so in words
-        missing = [topic.name for topic in (*interface.hears, *interface.says) if topic.name not in header]
-        assert missing == [], f"{name(path)}: the header does not tell of {missing}"
+    known, missing = {topic.name for topic in topics.TOPICS}, []
+    for path in PROCESSES:
+        interface = read_interface(f"{path.parent.name}.{path.stem}", ROOT)
+        header = ast.get_docstring(parsed(path)) or ""
+        named = [topic.name for topic in (*interface.hears, *interface.says)]
+        assert set(named) <= known
+        if len(interface.hears) < 10:  # one that hears nearly everything says so in words
+            missing += [f"{name(path)}: {topic}" for topic in named if topic not in header]
+    assert missing == []
 
 
-@pytest.mark.parametrize("path", WRITTEN, ids=name)
-def test_library_file_says_what_it_is(path):
-    text = path.read_text(encoding="utf-8")
-    assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module begins with a docstring"
+def test_modules_of_the_library_begin_with_a_docstring():
+    assert [name(path) for path in WRITTEN if path.stat().st_size and not ast.get_docstring(parsed(path))] == []
 
 
 def test_files_are_named_by_what_they_compute():
@@ -87,36 +86,34 @@ def test_files_are_named_by_what_they_compute():
 BANNED_CALLS = {"time.time", "eval", "exec", "yaml.load", "pickle.load", "pickle.loads", "os.system", "os.popen"}
 
 
-@pytest.mark.parametrize("path", PYTHON, ids=name)
-def test_nothing_banned(path):
+def test_nothing_banned():
     """No wall clock, no code from data, no shell, no silent except, no pickle; tests do not sleep."""
-    banned = BANNED_CALLS | ({"time.sleep"} if path.is_relative_to(ROOT / "tests") else set())
-    if path.is_relative_to(LIBRARY) or path in NODES:
-        banned.add("print")
     found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in PYTHON:
+        banned = BANNED_CALLS | ({"time.sleep"} if path.is_relative_to(ROOT / "tests") else set())
+        if path.is_relative_to(LIBRARY) or path in NODES:
+            banned.add("print")
+        found += [f"{name(path)}:{line}: {what}" for line, what in banned_in(parsed(path), banned)]
+    assert found == []
+
+
+def banned_in(tree, banned):
+    """Lines with what must not be there."""
+    for node in ast.walk(tree):
         if isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            found += [f"{node.lineno}: {called}"] if called in banned else []
-            found += [f"{node.lineno}: shell=True" for word in node.keywords if ast.unparse(word) == "shell=True"]
+            called = ast.unparse(node.func) if isinstance(node.func, ast.Name | ast.Attribute) else ""
+            if called in banned:
+                yield node.lineno, called
+            yield from ((node.lineno, "shell=True") for word in node.keywords if ast.unparse(word) == "shell=True")
         elif isinstance(node, ast.ExceptHandler) and node.type is None:
-            found.append(f"{node.lineno}: bare except")
+            yield node.lineno, "bare except"
         elif isinstance(node, ast.Import) and any(alias.name == "pickle" for alias in node.names):
-            found.append(f"{node.lineno}: import pickle")
-    assert found == []
+            yield node.lineno, "import pickle"
 
 
-def test_only_sim_knows_of_the_simulation():
-    """The library and the nodes import nothing of the workspace; the library imports no node."""
-    found = []
-    for path in [*LIBRARY_FILES, *NODES]:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            modules += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            found += [
-                f"{name(path)}: {module}" for module in modules if module.split(".")[0] in ("sim", "nodes", "tests")
-            ]
-    assert found == []
+def test_what_is_banned_is_found():
+    text = "import pickle\nos.system('x')\nrun(['x'], shell=True)\ntry:\n    x\nexcept:\n    y\n"
+    assert [line for line, _ in banned_in(ast.parse(text), BANNED_CALLS)] == [1, 2, 3, 6]
 
 
 def text_files():
@@ -164,9 +161,10 @@ def links(path):
             yield target.partition("#")[0]
 
 
-@pytest.mark.parametrize("path", [path for path in FILES if path.suffix == ".md"], ids=name)
-def test_links_inside_the_repository_lead_somewhere(path):
-    assert [target for target in links(path) if not (path.parent / target).exists()] == []
+def test_links_inside_the_repository_lead_somewhere():
+    pages = [path for path in FILES if path.suffix == ".md"]
+    dead = [f"{name(path)}: {to}" for path in pages for to in links(path) if not (path.parent / to).exists()]
+    assert dead == []
 
 
 def test_tests_mirror_the_library():

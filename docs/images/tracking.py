@@ -10,13 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from paramove.action_space.grammar import Grammar
-from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.tracker import ActionTracker
-from paramove.action_space.training import table_action
-from paramove.action_space.video_tracker import believed
-from paramove.action_space.vocabulary import Vocabulary
-from paramove.observation.arm_observer import ArmObserver
+from paramove.action_space import ActionTracker, Grammar, PersonPlacement, Vocabulary, believed, table_action
+from paramove.observation import ArmObserver
 from sim.persons.clips import clips_folder, read_clip
 
 MOMENTS_S = (0.6, 1.2, 1.5, 2.2)

@@ -11,21 +11,25 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.action_space.training import arm_poses
-from paramove.demonstrations import Demonstrations, demonstrations_at, table_targets
-from paramove.demonstrations.arm import ArmLengths
-from paramove.demonstrations.blending import corner_pairs, nine_pairs, phase
-from paramove.demonstrations.reaching import table_place
-from paramove.demonstrations.synthetic import (
+from paramove.action_space import arm_poses
+from paramove.demonstrations import (
     FRAME,
     RESTING_SHOULDER,
     SAMPLE_RATE_HZ,
+    ArmLengths,
+    Demonstrations,
     Demonstrator,
+    corner_pairs,
+    demonstrations_at,
     minimum_jerk,
+    nine_pairs,
+    phase,
+    table_place,
+    table_targets,
 )
-from paramove.documents.array_types import Floats
-from paramove.hmm.sequences import resample
-from paramove.observation.arm_body import POSE_POINTS, ArmSizes, fitted_poses
+from paramove.documents import Floats
+from paramove.hmm import resample
+from paramove.observation import POSE_POINTS, ArmSizes, fitted_poses
 from paramove.phmm import MovementDescription
 from sim.persons.staging import Stop, staged
 

@@ -24,13 +24,9 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 from ruamel.yaml import YAML
 
-from paramove.cameras.calibrated import CalibratedCamera, read_cameras, write_cameras
-from paramove.documents.array_types import Floats, Image, Ints
-from paramove.documents.arrays import read_arrays
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.input_error import InputError
-from paramove.documents.pictures import decoded
-from paramove.observation.arm_body import ArmSizes
+from paramove.cameras import CalibratedCamera, read_cameras, write_cameras
+from paramove.documents import Floats, Image, InputError, Ints, decoded, read_arrays, replacing
+from paramove.observation import ArmSizes
 from paramove.source_code import code_digest
 from sim.persons.performances import KINDS, Act, Split, split_of
 

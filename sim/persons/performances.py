@@ -11,9 +11,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.demonstrations.reaching import table_place
-from paramove.demonstrations.synthetic import RESTING_SHOULDER, RESTING_STERNUM, SAMPLE_RATE_HZ
-from paramove.documents.array_types import Floats
+from paramove.demonstrations import RESTING_SHOULDER, RESTING_STERNUM, SAMPLE_RATE_HZ, table_place
+from paramove.documents import Floats
 from sim.persons import actions
 from sim.persons.performers import (
     FIRST_SEED,

@@ -12,19 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.action_space.placement import PersonPlacement
-from paramove.demonstrations.arm import POINT_NAMES, ArmLengths
-from paramove.demonstrations.synthetic import (
+from paramove.action_space import PersonPlacement
+from paramove.demonstrations import (
+    POINT_NAMES,
     RESTING_SHOULDER,
     SAMPLE_RATE_HZ,
     UPWARD,
+    ArmLengths,
     Demonstrator,
     Timing,
     Variation,
     minimum_jerk,
 )
-from paramove.documents.array_types import Floats
-from paramove.observation.arm_body import ArmSizes
+from paramove.documents import Floats
+from paramove.observation import ArmSizes
 
 FIRST_SEED = 20_600
 """Models are trained with seeds 0 to 7."""

@@ -12,13 +12,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.demonstrations import Demonstrations
-from paramove.demonstrations.recorded_people import RecordedMovement, data_folder, load_recordings
-from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER
-from paramove.documents.array_types import Floats
-from paramove.documents.arrays import read_arrays
-from paramove.hmm.sequences import resample
-from paramove.observation.arm_body import BENT_POSE_POINTS, ArmSizes
+from paramove.demonstrations import (
+    FRAME,
+    RESTING_SHOULDER,
+    Demonstrations,
+    RecordedMovement,
+    data_folder,
+    load_recordings,
+)
+from paramove.documents import Floats, read_arrays
+from paramove.hmm import resample
+from paramove.observation import BENT_POSE_POINTS, ArmSizes
 from paramove.phmm import MovementDescription
 
 DATA_SET = "pointing27"

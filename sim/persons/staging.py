@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.demonstrations.arm import ArmPath, body_points, swivel_towards
-from paramove.demonstrations.synthetic import (
+from paramove.demonstrations import (
     CLOSED,
     OPEN,
     RELAXED,
@@ -22,15 +21,18 @@ from paramove.demonstrations.synthetic import (
     RESTING_STERNUM,
     SAMPLE_RATE_HZ,
     UPWARD,
+    ArmPath,
     Demonstrator,
     arc,
+    body_points,
     kept_away,
     leaning,
     minimum_jerk,
     overreach,
+    swivel_towards,
     usual_elbow,
 )
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 SWIVEL_AT_REST = 0.25
 USUAL_DURATION_S = 3.2

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JsonFileOption, write_numbers
+from paramove.cli import JsonFileOption, write_numbers
 from studies.terminal import marked
 
 FOLDER = Path("runs/evaluation/chapter2")

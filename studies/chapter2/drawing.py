@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from paramove.documents.array_types import Floats
-from paramove.runs.plots import STYLE
+from paramove.documents import Floats
+from paramove.runs import STYLE
 from studies.chapter2.movement import PARAMETER_SHARES, performance, prototype
 from studies.chapter2.training import Moment
 

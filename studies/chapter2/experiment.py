@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import ChainParameters, LeftRightHMM, Parameters
 from studies.chapter2.figures import (
     ERGODIC_10,

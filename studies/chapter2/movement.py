@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 PARAMETER_SHARES = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Parameters of a training set as shares of its bound: with 0.25 those of figures 2.6 and 2.7."""

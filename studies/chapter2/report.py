@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.reports import image, report_page
+from paramove.documents import image, report_page
 from studies.chapter2.drawing import (
     draw_convergence,
     draw_model,

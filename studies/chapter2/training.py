@@ -4,10 +4,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.hmm import ChainParameters, GaussianHMM, Parameters, Topology, TrainingOptions, TrainingSummary
-from paramove.hmm.chain import TopologyName
-from paramove.hmm.training import equal_segments, train
+from paramove.documents import Floats
+from paramove.hmm import (
+    ChainParameters,
+    GaussianHMM,
+    Parameters,
+    Topology,
+    TopologyName,
+    TrainingOptions,
+    TrainingSummary,
+    equal_segments,
+    train,
+)
 from studies.chapter2.figures import LAST, Setting
 from studies.chapter2.movement import ParameterSet, training_set
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from paramove.demonstrations import Demonstrator, demonstrations_at, table_targets
-from paramove.demonstrations.synthetic import Action
-from paramove.documents.array_types import Floats
+from paramove.demonstrations import Action, Demonstrator, demonstrations_at, table_targets
+from paramove.documents import Floats
 from paramove.hmm import resample
 
 ACTIONS: tuple[Action, ...] = ("pointing", "reaching")

@@ -12,7 +12,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JsonFileOption, seeds_in, write_numbers
+from paramove.cli import JsonFileOption, seeds_in, write_numbers
 from paramove.documents import exit_codes
 from studies.terminal import marked, stored_results
 

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paramove.documents.array_types import Floats
-from paramove.runs.plots import STYLE
+from paramove.documents import Floats
+from paramove.runs import STYLE
 from studies.chapter2.drawing import BLUE, GREY, RED, ellipse
 from studies.chapter2.movement import prototype
 from studies.chapter4.line_movement import SHOWN

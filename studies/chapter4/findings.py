@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.chapter4.kinds import IPHMM_2, IPHMM_3, LPHMM_2, LPHMM_3
 from studies.chapter4.line_movement import THESIS_TRAINING_S
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from paramove.alignment import movement_distance
-from paramove.documents.array_types import Floats
-from paramove.hmm.synthesis import Path
+from paramove.documents import Floats
+from paramove.hmm import Path
 from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, PolynomialPHMM
 from studies.chapter4.kinds import BY_NAME, Kind
 from studies.chapter4.raster import (

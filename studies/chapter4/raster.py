@@ -8,9 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, redirect_demonstrations, table_targets
-from paramove.demonstrations.synthetic import Action
-from paramove.documents.array_types import Floats, Ints
+from paramove.demonstrations import SAMPLE_RATE_HZ, Action, demonstrations_at, redirect_demonstrations, table_targets
+from paramove.documents import Floats, Ints
 from paramove.hmm import LeftRightHMM, resample
 from studies.movements.tasks import raster_tasks
 

@@ -20,7 +20,7 @@ from paramove.demonstrations import (
     table_place,
     train_pointing_model,
 )
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.phmm import LinearPHMM, ParametricHMM, QuadraticPHMM
 
 STATES, D_MIN, D_MAX, FRAMES = 32, 2, 3, 80

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.reports import report_page, section
+from paramove.documents import report_page, section
 from studies.chapter4 import drawing
 from studies.chapter4.experiments import LINE, MODELS, SURFACES
 from studies.chapter4.findings import findings_of

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.chapter4.experiments import (
     FIT,
     HMMLEARN,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.reports import table
+from paramove.documents import table
 from studies.chapter4.findings import THESIS_CLASSIFICATION, THESIS_VARIATION, Finding
 from studies.chapter4.summary import UNTYPICAL, Interval
 from studies.chapter4.targets import Target

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from paramove.demonstrations import POINT_NAMES
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.movements.disturbed import SENSOR_NOISE_M
 
 TIP = POINT_NAMES.index("index")

@@ -11,7 +11,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JsonFileOption, write_numbers
+from paramove.cli import JsonFileOption, write_numbers
 from paramove.documents import exit_codes
 from studies.terminal import marked, say_error, stored_results
 
@@ -71,8 +71,8 @@ def chapter6(
 
 def _prepared(selection: Selection, clips: Path | None, data: Path | None, console: Console) -> list[Piece]:
     """All tracks, when their clips are there and what the trackers need is learned."""
-    from paramove.demonstrations.recorded_people import RecordingsError
-    from paramove.documents.input_error import InputError
+    from paramove.demonstrations import RecordingsError
+    from paramove.documents import InputError
     from studies.chapter6.experiments import pieces, train
 
     try:

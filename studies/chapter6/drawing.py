@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.chapter6.measures import LOST_OTHERWISE_M, Track
 
 HUES = {

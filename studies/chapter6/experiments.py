@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 import cv2
 
-from paramove.documents.input_error import InputError
-from paramove.observation.options import Likelihood
+from paramove.documents import InputError
+from paramove.observation import Likelihood
 from paramove.source_code import code_digest
 from sim.persons.clips import (
     CAMERAS,

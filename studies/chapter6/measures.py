@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.chapter6.vocabularies import BY_OTHERS
 
 TARGET_MARGIN_S = 0.5

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.documents.reports import report_page, section
+from paramove.documents import Floats, report_page, section
 from sim.persons.clips import Clip, clips_code
 from studies.chapter4.drawing import drawn
 from studies.chapter6 import drawing

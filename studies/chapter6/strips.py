@@ -9,9 +9,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats, Image, Ints
-from paramove.observation.arm_observer import ArmObserver
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, Image, Ints
+from paramove.observation import ArmObserver
 from sim.persons.clips import Clip
 from studies.chapter6.measures import Track
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from sim.persons.performances import KINDS
 from studies.chapter6.experiments import ALL_VIEWS, TRACKED_KINDS
 from studies.chapter6.measures import DUAL, LOST_M, RECOGNISED, Track

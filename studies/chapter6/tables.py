@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from paramove.documents.reports import table
+from paramove.documents import table
 from studies.chapter6.findings import TABLE_6_1, Finding
 from studies.chapter6.goals import Goal
 from studies.chapter6.vocabularies import BY_OTHERS

@@ -10,13 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.target_detection import DetectedTarget
-from paramove.action_space.tracker import ActionBelief, ActionTracker
-from paramove.action_space.video_tracker import believed
-from paramove.observation.arm_body import HAND
-from paramove.observation.arm_observer import ArmObserver
-from paramove.observation.options import Likelihood, ObservationOptions
+from paramove.action_space import ActionBelief, ActionTracker, DetectedTarget, PersonPlacement, believed
+from paramove.observation import HAND, ArmObserver, Likelihood, ObservationOptions
 from paramove.phmm import ParametricHMM
 from sim.persons.clips import TABLE, Clip, read_clip
 from sim.persons.performances import Act

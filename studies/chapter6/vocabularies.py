@@ -9,12 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.action_space.grammar import Grammar
-from paramove.action_space.grammar_file import parsed_grammar
-from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.training import cached_action
-from paramove.action_space.vocabulary import ActionModel, Vocabulary, table_target
-from paramove.documents.array_types import Floats
+from paramove.action_space import (
+    ActionModel,
+    Grammar,
+    PersonPlacement,
+    Vocabulary,
+    cached_action,
+    parsed_grammar,
+    table_target,
+)
+from paramove.documents import Floats
 from sim.persons.actions import EYE, FAR_ORIGIN, SHOWN, far_place
 from sim.persons.performances import recording_of
 from sim.persons.recorded import direction_place, recorded_demonstrations

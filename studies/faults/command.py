@@ -12,7 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from paramove.cli.evaluation_io import PROGRESS, JsonFileOption, workspace_here, write_numbers
+from paramove.cli import PROGRESS, JsonFileOption, workspace_here, write_numbers
 from paramove.documents import exit_codes
 
 RUNS = Path("runs/kills")
@@ -42,7 +42,7 @@ def kills(
     process is back, whether the arm ever jumped, how the run ends, what is left over. Ctrl-C and the same command
     again: goes on with the cases that are missing. Exit codes: 0 all passed; 3 not all did; 130 interrupted.
     """
-    from paramove.supervision.launch_file import load
+    from paramove.supervision import load
     from studies.faults.kill_batch import KillOptions, finished
     from studies.faults.kill_cases import CaseError, cases_of
     from studies.faults.kill_table import LEGEND, problems_of, table_of

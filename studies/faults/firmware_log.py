@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 
 FILE = "firmware_frames.int16"
 SPAN = 8  # frames; over fewer, rounding to counts is larger than the limit of the acceleration

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from studies.faults.kill_cases import KillCase, runs_of
 from studies.faults.kill_run import InterruptedRunError, KillResult, KillRun
 

@@ -7,7 +7,7 @@ import signal
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from paramove.supervision.launch_schema import LaunchFile
+from paramove.supervision import LaunchFile
 
 LAUNCHER = "launcher"
 SIGNALS = {"KILL": signal.SIGKILL, "STOP": signal.SIGSTOP}

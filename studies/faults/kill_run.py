@@ -14,7 +14,7 @@ from typing import Any
 
 from paramove.documents import exit_codes
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from studies.faults import firmware_log
 from studies.faults.kill_cases import LAUNCHER, SIGNALS, Expected, KillCase
 from studies.faults.leftovers import left_over

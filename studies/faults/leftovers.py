@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from paramove.bus.endpoint import is_alive
+from paramove.bus import is_alive
 
 
 def processes_of(domain: str) -> list[tuple[int, str]]:

@@ -12,9 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from paramove.bus import topics
-from paramove.bus.exchange import Exchange
-from paramove.bus.settings import BusSettings, default_folder
+from paramove.bus import BusSettings, Exchange, default_folder, topics
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.safety_state_pb2 import SafetyState

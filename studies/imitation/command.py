@@ -10,7 +10,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import seeds_in, workspace_here
+from paramove.cli import seeds_in, workspace_here
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.alignment import warp
-from paramove.documents.array_types import Floats, Ints
-from paramove.motion.reaching_movement import ArmPoses
+from paramove.documents import Floats, Ints
+from paramove.motion import ArmPoses
 
 SIGNIFICANT = (20, 60)
 """The significant states, first and last, counted from 1 (5.2.7): outside them base poses differ by themselves."""

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from paramove.demonstrations.reaching import train_reaching_model
-from paramove.motion.arm_pose import ArmPoseSolver
-from paramove.motion.conversion import RobotMovement
-from paramove.robots.description import RobotDescription
+from paramove.demonstrations import train_reaching_model
+from paramove.motion import ArmPoseSolver, RobotMovement
+from paramove.robots import RobotDescription
 from studies.imitation.errors import SIGNIFICANT, Errors, Movement, errors_of, largest, ranges
 from studies.imitation.reference import ReferenceKind, References, on_robot, reference_movement
 

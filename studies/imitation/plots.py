@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from paramove.runs.plots import STYLE
+from paramove.runs import STYLE
 from studies.imitation.errors import SIGNIFICANT, Errors
 from studies.imitation.experiment import (
     CENTRE,

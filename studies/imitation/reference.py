@@ -7,17 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from paramove.demonstrations.arm import POINT_NAMES
-from paramove.demonstrations.reaching import demonstrations_at, reaching_grid_demonstrations
-from paramove.documents.array_types import Floats
-from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
-from paramove.hmm.sequences import resample
-from paramove.motion.arm_pose import ArmPoseSolver
-from paramove.motion.conversion import RobotMovement
-from paramove.motion.planned_motion import RelocationOptions
-from paramove.motion.reaching_movement import ArmPoses
-from paramove.phmm import InterpolativePHMM
-from paramove.phmm.synchronisation import synchronised
+from paramove.demonstrations import POINT_NAMES, demonstrations_at, reaching_grid_demonstrations
+from paramove.documents import Floats
+from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions, resample
+from paramove.motion import ArmPoses, ArmPoseSolver, RelocationOptions, RobotMovement
+from paramove.phmm import InterpolativePHMM, synchronised
 from studies.imitation.errors import Movement, RobotArm
 
 ReferenceKind = Literal["own", "global"]

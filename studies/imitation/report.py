@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.reports import image, report_page
+from paramove.documents import image, report_page
 from studies.imitation.experiment import Experiment, numbers_of
 from studies.imitation.plots import PLOTS, png_of
 from studies.imitation.reasons import LimitUse, limit_uses, why

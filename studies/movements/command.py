@@ -12,7 +12,7 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JsonFileOption, workspace_here, write_numbers
+from paramove.cli import JsonFileOption, workspace_here, write_numbers
 from paramove.documents import exit_codes
 from studies.terminal import say_error, stored_results
 
@@ -115,7 +115,7 @@ def _chosen(rows: Sequence[Row], methods: list[str] | None) -> list[Row]:
 
 
 def _tasks(on: Scope, data: Path | None, wanted: list[str] | None) -> dict[str, list[Fold]]:
-    from paramove.demonstrations.recorded_people import RecordingsError
+    from paramove.demonstrations import RecordingsError
     from studies.movements.tasks import raster_tasks, real_tasks
 
     folds: dict[str, list[Fold]] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 SENSOR_NOISE_M = 0.001
 

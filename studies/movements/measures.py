@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2, rankdata
 
 from paramove.alignment import movement_distance
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, Estimate
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 SYNTHESIS, THETA, CLASSES, BEGINNINGS, TYPICALITY = "synthesis", "theta", "classes", "beginnings", "typicality"
 """What a method can do, as it says itself; what it cannot is a dash in the tables."""

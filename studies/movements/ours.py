@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
 from paramove.phmm import CubicPHMM, LinearPHMM, MovementClassifier, ParametricHMM, PolynomialPHMM, QuadraticPHMM
 from studies.movements.method import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.movements.method import Estimate, Examples, Method, NotAble
 
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from paramove.runs.plots import STYLE
+from paramove.runs import STYLE
 from studies.movements.summary import Measured, Quantity
 from studies.movements.trial import SHARES
 

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.reports import report_page
+from paramove.documents import report_page
 from studies.movements import plots
 from studies.movements.summary import QUANTITIES, SECONDS, Measured, Quantity
 from studies.movements.tasks import FIRST_MS

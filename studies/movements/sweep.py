@@ -19,7 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.linear_algebra_threads import ONE_THREAD
 from paramove.source_code import code_digest
 from studies.movements.method import Method

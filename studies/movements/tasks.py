@@ -22,16 +22,18 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations import SAMPLE_RATE_HZ, demonstrations_at, table_targets
-from paramove.demonstrations.recorded_people import (
+from paramove.demonstrations import (
     RATE_HZ,
+    SAMPLE_RATE_HZ,
     RecordedMovement,
     Recordings,
     RecordingsError,
     data_folder,
+    demonstrations_at,
     load_recordings,
+    table_targets,
 )
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.movements.measures import ThetaKind
 from studies.movements.method import Examples
 from studies.movements.per_action import first_frames

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library

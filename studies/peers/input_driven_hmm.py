@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.hidden_markov import left_right

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from studies.movements.method import Estimate
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library

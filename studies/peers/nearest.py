@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library

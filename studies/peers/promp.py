@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.peers.library import library

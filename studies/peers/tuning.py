@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, SYNTHESIS, THETA, Estimate, Examples, Method, NotAble
 

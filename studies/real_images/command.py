@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli.evaluation_io import JsonFileOption, write_numbers
+from paramove.cli import JsonFileOption, write_numbers
 from paramove.documents import exit_codes
 
 REAL_IMAGES_FOLDER = Path("runs/evaluation/real_images")
@@ -28,7 +28,7 @@ def real_images(
     the hand is at most 25 px in both ranges of frames with every seed; 3 it is not; 66 the recording or a part of it
     is missing.
     """
-    from paramove.documents.input_error import InputError
+    from paramove.documents import InputError
     from studies.real_images import seated_person
     from studies.real_images.experiment import numbers_of, recording_folder, resting_numbers, run_all
     from studies.real_images.report import write_report

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from paramove.demonstrations.recorded_people import RecordingsError, data_folder
-from paramove.documents.input_error import InputError
+from paramove.demonstrations import RecordingsError, data_folder
+from paramove.documents import InputError
 from studies.real_images import seated_person
 from studies.real_images.replay import RATE_HZ, RETARGETED, Said, replayed
 from studies.real_images.scores import GOAL_PX, Distances, distances, is_met, read_reference

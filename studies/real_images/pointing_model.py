@@ -10,14 +10,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.action_space.placement import PersonPlacement
-from paramove.action_space.training import cached_action
-from paramove.action_space.vocabulary import ActionModel
-from paramove.demonstrations import Demonstrations
-from paramove.demonstrations.arm import elbow_positions, swivel_towards, unit
-from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, minimum_jerk
-from paramove.documents.array_types import Floats
-from paramove.observation.arm_body import POSE_POINTS, ArmSizes
+from paramove.action_space import ActionModel, PersonPlacement, cached_action
+from paramove.demonstrations import (
+    FRAME,
+    RESTING_SHOULDER,
+    SAMPLE_RATE_HZ,
+    Demonstrations,
+    elbow_positions,
+    minimum_jerk,
+    swivel_towards,
+    unit,
+)
+from paramove.documents import Floats
+from paramove.observation import POSE_POINTS, ArmSizes
 from paramove.phmm import CubicPHMM, MovementDescription
 
 NAME = "pointing_seated"

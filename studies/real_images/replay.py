@@ -13,21 +13,23 @@ import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 
-from paramove.action_space.grammar import Grammar
-from paramove.action_space.messages import arm_pose_message, estimate_message, outline_message
-from paramove.action_space.particle_filter import FilterOptions
-from paramove.action_space.propagation import PropagationOptions
-from paramove.action_space.tracker import ActionTracker, TrackerOptions
-from paramove.action_space.video_tracker import VideoTracker
-from paramove.action_space.vocabulary import Vocabulary
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.cameras.frame_sources import open_source
-from paramove.cameras.frames import EndOfFrames, FrameChecks, decode, encode
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.action_space import (
+    ActionTracker,
+    FilterOptions,
+    Grammar,
+    PropagationOptions,
+    TrackerOptions,
+    VideoTracker,
+    Vocabulary,
+    arm_pose_message,
+    estimate_message,
+    outline_message,
+)
+from paramove.cameras import CalibratedCamera, EndOfFrames, FrameChecks, decode, encode, open_source
+from paramove.documents import Floats, InputError
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation.arm_observer import ArmObserver
+from paramove.observation import ArmObserver
 from studies.real_images import seated_person
 from studies.real_images.pointing_model import NAME, pointing_action
 

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats
-from paramove.documents.reports import report_page, section
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, report_page, section
 from studies.chapter4.drawing import drawn
 from studies.real_images.experiment import JUDGED, Replay
 from studies.real_images.scores import GOAL_PX, RANGES, middle_of_hand

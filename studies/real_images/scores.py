@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.arrays import read_arrays
-from paramove.documents.input_error import InputError
-from paramove.observation.arm_body import fitted_poses
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, InputError, Ints, read_arrays
+from paramove.observation import fitted_poses
 from studies.real_images.replay import Said
 from studies.real_images.seated_person import SIZES
 

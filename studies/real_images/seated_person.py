@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.action_space.placement import PersonPlacement
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.demonstrations.arm import unit
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
-from paramove.observation.arm_body import ArmSizes, fitted_poses
+from paramove.action_space import PersonPlacement
+from paramove.cameras import CalibratedCamera
+from paramove.demonstrations import unit
+from paramove.documents import Floats, InputError
+from paramove.observation import ArmSizes, fitted_poses
 
 INTRINSICS = "cam_params_realsense.json"
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.observation.arm_body import HAND
+from paramove.documents import Floats, Ints
+from paramove.observation import HAND
 
 KERNEL_WIDTHS = (0.15, 0.10, 0.05)
 """sigma_1 to sigma_3 of (6.19), m."""

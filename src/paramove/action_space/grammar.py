@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import nearest
+from paramove.documents import Floats, InputError, Ints, nearest
 
 NEW = -1
 """In a binding: this place is unknown and drawn anew."""

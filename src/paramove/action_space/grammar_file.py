@@ -18,10 +18,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from paramove.action_space.grammar import NEW, Follower, Grammar, Step, Switching
-from paramove.documents.files import read_text
-from paramove.documents.input_error import InputError
-from paramove.documents.positions import MAX_CHARACTERS, Document, DocumentError, KeyPath, read_mapping
-from paramove.documents.wording import nearest
+from paramove.documents import (
+    MAX_CHARACTERS,
+    Document,
+    DocumentError,
+    InputError,
+    KeyPath,
+    nearest,
+    read_mapping,
+    read_text,
+)
 
 EXAMPLE = "begin: point(a)"
 KEYS = ("description", "begin", "after", "actions", "switching")

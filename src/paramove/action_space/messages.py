@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
 from paramove.action_space.video_tracker import TrackedMoment
-from paramove.cameras.calibrated import WORLD_FRAME
-from paramove.documents.array_types import Floats
+from paramove.cameras import WORLD_FRAME
+from paramove.documents import Floats
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation.arm_body import BENT_POSE_POINTS, HAND
+from paramove.observation import BENT_POSE_POINTS, HAND
 
 NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", "wrist": "wrist"}
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramove.action_space.propagation import Particles, Propagation
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError, Ints
 
 ARRAYS = ("step", "origin", "theta", "tau", "deviation", "poses")
 """Of particles, beside their weights."""

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.demonstrations.arm import ArmLengths
-from paramove.demonstrations.synthetic import RESTING_SHOULDER
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.demonstrations import RESTING_SHOULDER, ArmLengths
+from paramove.documents import Floats, InputError
 
 SCALES = (0.3, 2.0)
 """Arm lengths over the demonstrator's: a figure of a small robot's size to more than any person. Millimetres lie far

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled_sums
+from paramove.documents import Floats, Ints
+from paramove.hmm import compiled_sums
 
 
 @compiled_sums

@@ -8,8 +8,7 @@ import numpy as np
 
 from paramove.action_space.grammar import BASE, Grammar
 from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError, Ints
 
 THESIS_RATE_HZ = 8.0
 """The diffusions of 6.4.4 are told per frame at this rate. Here their variances grow with time, so that they are the

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from paramove.action_space.estimates import ThetaEstimate, theta_estimate
 from paramove.action_space.propagation import Particles
 from paramove.action_space.vocabulary import PLACE_SIZE, ActionModel, Vocabulary
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 CONTACT = 0.8
 """Share of the greatest dependence of the hand on a place from which on the hand is at that place."""

@@ -18,11 +18,9 @@ from paramove.action_space.tracker import ActionTracker, TrackerOptions
 from paramove.action_space.training import table_action
 from paramove.action_space.video_tracker import VideoTracker
 from paramove.action_space.vocabulary import ActionModel, Vocabulary
-from paramove.cameras.calibrated import measured_cameras, measured_file
-from paramove.documents.input_error import InputError
-from paramove.documents.positions import read_document
-from paramove.observation.arm_body import ArmSizes
-from paramove.observation.arm_observer import ArmObserver
+from paramove.cameras import measured_cameras, measured_file
+from paramove.documents import InputError, read_document
+from paramove.observation import ArmObserver, ArmSizes
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 LEAST_GROWN = 0.8

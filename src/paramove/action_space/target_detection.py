@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramove.action_space.estimates import ThetaEstimate
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.input_error import InputError
-from paramove.observation.presence import Presence
+from paramove.documents import InputError
+from paramove.observation import Presence
 
 KEPT_SHARE = 0.9
 """Of the greatest change: while the arm is lost it must fall below that."""

@@ -26,10 +26,8 @@ from paramove.action_space.reached_place import ReachedPlace, reached_place
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth
 from paramove.action_space.vocabulary import Vocabulary
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.input_error import InputError
-from paramove.observation.arm_body import HAND
-from paramove.observation.presence import Presence
+from paramove.documents import Floats, InputError, Ints
+from paramove.observation import HAND, Presence
 
 LEAST_CONCENTRATION = 0.8
 """Length of the mean of the progress as a direction, 0 (spread over all of the action) to 1."""

@@ -11,14 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.action_space.vocabulary import POSE_SIZES, ActionModel, table_target
-from paramove.demonstrations import POINT_NAMES, Demonstrations, demonstrations_at, table_targets
-from paramove.demonstrations.synthetic import FRAME, SAMPLE_RATE_HZ, Action
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.demonstrations import (
+    FRAME,
+    POINT_NAMES,
+    SAMPLE_RATE_HZ,
+    Action,
+    Demonstrations,
+    demonstrations_at,
+    table_targets,
+)
+from paramove.documents import Floats, InputError
 from paramove.hmm import TrainingOptions
-from paramove.observation.arm_body import BENT_POSE_POINTS
-from paramove.phmm import MovementDescription, PolynomialPHMM, QuadraticPHMM
-from paramove.phmm.model_cache import cached_model
+from paramove.observation import BENT_POSE_POINTS
+from paramove.phmm import MovementDescription, PolynomialPHMM, QuadraticPHMM, cached_model
 
 STATES = 80
 TRACKED_POINTS = ("shoulder", "elbow", "index")

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramove.action_space.tracker import ActionBelief, ActionTracker
-from paramove.cameras.aligned_views import AlignedViews, Views
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.cameras.watch import CameraWatch
-from paramove.documents.array_types import Floats, Image
-from paramove.observation.arm_observer import ArmObserver
+from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
+from paramove.documents import Floats, Image
+from paramove.observation import ArmObserver
 
 LEAST_SHARPNESS = 3.0
 """Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above

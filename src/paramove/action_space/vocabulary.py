@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 
 from paramove.action_space.pose_kernels import write_polynomial_poses, write_tabled_poses
 from paramove.demonstrations import table_place
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError, Ints
 from paramove.hmm import LeftRightHMM
-from paramove.observation.arm_body import BENT_POSE_POINTS, HAND, POSE_POINTS
+from paramove.observation import BENT_POSE_POINTS, HAND, POSE_POINTS
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 POSE_SIZES = (3 * len(POSE_POINTS), 3 * len(BENT_POSE_POINTS))

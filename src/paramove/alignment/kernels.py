@@ -7,8 +7,8 @@ can do; the recurrence, which they cannot, is left with one addition and one com
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled
+from paramove.documents import Floats, Ints
+from paramove.hmm import compiled
 
 
 @compiled

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.alignment import kernels
-from paramove.documents.array_types import Ints
-from paramove.hmm.sequences import checked_sequence
+from paramove.documents import Ints
+from paramove.hmm import checked_sequence
 
 StepPattern = Literal["A", "B"]
 

@@ -11,7 +11,7 @@ from paramove.applications.table import Sighting
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
-from paramove.objects.homography import HomographyError, PlaneHomography
+from paramove.objects import HomographyError, PlaneHomography
 
 HELD_STILL_S = 1.0
 HAND_AWAY_S = 0.5

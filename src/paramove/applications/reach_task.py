@@ -13,15 +13,12 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from pydantic import AfterValidator, BaseModel, ConfigDict, model_validator
 
 from paramove.applications.arm_watch import ArmWatch
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
-from paramove.motion.hand_poses import FARTHEST_M, metres
-from paramove.motion.planned_motion import PlannedMotion, motion_message
-from paramove.motion.servo_arm_reaching import ServoArmReaching
+from paramove.documents import Floats, InputError
+from paramove.motion import FARTHEST_M, PlannedMotion, ServoArmReaching, metres, motion_message
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.robots.out_of_reach import OutOfReachError
+from paramove.robots import OutOfReachError
 
 REST_NS = 300_000_000
 STALE_NS = 1_000_000_000

@@ -4,3 +4,7 @@ A node needs `paramove.bus.topics` (the one table of topics) and `paramove.bus.n
 The simulator needs `paramove.bus.barrier`, a replay test `paramove.bus.recorded`, a tool that looks on
 `paramove.bus.inspection`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -31,9 +31,7 @@ from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
-from paramove.documents.positions import read_document
+from paramove.documents import InputError, exit_codes, read_document
 
 __all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "publish_each", "read_node_file"]
 

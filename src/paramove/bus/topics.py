@@ -16,7 +16,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from paramove.documents.wording import nearest
+from paramove.documents import nearest
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.clock_pb2 import Clock

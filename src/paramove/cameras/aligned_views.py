@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 
 PATIENCE_PERIODS = 3.0
 """A camera that is silent for so many of its periods is gone: nobody waits for it any longer."""

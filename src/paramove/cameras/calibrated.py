@@ -20,10 +20,7 @@ from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
-from paramove.documents.array_types import Floats, Image
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.input_error import InputError
-from paramove.documents.positions import read_document
+from paramove.documents import Floats, Image, InputError, read_document, replacing
 
 MOST_CAMERAS = 4
 WORLD_FRAME = "table"

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.cameras.charuco_board import Board, BoardView
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 
 LEAST_VIEWS = 6
 GOOD_VIEWS = 15

@@ -16,9 +16,7 @@ import numpy as np
 
 from paramove.cameras.calibration import GOOD_VIEWS, CalibrationError
 from paramove.cameras.charuco_board import BoardFinder, BoardView
-from paramove.documents.array_types import Image
-from paramove.documents.input_error import InputError
-from paramove.documents.pictures import opened_video, read_picture
+from paramove.documents import Image, InputError, opened_video, read_picture
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 TABLE_PREFIX = "table"
@@ -134,6 +132,7 @@ class LiveImages:
         self._finder = BoardFinder()
 
     def held(self) -> Found:
+        """Views of the board before the camera, the table's included. Raises InputError."""
         collector, looked_at, newest_s = ViewCollector(), 0, None
         self._say(f"{self.name}: hold the board before the camera, still for a moment, each time at another angle")
         for time_s, view in self._looks():
@@ -152,6 +151,7 @@ class LiveImages:
         return Found(tuple(collector.views), looked_at)
 
     def table(self) -> Found:
+        """Views of the board on the table. Raises InputError."""
         self._say(f"{self.name}: waiting until the board lies still on the table")
         lying: list[BoardView] = []
         start_s = None

@@ -15,8 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Image
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, Image, InputError
 
 COLUMNS, ROWS = 8, 5
 MARKERS = COLUMNS * ROWS // 2

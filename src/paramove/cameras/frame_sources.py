@@ -14,9 +14,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from paramove.cameras.frames import EndOfFrames, Frame, FrameError, image_of_raw
 from paramove.cameras.replayed_frames import FolderFrames, RecordingFrames
 from paramove.devices import holders
-from paramove.documents.array_types import Image
-from paramove.documents.input_error import InputError
-from paramove.documents.pictures import opened_video
+from paramove.documents import Image, InputError, opened_video
 
 _log = logging.getLogger(__name__)
 
@@ -104,6 +102,7 @@ class FileFrames:
         self._grabbed = 0
 
     def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        """The frame of the video that is due. Raises EndOfFrames after the last one, FrameError."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         # A quarter of a frame of tolerance, as ticks are rounded to milliseconds.
         due = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + 0.25) + 1
@@ -119,6 +118,7 @@ class FileFrames:
         return Frame(image, now_ns, self._grabbed - 1)
 
     def close(self) -> None:
+        """Close the file."""
         self._capture.release()
 
     def _end(self) -> EndOfFrames:
@@ -164,6 +164,7 @@ class DeviceFrames:
         self._reader = _Reader(self._open())
 
     def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+        """The latest frame, None if there is no new one yet. Raises FrameError if none has come for long."""
         self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
         image = self._reader.take()
         if image is None:
@@ -177,6 +178,7 @@ class DeviceFrames:
         return Frame(image, now_ns, self._index - 1)
 
     def close(self) -> None:
+        """Stop reading and give the device back."""
         self._reader.stop()
 
     def _open(self) -> Capture:

@@ -13,9 +13,7 @@ import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.documents.array_types import Image
-from paramove.documents.input_error import InputError
-from paramove.documents.pictures import JPEG, decoded
+from paramove.documents import JPEG, Image, InputError, decoded
 
 CAMERA_FRAME = "camera_optical"
 DARK_LEVEL = 16.0

@@ -12,7 +12,7 @@ import numpy as np
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.cameras.calibration import CalibrationError, Lens
 from paramove.cameras.charuco_board import Board, BoardView
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 LEAST_NOISE_PX = 0.05
 """Corners are never found better than this, however few there are to show it."""

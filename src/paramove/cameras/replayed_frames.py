@@ -9,9 +9,8 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from paramove.cameras.frames import EndOfFrames, Frame, FrameError, decode
-from paramove.documents.input_error import InputError
-from paramove.documents.pictures import read_picture
-from paramove.recording.reader import Recorded, read
+from paramove.documents import InputError, read_picture
+from paramove.recording import Recorded, read
 
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
 TICK_SHARE = 0.25

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 
 LEAST_BASELINE = 0.01
 """m. Cameras nearer to each other see the same."""

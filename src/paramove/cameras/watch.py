@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 
 SILENT_S = 1.0
 """A camera of which nothing was heard for so long is told."""

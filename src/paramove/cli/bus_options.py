@@ -9,9 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paramove.bus import topics
-from paramove.bus.settings import default_folder
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, default_folder, topics
 from paramove.cli import completions
 
 DomainOption = Annotated[

@@ -10,17 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.documents import exit_codes
-from paramove.documents.array_types import Image
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import printable
+from paramove.documents import Image, InputError, exit_codes, printable
 
 if TYPE_CHECKING:
-    from paramove.cameras.calibration import Lens
-    from paramove.cameras.calibration_images import ImageSource
-    from paramove.cameras.charuco_board import Board, BoardView
-    from paramove.cameras.placement import Placement
-    from paramove.documents.array_types import Image
+    from paramove.cameras import Board, BoardView, ImageSource, Lens, Placement
+    from paramove.documents import Image
 
 app = typer.Typer(name="calibrate", no_args_is_help=True, help="Print the calibration board; calibrate cameras.")
 
@@ -43,7 +37,7 @@ def board(
 
     Exit codes: 0 written; 77 not allowed to write; 78 no such board.
     """
-    from paramove.cameras.charuco_sheet import PAPERS, board_sheet
+    from paramove.cameras import PAPERS, board_sheet
 
     try:
         side = None if square is None else length(square, "--square")
@@ -68,8 +62,8 @@ def markers(
 
     Exit codes: 0 written; 77 not allowed to write; 78 no such markers.
     """
-    from paramove.cameras.charuco_sheet import marker_sheet
-    from paramove.observation.markers import DEFAULT_MARKERS, ArucoMarker
+    from paramove.cameras import marker_sheet
+    from paramove.observation import DEFAULT_MARKERS, ArucoMarker
 
     numbers = {name: marker.number for name, marker in DEFAULT_MARKERS.items() if isinstance(marker, ArucoMarker)}
     try:
@@ -108,7 +102,7 @@ def cameras(
 
     Exit codes: 0 written; 66 no such source; 77 not allowed to write; 78 images that do not calibrate, with the cause.
     """
-    from paramove.cameras.calibrated import write_cameras
+    from paramove.cameras import write_cameras
 
     try:
         placed = _calibrated(sources, _board(square, thickness), _pixels(size))
@@ -129,7 +123,7 @@ def length(text: str, option: str) -> float:
 
 
 def _board(square: str, thickness: str) -> Board:
-    from paramove.cameras.charuco_board import Board
+    from paramove.cameras import Board
 
     return Board(length(square, "--square"), thickness=length(thickness, "--thickness"))
 
@@ -143,8 +137,7 @@ def _pixels(text: str) -> tuple[int, int]:
 
 def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> list[Placement]:
     """First all lenses, then all places: the board lies on the table once for all cameras."""
-    from paramove.cameras.calibration import CalibrationError, calibrate_lens, check_square
-    from paramove.cameras.placement import place_camera
+    from paramove.cameras import CalibrationError, calibrate_lens, check_square, place_camera
 
     sources = [_source(text, size) for text in texts]
     names = [source.name for source in sources]
@@ -180,7 +173,7 @@ def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> li
 
 
 def _tell_lens(lens: Lens, looked_at: int) -> None:
-    from paramove.cameras.calibration import GOOD_ERROR_PX
+    from paramove.cameras import GOOD_ERROR_PX
 
     verdict = "good" if lens.error_px < GOOD_ERROR_PX else f"not good, < {GOOD_ERROR_PX:g} px is"
     focal = 0.5 * (lens.matrix[0, 0] + lens.matrix[1, 1])
@@ -212,7 +205,7 @@ def _tell_agreement(placed: Sequence[Placement], board: Board) -> None:
         return
     import numpy as np
 
-    from paramove.cameras.stereo import StereoRig
+    from paramove.cameras import StereoRig
 
     rig = StereoRig([placement.camera for placement in placed])
     corners = board.corners()
@@ -227,7 +220,7 @@ def _is_live(text: str) -> bool:
 
 
 def _source(text: str, size: tuple[int, int]) -> ImageSource:
-    from paramove.cameras.calibration_images import LiveImages, file_source
+    from paramove.cameras import LiveImages, file_source
 
     if not _is_live(text):
         return file_source(Path(text))
@@ -237,8 +230,7 @@ def _source(text: str, size: tuple[int, int]) -> ImageSource:
 
 def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Image]]:
     """Frames of a camera without end, with the time since the first, s."""
-    from paramove.cameras.frame_sources import DeviceFrames
-    from paramove.cameras.frames import FrameError
+    from paramove.cameras import DeviceFrames, FrameError
 
     frames = DeviceFrames(device, *size, patience_ns=LIVE_PATIENCE_NS)
     try:

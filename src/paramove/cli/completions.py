@@ -61,7 +61,7 @@ def nodes(incomplete: str) -> list[str]:
 
 def topics(incomplete: str) -> list[str]:
     """Topics of the table, and the status topics of the nodes on the bus."""
-    from paramove.bus.topics import TOPICS
+    from paramove.bus import TOPICS
 
     statuses = (f"status/{node}" for node in nodes(""))
     return _beginning(incomplete, [*(topic.name for topic in TOPICS if not topic.truth), *statuses])
@@ -69,7 +69,7 @@ def topics(incomplete: str) -> list[str]:
 
 def domains(incomplete: str) -> list[str]:
     """Domains that are, or were, in use."""
-    from paramove.bus.settings import default_folder
+    from paramove.bus import default_folder
 
     with contextlib.suppress(OSError):
         found = [path.name for path in default_folder().parent.iterdir() if path.is_dir()]
@@ -100,7 +100,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _sockets(pattern: str) -> list[Path]:
-    from paramove.bus.settings import default_folder
+    from paramove.bus import default_folder
 
     with contextlib.suppress(OSError):
         return sorted(path for path in default_folder().glob(pattern) if path.suffix != ".lock")
@@ -120,8 +120,8 @@ def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Ite
 
 def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
-    from paramove.documents.positions import DocumentError, read_mapping
-    from paramove.supervision.launch_file import overlay_folder
+    from paramove.documents import DocumentError, read_mapping
+    from paramove.supervision import overlay_folder
 
     modules: dict[str, str] = {}
     with contextlib.suppress(OSError, DocumentError, UnicodeDecodeError):

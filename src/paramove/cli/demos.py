@@ -25,11 +25,10 @@ from paramove.cli.demos_options import (
     table_of,
     words,
 )
-from paramove.documents import exit_codes
-from paramove.documents.wording import printable
+from paramove.documents import exit_codes, printable
 
 if TYPE_CHECKING:
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.demonstrations import DemonstrationSet
 
 app = typer.Typer(
     name="demos", help="List, show, plot, label, import, split and synthesize demonstrations.", no_args_is_help=True
@@ -49,8 +48,7 @@ def list_sets(
 
     Exit codes: 0; 66 there is none; 78 the labels of one are wrong, which is told.
     """
-    from paramove.demonstrations.labels import FILE_NAME
-    from paramove.demonstrations.movement import DemonstrationError
+    from paramove.demonstrations import FILE_NAME, DemonstrationError
 
     files = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + FILE_NAME)})
     if not files:
@@ -74,7 +72,7 @@ def list_sets(
 
 
 def _listed(file: Path) -> dict[str, Any]:
-    from paramove.demonstrations.labels import load_labels
+    from paramove.demonstrations import load_labels
 
     content = load_labels(file).file
     return {
@@ -123,7 +121,7 @@ def show(
 
 
 def _loaded(folder: Path, action: str | None = None, subject: str | None = None) -> DemonstrationSet:
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.demonstrations import DemonstrationSet
 
     found = DemonstrationSet.load(folder)
     return found if action is None and subject is None else found.select(action, subject)
@@ -179,7 +177,7 @@ def plot(
     body: Annotated[bool, typer.Option("--body", help="seen from the person, left arms mirrored")] = False,
 ) -> None:
     """Draw the paths of a body point in space and its coordinates over time, coloured by a parameter."""
-    from paramove.demonstrations.plots import plot_set, write_plot
+    from paramove.demonstrations import plot_set, write_plot
 
     with one_sentence():
         shown = _loaded(folder, action, subject)
@@ -209,9 +207,8 @@ def label(
 
     Comments in labels.yaml are kept; repetitions are counted on. Where there is no labels.yaml, one is made.
     """
-    from paramove.demonstrations.labelling import label as add_labels
-    from paramove.demonstrations.labelling import next_repetition
-    from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
+    from paramove.demonstrations import FILE_NAME, Segment, load_labels, next_repetition
+    from paramove.demonstrations import label as add_labels
 
     if find == (start is not None or end is not None) or (not find and None in (start, end)):
         raise typer.BadParameter("give both --start and --end, or --find", param_hint="--start")
@@ -233,8 +230,7 @@ def label(
 def _segment(recording: str, start: float, end: float, action: str, theta: list[float], subject: str, side: str) -> Any:
     from pydantic import ValidationError
 
-    from paramove.demonstrations.labels import Segment
-    from paramove.demonstrations.movement import DemonstrationError
+    from paramove.demonstrations import DemonstrationError, Segment
 
     try:
         return Segment(
@@ -253,9 +249,7 @@ def _segment(recording: str, start: float, end: float, action: str, theta: list[
 
 def _found_in(recording: Path, point: str) -> list[tuple[float, float]]:
     """Start and end of every movement of a recording, s."""
-    from paramove.demonstrations.labelling import movements_by_speed
-    from paramove.demonstrations.movement import DemonstrationError
-    from paramove.demonstrations.pose_recording import read_poses
+    from paramove.demonstrations import DemonstrationError, movements_by_speed, read_poses
 
     poses = read_poses(recording)
     time = poses.time
@@ -294,8 +288,7 @@ def split(
 
 def _refuse_sets(folders: Sequence[Path]) -> None:
     """Nothing is written if any of the folders holds a set already."""
-    from paramove.demonstrations.labels import FILE_NAME
-    from paramove.demonstrations.movement import DemonstrationError
+    from paramove.demonstrations import FILE_NAME, DemonstrationError
 
     if len({folder.resolve() for folder in folders}) < len(folders):
         raise DemonstrationError("training and test need different folders")
@@ -315,8 +308,7 @@ def synthesize(
     add: Annotated[bool, typer.Option("--add", help="to a set that is there already")] = False,
 ) -> None:
     """Make up a set: a synthetic person reaches for, or points at, a raster of targets over 80 x 30 cm of a table."""
-    from paramove.demonstrations.made_up import synthetic_takes
-    from paramove.demonstrations.writing import write_set
+    from paramove.demonstrations import synthetic_takes, write_set
 
     with one_sentence():
         takes, names = synthetic_takes(action, columns, rows, repetitions, seed)

@@ -21,8 +21,8 @@ from paramove.cli.demos_options import (
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
+    from paramove.demonstrations import Label
     from paramove.demonstrations.importing import Imported, ImportOptions
-    from paramove.demonstrations.writing import Label
 
 PointsOption = Annotated[
     list[str] | None,
@@ -67,8 +67,8 @@ def import_files(
 
     Exit codes: 0; 2 wrong arguments; 66 a file is missing; 78 a file or a movement in it cannot be used.
     """
+    from paramove.demonstrations import Label
     from paramove.demonstrations.importing import import_file
-    from paramove.demonstrations.writing import Label
 
     values = numbers(theta, "--theta")
     given = words(parameters)
@@ -135,8 +135,7 @@ def _tell(results: list[Imported], skip_refused: bool) -> None:
 def _write(
     to: Path, results: list[Imported], names: tuple[str, ...], max_gap: float, repetition: int | None, add: bool
 ) -> None:
-    from paramove.demonstrations.labels import FILE_NAME, load_labels
-    from paramove.demonstrations.writing import write_set
+    from paramove.demonstrations import FILE_NAME, load_labels, write_set
 
     there: dict[tuple[object, ...], int] = {}
     if add and (to / FILE_NAME).exists():

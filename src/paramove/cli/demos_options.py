@@ -11,10 +11,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents import exit_codes
-from paramove.documents.wording import printable
-from paramove.recording.writer import RecordingExistsError
+from paramove.demonstrations import DemonstrationError
+from paramove.documents import exit_codes, printable
+from paramove.recording import RecordingExistsError
 
 SetArgument = Annotated[Path, typer.Argument(metavar="SET", help="folder of a demonstration set")]
 ActionOption = Annotated[str | None, typer.Option(help="only this action")]

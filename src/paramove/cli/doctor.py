@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from paramove.diagnosis.finding import Finding, Level, Machine, Part
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.bus.serial_adapters import BY_ID_VARIABLE
+from paramove.diagnosis import Finding, Level, Machine, Part
+from paramove.documents import InputError, exit_codes
+from paramove.robots.dynamixel import BY_ID_VARIABLE
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,7 +67,7 @@ def _look(part: Part, machine: Machine, fix: bool, yes: bool, as_json: bool) -> 
     """What is found of a part, shown; after something was mended, what is found then."""
     from rich.console import Console
 
-    from paramove.diagnosis.examination import examined
+    from paramove.diagnosis import examined
 
     shown, told = Console(highlight=False), Console(stderr=True)
     with told.status(f"looking at {part.value}"):
@@ -97,7 +96,7 @@ def _show(console: Console, findings: Sequence[Finding]) -> None:
     """A line each, and its remedies indented below."""
     from rich.text import Text
 
-    from paramove.documents.wording import printable
+    from paramove.documents import printable
 
     plain = not console.encoding.lower().startswith("utf")
 

@@ -62,7 +62,7 @@ def rule_learning(
     """
     console = Console(highlight=False, emoji=False)
     results = _batch(console, seeds, jobs, runs, settings or [], overlays or [], again, video, drop_recordings)
-    from paramove.runs.batch_table import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
+    from paramove.runs import LEGEND, TABLE_WIDTH, enough, table_of, totals_of
 
     wide = Console(highlight=False, emoji=False, width=max(console.width, TABLE_WIDTH))
     wide.print(table_of(results))
@@ -91,8 +91,7 @@ def homography(
 
     Exit codes: 0 median error of every run at most 3 mm; 3 larger, or a run never calibrated; 66 no such run.
     """
-    from paramove.runs.homography_accuracy import GOAL_MM, accuracy_of
-    from paramove.runs.recorded_run import RunFolderError, load_run
+    from paramove.runs import GOAL_MM, RunFolderError, accuracy_of, load_run
 
     console = Console(highlight=False, emoji=False)
     if (run_folder is None) == (seeds is None):
@@ -148,7 +147,7 @@ def _batch(
     video: bool,
     drop_recordings: bool,
 ) -> list[dict[str, Any]]:
-    from paramove.runs.batch import BatchOptions, finished, run_batch
+    from paramove.runs import BatchOptions, finished, run_batch
 
     wanted, workspace = seeds_in(seeds), workspace_here()
     folder = (runs or workspace / RUNS).resolve()

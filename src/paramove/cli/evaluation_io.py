@@ -29,7 +29,7 @@ def workspace_here() -> Path:
 
 def seeds_in(text: str) -> list[int]:
     """Seeds of `--seeds`; a text that names none is a wrong use of the command."""
-    from paramove.runs.batch import SeedsError, seeds_of
+    from paramove.runs import SeedsError, seeds_of
 
     try:
         return seeds_of(text)

@@ -11,7 +11,7 @@ import typer
 from paramove.cli import completions
 
 if TYPE_CHECKING:
-    from paramove.supervision.graph import Graph
+    from paramove.supervision import Graph
 
 app = typer.Typer(add_completion=False)
 
@@ -51,8 +51,7 @@ def graph(
     Exit codes: 0 done; 1 nothing is running; 66 no such launch file; 77 the output cannot be written; 78 the launch
     file is wrong.
     """
-    from paramove.supervision.graph import as_mermaid, as_text
-    from paramove.supervision.graph_svg import as_svg
+    from paramove.supervision import as_mermaid, as_svg, as_text
 
     found = _running(domain) if live or name is None else _launched(name, overlays)
     text = {Format.TEXT: as_text, Format.MERMAID: as_mermaid, Format.SVG: as_svg}[form](found)
@@ -68,11 +67,8 @@ def graph(
 
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
-    from paramove.documents import exit_codes
-    from paramove.documents.positions import DocumentError
-    from paramove.supervision.application import NoWorkspaceError, check, find_workspace
-    from paramove.supervision.graph import graph_of
-    from paramove.supervision.launch_file import LaunchFileMissingError, load
+    from paramove.documents import DocumentError, exit_codes
+    from paramove.supervision import LaunchFileMissingError, NoWorkspaceError, check, find_workspace, graph_of, load
 
     try:
         workspace = find_workspace(Path.cwd())
@@ -88,7 +84,7 @@ def _launched(name: str, overlays: list[str] | None) -> Graph:
 
 def _running(domain: str | None) -> Graph:
     from paramove.cli.bus_options import bus_folder
-    from paramove.supervision.graph import running_graph
+    from paramove.supervision import running_graph
 
     folder = bus_folder(domain)
     found = running_graph(folder, folder.name, MEASURED_S)

@@ -15,7 +15,7 @@ app = typer.Typer(add_completion=False)
 def _print_schema(kind: str | None) -> None:
     if kind is None:
         return
-    from paramove.supervision.launch_schema import FILES, editor_schema, schema_as_text
+    from paramove.supervision import FILES, editor_schema, schema_as_text
 
     if kind not in FILES:
         raise typer.BadParameter(f"there are schemas of: {', '.join(FILES)}")

@@ -16,9 +16,8 @@ from typing import Annotated
 import typer
 
 from paramove.cli import completions
-from paramove.documents.wording import printable
-from paramove.supervision.application import find_workspace
-from paramove.supervision.run_logs import LEVELS, SUPERVISOR, LogLine, RunLogs
+from paramove.documents import printable
+from paramove.supervision import LEVELS, SUPERVISOR, LogLine, RunLogs, find_workspace
 
 app = typer.Typer(add_completion=False)
 

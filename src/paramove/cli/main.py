@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from paramove.cli.completions import typed_words
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.linear_algebra_threads import ONE_THREAD
 
 COMMANDS: dict[str, tuple[str, str]] = {

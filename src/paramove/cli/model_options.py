@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ended
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
-from paramove.recording.writer import RecordingExistsError
+from paramove.documents import InputError, exit_codes
+from paramove.recording import RecordingExistsError
 
 if TYPE_CHECKING:
     from paramove.phmm import MovementClassifier, ParametricHMM
@@ -54,7 +53,7 @@ def loaded(path: Path) -> ParametricHMM:
 
 def model_files(folder: Path) -> list[Path]:
     """Files in a folder that may be models: every .npz but the index of a classifier."""
-    from paramove.phmm.classification import INDEX_FILE
+    from paramove.phmm import INDEX_FILE
 
     return sorted(file for file in folder.glob("*.npz") if file.name != INDEX_FILE)
 
@@ -64,8 +63,7 @@ def classifier_of(paths: Sequence[Path]) -> MovementClassifier:
 
     Raises InputError if a file is missing or damaged, or two models are of the same action.
     """
-    from paramove.phmm import MovementClassifier, ParametricHMM
-    from paramove.phmm.classification import INDEX_FILE
+    from paramove.phmm import INDEX_FILE, MovementClassifier, ParametricHMM
 
     if len(paths) == 1 and (paths[0] / INDEX_FILE).is_file():
         return MovementClassifier.load(paths[0])

@@ -11,9 +11,7 @@ import typer
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import PointOption, ended, table_of
 from paramove.cli.model_options import ModelArgument, loaded, model_files, one_sentence
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import printable
+from paramove.documents import InputError, exit_codes, printable
 
 if TYPE_CHECKING:
     from paramove.phmm import ParametricHMM
@@ -33,8 +31,7 @@ def list_models(
 
     Exit codes: 0; 66 there is none; 78 one is damaged, which is told.
     """
-    from paramove.phmm import ParametricHMM
-    from paramove.phmm.classification import INDEX_FILE
+    from paramove.phmm import INDEX_FILE, ParametricHMM
 
     rows, wrong = [], []
     found = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + "*.npz")})
@@ -55,7 +52,7 @@ def list_models(
 
 def _is_model(file: Path) -> bool:
     """Whether an .npz calls itself a model; others, such as recordings, are passed over."""
-    from paramove.documents.arrays import read_arrays
+    from paramove.documents import read_arrays
 
     names = {"format_version", "header"}
     try:
@@ -65,8 +62,7 @@ def _is_model(file: Path) -> bool:
 
 
 def _row(file: Path, model: ParametricHMM) -> dict[str, Any]:
-    from paramove.training.drawing import parameter_names
-    from paramove.training.kinds import kind_of
+    from paramove.training import kind_of, parameter_names
 
     about = model.description
     return {
@@ -97,10 +93,7 @@ def show(file: ModelArgument, as_json: JsonOption = False) -> None:
 
 def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
     from paramove.phmm import MovementDescription
-    from paramove.training.drawing import bounds, dimension, parameter_names
-    from paramove.training.kinds import kind_of
-    from paramove.training.pictures import state_seconds
-    from paramove.training.training import checksum, told_of
+    from paramove.training import bounds, checksum, dimension, kind_of, parameter_names, state_seconds, told_of
 
     about = model.description or MovementDescription()
     low_high = bounds(model)
@@ -141,8 +134,7 @@ def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
 
 
 def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    from paramove.training.drawing import with_unit
-    from paramove.training.report import left_out_sentences
+    from paramove.training import left_out_sentences, with_unit
 
     low_high = [f"{with_unit(name)}: {low:.4g} to {high:.4g}" for name, (low, high) in facts["parameters"].items()]
     least, most = facts["frames_per_state"]
@@ -185,8 +177,8 @@ def plot(
 
     Exit codes: 0; 66 there is no such file; 78 it is damaged, or has no such point.
     """
-    from paramove.demonstrations.plots import write_plot
-    from paramove.training.pictures import plot_model, title_of
+    from paramove.demonstrations import write_plot
+    from paramove.training import plot_model, title_of
 
     with one_sentence():
         model = loaded(file)
@@ -206,8 +198,8 @@ def compare(
 
     Exit codes: 0; 2 fewer than two; 66 a file is missing; 78 one is damaged, or they have other points or parameters.
     """
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
-    from paramove.training.comparing import on_set, table_of_distances
+    from paramove.demonstrations import DemonstrationSet
+    from paramove.training import on_set, table_of_distances
 
     if len(files) < 2:
         raise typer.BadParameter("give at least two files", param_hint="FILE FILE...")

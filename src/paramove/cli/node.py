@@ -13,7 +13,7 @@ from paramove.bus import inspection
 from paramove.cli import completions
 from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show
 from paramove.msgs.node_status_pb2 import NodeStatus
-from paramove.supervision.control import NoRunError, ask
+from paramove.supervision import NoRunError, ask
 
 app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start or restart one.", no_args_is_help=True)
 

@@ -15,18 +15,26 @@ from pathlib import Path
 
 from rich.console import Console
 
-from paramove.dashboard.link_file import link_in
-from paramove.documents import exit_codes
-from paramove.documents.positions import DocumentError
-from paramove.supervision import application
-from paramove.supervision.domain import DomainError, DomainNameError
-from paramove.supervision.environment import Environment, LimitError, examined
-from paramove.supervision.launch_file import Launch, LaunchFileMissingError, load
-from paramove.supervision.queued_output import QueuedOutput
-from paramove.supervision.run_folder import RunFolder
-from paramove.supervision.supervised_node import SupervisedNode
-from paramove.supervision.supervisor import Outcome, View
-from paramove.supervision.view import LineView, TableView
+from paramove.dashboard import link_in
+from paramove.documents import DocumentError, exit_codes
+from paramove.supervision import (
+    DomainError,
+    DomainNameError,
+    Environment,
+    Launch,
+    LaunchFileMissingError,
+    LimitError,
+    LineView,
+    Outcome,
+    QueuedOutput,
+    RunFolder,
+    SupervisedNode,
+    TableView,
+    View,
+    application,
+    examined,
+    load,
+)
 
 OVERLAY = "view"
 

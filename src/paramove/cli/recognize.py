@@ -16,16 +16,16 @@ from paramove.cli import demos_import
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import ended, table_of
 from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_sentence
-from paramove.demonstrations.movement import DemonstrationError, Movement
-from paramove.documents.wording import printable
+from paramove.demonstrations import DemonstrationError, Movement
+from paramove.documents import printable
 
 if TYPE_CHECKING:
+    from paramove.demonstrations import Take
     from paramove.demonstrations.importing import ImportOptions
-    from paramove.demonstrations.writing import Take
 
 MAX_GAP_S = 0.1
 if TYPE_CHECKING:
-    from paramove.training.examining import Recognition
+    from paramove.training import Recognition
 
 app = typer.Typer(add_completion=False)
 
@@ -58,7 +58,7 @@ def recognize(
     Exit codes: 0, also where nothing known was seen; 66 a file is missing; 78 a file or the movement cannot be used.
     """
     from paramove.cli.recognize import movements_of
-    from paramove.training.examining import Examiner
+    from paramove.training import Examiner
 
     if unit not in (None, "m", "cm", "mm"):
         raise typer.BadParameter(f"expected m, cm or mm, found {unit!r}", param_hint="--unit")
@@ -76,8 +76,8 @@ def recognize(
         except KeyboardInterrupt:
             raise ended("interrupted", INTERRUPTED) from None
         if plot is not None:
-            from paramove.demonstrations.plots import write_plot
-            from paramove.training.recognition_pictures import plot_recognition
+            from paramove.demonstrations import write_plot
+            from paramove.training import plot_recognition
 
             write_plot(plot_recognition(examiner.models, found), plot, f"{source.name}: {len(found)} movements")
     _tell(found, as_json)
@@ -86,7 +86,7 @@ def recognize(
 
 
 def _tell(found: list[Recognition], as_json: bool) -> None:
-    from paramove.training.examining import confusion
+    from paramove.training import confusion
 
     facts = [one.facts() for one in found]
     table = confusion(found)
@@ -102,8 +102,7 @@ def _tell(found: list[Recognition], as_json: bool) -> None:
 
 def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
     """One movement, in words."""
-    from paramove.training.drawing import with_unit
-    from paramove.training.examining import percent
+    from paramove.training import percent, with_unit
 
     others = sorted(facts["posterior"].items(), key=lambda item: -item[1])
     rows = [("movement", f"{facts['movement']} ({facts['seconds']:.3g} s)")]
@@ -132,7 +131,7 @@ def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
 
 def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
     """One of many movements, as a line of the table."""
-    from paramove.training.examining import percent
+    from paramove.training import percent
 
     row: dict[str, Any] = {"": number, "action": facts["action"] or "none"}
     if len(facts["posterior"]) > 1:
@@ -177,7 +176,7 @@ def movements_of(path: Path, options: ImportOptions, find: str | None = None) ->
 
     Raises DemonstrationError if nothing is there or it cannot be used.
     """
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
+    from paramove.demonstrations import DemonstrationSet
     from paramove.demonstrations.importing import import_file
 
     if path.is_dir():
@@ -191,10 +190,7 @@ def movements_of(path: Path, options: ImportOptions, find: str | None = None) ->
 
 
 def _recorded(path: Path, find: str | None) -> list[Movement]:
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
-    from paramove.demonstrations.labels import FILE_NAME
-    from paramove.demonstrations.pose_recording import read_poses
-    from paramove.demonstrations.writing import Take
+    from paramove.demonstrations import FILE_NAME, DemonstrationSet, Take, read_poses
 
     poses = read_poses(path)
     if find is None and (path.parent / FILE_NAME).is_file():
@@ -207,9 +203,7 @@ def _recorded(path: Path, find: str | None) -> list[Movement]:
 
 def _of_take(take: Take, parameter_names: tuple[str, ...], path: Path, find: str | None) -> Iterator[Movement]:
     """Its labelled movements, those found by speed, or all of it."""
-    from paramove.demonstrations.gaps import fill_gaps
-    from paramove.demonstrations.labelling import movements_by_speed
-    from paramove.demonstrations.writing import Label
+    from paramove.demonstrations import Label, fill_gaps, movements_by_speed
 
     if find is not None:
         spans = movements_by_speed(take.time, take.positions, take.point_names, find, MAX_GAP_S)

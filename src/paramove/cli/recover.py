@@ -9,10 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from paramove.cli.bus_options import JsonOption
-from paramove.documents import exit_codes
-from paramove.documents.wording import printable
-from paramove.recording.recovery import Recovery, RecoveryError, StillWrittenError, recover
-from paramove.recording.writer import RecordingExistsError
+from paramove.documents import exit_codes, printable
+from paramove.recording import RecordingExistsError, Recovery, RecoveryError, StillWrittenError, recover
 
 app = typer.Typer(add_completion=False)
 

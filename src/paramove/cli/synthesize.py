@@ -10,7 +10,7 @@ import typer
 
 from paramove.cli.demos_options import ThetaOption, numbers
 from paramove.cli.model_options import ModelArgument, PlotOption, loaded, one_sentence
-from paramove.documents.wording import printable
+from paramove.documents import printable
 
 if TYPE_CHECKING:
     from paramove.phmm import ParametricHMM
@@ -45,9 +45,8 @@ def synthesize(
     """
     import numpy as np
 
-    from paramove.demonstrations.plots import write_plot
-    from paramove.training.movement_writing import ENDINGS, Made, as_csv, write_movement
-    from paramove.training.pictures import plot_synthesis
+    from paramove.demonstrations import write_plot
+    from paramove.training import ENDINGS, Made, as_csv, plot_synthesis, write_movement
 
     if out is not None and out.suffix not in ENDINGS:
         raise typer.BadParameter(f"files of movements end in {', '.join(ENDINGS)}", param_hint="--out")
@@ -74,8 +73,8 @@ def _check(model: ParametricHMM, theta: object) -> None:
     """Ends the command for a wrong number of components; warns of values outside the training's bounds."""
     import numpy as np
 
-    from paramove.documents.input_error import InputError
-    from paramove.training.drawing import bounds, parameter_names, with_unit
+    from paramove.documents import InputError
+    from paramove.training import bounds, parameter_names, with_unit
 
     names, values = parameter_names(model), np.asarray(theta)
     low, high = bounds(model)

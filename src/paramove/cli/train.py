@@ -17,12 +17,10 @@ from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import SetArgument, ended, words
 from paramove.cli.evaluation_io import PROGRESS
 from paramove.cli.model_options import INTERRUPTED, one_sentence
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import printable
+from paramove.documents import InputError, printable
 
 if TYPE_CHECKING:
-    from paramove.training.examples import Examples
-    from paramove.training.training import Make, Trained
+    from paramove.training import Examples, Make, Trained
 
 app = typer.Typer(add_completion=False)
 
@@ -62,9 +60,8 @@ def train(
 
     Exit codes: 0; 2 wrong arguments; 66 there is no set; 78 nothing can be learned from it; 130 interrupted.
     """
-    from paramove.demonstrations.demonstration_set import DemonstrationSet
-    from paramove.training.examples import examples_of
-    from paramove.training.kinds import untrained
+    from paramove.demonstrations import DemonstrationSet
+    from paramove.training import examples_of, untrained
 
     console = Console(stderr=True, highlight=False, emoji=False, markup=False)
     with one_sentence():
@@ -84,7 +81,7 @@ def train(
         }  # fmt: skip
         trained = _trained(examples, make, goal, leave_out, console)
         if report is not None:
-            from paramove.training.report import write_training_report
+            from paramove.training import write_training_report
 
             report.parent.mkdir(parents=True, exist_ok=True)
             write_training_report(trained, report, examples.remarks)
@@ -111,7 +108,7 @@ def _trained(
     examples: Examples, make: dict[str, Make], goal: Path, leave_out: LeaveOut, console: Console
 ) -> list[Trained]:
     """Trains, writes, and then checks, so that an interrupted check leaves a model."""
-    from paramove.training.training import train_and_write, with_check
+    from paramove.training import train_and_write, with_check
 
     written = "nothing was written"
     try:
@@ -149,7 +146,7 @@ def _with_points(sentence: str, names: tuple[str, ...]) -> str:
 
 
 def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:
-    from paramove.training.report import sentences
+    from paramove.training import sentences
 
     facts = [one.facts() for one in trained]
     if as_json:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 from platformdirs import user_cache_path
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 if TYPE_CHECKING:
-    from paramove.cameras.calibrated import CalibratedCamera
+    from paramove.cameras import CalibratedCamera
 
 app = typer.Typer(add_completion=False)
 
@@ -106,7 +106,7 @@ def _interpolation() -> None:
 def _camera() -> CalibratedCamera:
     import numpy as np
 
-    from paramove.cameras.calibrated import CalibratedCamera
+    from paramove.cameras import CalibratedCamera
 
     place = np.array([[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
     lens = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
@@ -117,24 +117,23 @@ def _images() -> None:
     """Postures of an arm are compared with images."""
     import numpy as np
 
-    from paramove.action_space.video_tracker import try_out
-    from paramove.observation.arm_body import ArmSizes
-    from paramove.observation.arm_observer import ArmObserver
+    from paramove.action_space import try_out
+    from paramove.observation import ArmObserver, ArmSizes
 
     poses = np.tile([0.0, -0.25, 0.3, 0.1, -0.25, 0.1, 0.35, -0.2, 0.1], (10, 1))
     try_out(ArmObserver(ArmSizes(), [_camera()]), _camera(), poses)
 
 
 def _reaching() -> None:
-    from paramove.motion.setup import MovementSource
+    from paramove.motion import MovementSource
 
     MovementSource().trained()
 
 
 def _tracking() -> None:
     """A tracker of pointing."""
-    from paramove.action_space.setup import TrackingSetup
-    from paramove.cameras.calibrated import write_cameras
+    from paramove.action_space import TrackingSetup
+    from paramove.cameras import write_cameras
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cameras.yaml"

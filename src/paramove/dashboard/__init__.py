@@ -1,1 +1,5 @@
 """The live page: what a running application sees, believes and does, in a browser, and a stop button."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

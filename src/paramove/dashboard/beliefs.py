@@ -11,7 +11,7 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
-from paramove.objects.homography import HomographyError, PlaneHomography
+from paramove.objects import HomographyError, PlaneHomography
 
 KEPT_WORDS = 12
 KEPT_RESULTS = 8

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from paramove.dashboard.access import Secrets
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 
 _log = logging.getLogger(__name__)
 

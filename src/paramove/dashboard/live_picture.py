@@ -11,14 +11,13 @@ from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from pydantic import BaseModel, ConfigDict
 
-from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus import Heard, topics
 from paramove.dashboard.beliefs import Beliefs
 from paramove.dashboard.node_table import NodeTable
 from paramove.dashboard.robot_shape import RobotShape
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 
 
 class Surface(BaseModel):

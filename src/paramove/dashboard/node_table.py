@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from paramove.bus import topics
-from paramove.bus.bus import Bus
+from paramove.bus import Bus, topics
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 VISUAL_GROUP = 2
 _TYPES = {

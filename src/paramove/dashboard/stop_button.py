@@ -6,10 +6,9 @@ import enum
 from collections.abc import Callable
 from typing import Any
 
-from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus import Heard, topics
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
-from paramove.safety.gate_io import PERSON_STOP
+from paramove.safety import PERSON_STOP
 
 SOURCE = "page"
 SHOWN_S = 3.0

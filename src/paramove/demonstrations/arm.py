@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 POINT_NAMES = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index", "thumb")
 UP = np.array([0.0, 0.0, 1.0])

@@ -14,8 +14,8 @@ from paramove.alignment import warp
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.reaching import Demonstrations, demonstrations_at, table_place, table_targets
 from paramove.demonstrations.synthetic import FRAME, Demonstrator, Timing, minimum_jerk
-from paramove.documents.array_types import Floats
-from paramove.hmm.sequences import checked_sequence, interpolate, resample
+from paramove.documents import Floats
+from paramove.hmm import checked_sequence, interpolate, resample
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
 
 ALIGNED_FRAMES = 200

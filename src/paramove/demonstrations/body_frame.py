@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from paramove.demonstrations.movement import DemonstrationError, Movement, place_of_theta
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 BODY = "body"
 SHOULDER, OTHER_SHOULDER, STERNUM = "shoulder", "other_shoulder", "sternum"

@@ -15,7 +15,7 @@ from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.reading import read_movements
 from paramove.demonstrations.splitting import SplitBy, split_groups
 from paramove.demonstrations.writing import Label, Take, write_set
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 if TYPE_CHECKING:
     from paramove.demonstrations.reaching import Demonstrations

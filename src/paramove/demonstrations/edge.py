@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramove.demonstrations.synthetic import minimum_jerk
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 EDGE_HEIGHT = 0.05
 EDGE_WIDTH = 0.06

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from paramove.demonstrations.movement import runs
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 NEIGHBOURS = 5
 """So many frames on each side of a gap shape what is put into it."""

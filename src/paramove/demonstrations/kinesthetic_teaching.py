@@ -14,10 +14,8 @@ from paramove.demonstrations.labelling import next_repetition
 from paramove.demonstrations.labels import FILE_NAME, Segment, load_labels
 from paramove.demonstrations.movement import DemonstrationError
 from paramove.demonstrations.writing import Label, Take, write_set
-from paramove.documents.array_types import Floats
-from paramove.documents.atomic_writing import replacing
-from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.pose_points import ARM_BASE, POINT_NAMES, arm_points
+from paramove.documents import Floats, replacing
+from paramove.robots import ARM_BASE, POINT_NAMES, DescriptionError, RobotDescription, arm_points
 
 PARAMETERS = ("target_x", "target_y", "target_z")
 RESTS_WITHIN_M = 0.002

@@ -12,8 +12,7 @@ from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, appen
 from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
 from paramove.demonstrations.timing import FAST, FINGERTIP, SLOW, speeds
-from paramove.documents.array_types import Floats
-from paramove.documents.wording import nearest
+from paramove.documents import Floats, nearest
 
 
 def movements_by_speed(

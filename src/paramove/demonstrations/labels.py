@@ -17,10 +17,17 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
 from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.files import read_text
-from paramove.documents.positions import Document, DocumentError, KeyPath, raise_any, read_mapping
-from paramove.documents.wording import closest, nearest
+from paramove.documents import (
+    Document,
+    DocumentError,
+    KeyPath,
+    closest,
+    nearest,
+    raise_any,
+    read_mapping,
+    read_text,
+    replacing,
+)
 
 FILE_NAME = "labels.yaml"
 MAX_CHARACTERS = 4_000_000

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 
 Side = Literal["right", "left"]
 AXIS_ENDINGS = ("_x", "_y", "_z")

@@ -17,7 +17,7 @@ from paramove.demonstrations.synthetic import (
     Demonstrator,
     Timing,
 )
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 FRAMES = 24
 """Of a last part, however long it took."""

@@ -15,9 +15,7 @@ from matplotlib.figure import Figure
 
 from paramove.demonstrations.demonstration_set import DemonstrationSet
 from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.array_types import Floats
-from paramove.documents.reports import image, report_page
-from paramove.documents.wording import nearest
+from paramove.documents import Floats, image, nearest, report_page
 
 DPI = 110
 FIGURE_IN = (13.0, 7.5)

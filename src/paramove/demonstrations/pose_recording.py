@@ -10,12 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.bus.topics import HUMAN_ARM_POSE
+from paramove.bus import HUMAN_ARM_POSE
 from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.recording.reader import read
-from paramove.recording.writer import RecordingWriter
+from paramove.recording import RecordingWriter, read
 
 BILLION = 1_000_000_000
 MOST_UNSEEN = 2_000_000

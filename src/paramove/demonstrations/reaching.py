@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import POINT_NAMES
 from paramove.demonstrations.synthetic import FRAME, RESTING_SHOULDER, SAMPLE_RATE_HZ, Action, Demonstrator
-from paramove.documents.array_types import Floats
-from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
-from paramove.phmm.model_cache import stored_model
+from paramove.documents import Floats
+from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid, stored_model
 from paramove.source_code import code_digest
 
 

@@ -9,9 +9,7 @@ from paramove.demonstrations.gaps import PointGap, fill_gaps
 from paramove.demonstrations.labels import Labels, LabelsError, Segment
 from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, read_poses
-from paramove.documents.array_types import Floats
-from paramove.documents.positions import DocumentError, raise_any
-from paramove.documents.wording import nearest
+from paramove.documents import DocumentError, Floats, nearest, raise_any
 
 
 def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:

@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.documents.arrays import read_arrays
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError, Ints, read_arrays
 
 Bools = NDArray[np.bool_]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paramove.demonstrations.arm import ArmLengths, ArmPath, body_points, swivel_towards
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 Action = Literal["reaching", "pointing"]
 

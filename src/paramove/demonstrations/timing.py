@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from paramove.demonstrations.movement import DemonstrationError, Movement
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 FINGERTIP = "index"
 SLOW, FAST = 0.03, 0.15

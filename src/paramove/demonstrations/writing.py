@@ -13,8 +13,7 @@ from pydantic import ValidationError
 from paramove.demonstrations.labels import FILE_NAME, LabelsFile, Segment, append_segments, load_labels, write_labels
 from paramove.demonstrations.movement import DemonstrationError, Movement, Side
 from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
-from paramove.documents.array_types import Floats
-from paramove.documents.key_findings import findings
+from paramove.documents import Floats, findings
 
 LIBRARY = "paramove demonstrations"
 BETWEEN_NS = 2 * BILLION

@@ -10,12 +10,21 @@ from pathlib import Path
 
 from paramove.diagnosis.finding import Finding, Level, Machine
 from paramove.diagnosis.serial_ports import usable_ports
-from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.bus.hardware_error import hardware_errors, in_words
-from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, BusScan, FoundServo, listed, scan_bus
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES
-from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
+from paramove.documents import InputError
+from paramove.robots.dynamixel import (
+    ALL_IDS,
+    BAUD_RATES,
+    USUAL_BAUD_RATES,
+    BusScan,
+    FoundServo,
+    PortLostError,
+    ServoChain,
+    ServoPort,
+    hardware_errors,
+    in_words,
+    listed,
+    scan_bus,
+)
 
 NEAR_LIMIT_C = 10
 """A servo so near its temperature limit is told of; chosen."""

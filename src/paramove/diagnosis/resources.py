@@ -14,11 +14,18 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from paramove.bus.settings import default_folder
+from paramove.bus import default_folder
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
-from paramove.supervision.application import NoWorkspaceError, find_workspace
-from paramove.supervision.domain import LONGEST_FOLDER, DomainError, check_name
-from paramove.supervision.environment import DEFAULT_DOMAIN, OPEN_FILES, examined
+from paramove.supervision import (
+    DEFAULT_DOMAIN,
+    LONGEST_FOLDER,
+    OPEN_FILES,
+    DomainError,
+    NoWorkspaceError,
+    check_name,
+    examined,
+    find_workspace,
+)
 
 LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
 """Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second

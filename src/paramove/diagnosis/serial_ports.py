@@ -10,8 +10,7 @@ from pathlib import Path
 
 from paramove.devices import holders, may_use, serial_remedy
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
-from paramove.robots.dynamixel.bus.serial_adapters import adapter_links
-from paramove.robots.dynamixel.bus.servo_port import ServoPort
+from paramove.robots.dynamixel import ServoPort, adapter_links
 
 SOON_MS = 1
 RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm import chain_kernels
 from paramove.hmm.covariances import Covariance, covariances_of, log_prior
 from paramove.hmm.estimation import Moments, whitened

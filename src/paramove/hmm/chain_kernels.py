@@ -7,7 +7,7 @@ alpha beta / p(X) (2.14), for what follows t does not depend on what was before,
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_arithmetic
 from paramove.hmm.vector_functions import UNDERFLOW, add_multiple, dot, exp_of_negative, log_of_one_plus
 

@@ -4,7 +4,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm.gaussians import whitening_of
 from paramove.hmm.options import Regularisation
 

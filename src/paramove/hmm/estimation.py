@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm import kernels
 from paramove.hmm.covariances import Covariance, covariances_of, floored, log_prior, pooled_covariance
 from paramove.hmm.gaussians import whitening_of

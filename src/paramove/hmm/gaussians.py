@@ -7,7 +7,7 @@ factors (E.10), hence lower triangular: ln b(x) = log_norm - |S (x - mu)|^2 / 2 
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_sums
 
 BLOCK = 128

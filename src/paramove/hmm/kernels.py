@@ -10,7 +10,7 @@ Index convention: `ending[i, t]` belongs to "i states are complete and t frames 
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
 from paramove.hmm.gaussians import add_moments, stacked_log_outputs, stacked_moments
 from paramove.hmm.vector_functions import exp_of_negative, log_of_positive

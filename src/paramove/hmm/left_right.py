@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm import kernels, synthesis
 from paramove.hmm.covariances import Covariance, check_kind
 from paramove.hmm.estimation import Evaluator, Parameters

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 
 @dataclass(frozen=True)

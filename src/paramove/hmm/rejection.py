@@ -8,7 +8,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm.sequences import SequenceLengthError
 
 

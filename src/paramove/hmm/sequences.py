@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 CACHED_VALUES = 1 << 16
 LARGEST = 1e100

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.sequences import interpolate
 
 Timing = Literal["uniform", "expected"]

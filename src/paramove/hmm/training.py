@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.covariances import Covariance, covariances_of, pooled_covariance
 from paramove.hmm.estimation import Parameters, Statistics, durations_of, penalty
 from paramove.hmm.options import Regularisation, TrainingOptions, TrainingSummary

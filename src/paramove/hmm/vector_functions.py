@@ -5,7 +5,7 @@ numba's own exponential function and logarithm call the C library once per numbe
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled_arithmetic, compiled_sums
 
 UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100

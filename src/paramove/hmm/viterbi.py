@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from paramove.documents.array_types import Floats
-from paramove.robots.description import Arm, RobotDescription
+from paramove.documents import Floats
+from paramove.robots import Arm, RobotDescription
 
 # The elbow is turned on this grid, then refined by bisection to a hundredth of a step.
 _TURNS = np.deg2rad(np.arange(0.0, 181.0, 1.0))

@@ -8,9 +8,9 @@ import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.planned_motion import PlannedMotion
-from paramove.robots.description import Arm
+from paramove.robots import Arm
 
 FELT_OPENING = 0.12  # a closed hand whose fingers stop at a wider opening than this holds something
 GRIPPING_OPENINGS = (0.36, 0.5)  # where fingers rest on an object; at the base pose they are at 0.3, open hands wider

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.clearance import ClearanceChecker
 from paramove.motion.joint_path import joined, joint_motion

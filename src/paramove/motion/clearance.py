@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.robots.description import RobotDescription
+from paramove.documents import Floats, Ints
+from paramove.robots import RobotDescription
 
 _FAR = 0.05  # distances beyond are not told apart, m
 _HIDDEN = 10.0

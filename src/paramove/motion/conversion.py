@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.table_clearance import TableClearance
-from paramove.robots.description import Chain
-from paramove.robots.out_of_reach import OutOfReachError
+from paramove.robots import Chain, OutOfReachError
 
 LEAST_HEIGHT = 0.0005
 """m; of the hand's lowest point above the table."""

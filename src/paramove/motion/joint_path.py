@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.timing import minimum_jerk
-from paramove.robots.arm_kinematics import ArmKinematics
+from paramove.robots import ArmKinematics
 
 LIMIT_SHARE = 0.5  # of the operating velocity and acceleration: nobody expects this motion
 LEAST_DURATION_S = 0.5

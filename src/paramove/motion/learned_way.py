@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import minimum_jerk, smoothed
 

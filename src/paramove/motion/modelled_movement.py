@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.conversion import RobotMovement, arm_of, points_of
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement, TrainingTargets

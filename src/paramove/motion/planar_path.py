@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.timing import smoothed
-from paramove.robots.out_of_reach import OutOfReachError
-from paramove.robots.planar_arm import PlanarArm
+from paramove.robots import OutOfReachError, PlanarArm
 
 OFFSETS = np.deg2rad(5.0) * np.arange(-30, 31)
 """Of the pitch from what is wanted, among which the search chooses, rad."""

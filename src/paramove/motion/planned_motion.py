@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.reaching_movement import ArmPoses
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPhase, TrajectoryPoint
 

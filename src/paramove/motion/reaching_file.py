@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.body_frame import BODY
-from paramove.demonstrations.synthetic import FRAME
+from paramove.demonstrations import BODY, FRAME
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.conversion import RobotMovement
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.reaching_movement import ReachingMovement
 from paramove.phmm import InterpolativePHMM, ModelFileError, MovementDescription, ParametricHMM
-from paramove.robots.pose_points import ARM_BASE
+from paramove.robots import ARM_BASE
 
 REMEDY = (
     "train it again: leave out the node's parameter movement.file to have a model trained from synthetic "

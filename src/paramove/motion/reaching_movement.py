@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 
 @dataclass(frozen=True)

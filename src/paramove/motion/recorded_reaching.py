@@ -9,10 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.body_frame import BODY
-from paramove.demonstrations.recorded_people import RATE_HZ, Recordings, RecordingsError, data_folder, load_recordings
-from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM
-from paramove.phmm.model_cache import stored_model
+from paramove.demonstrations import BODY, RATE_HZ, Recordings, RecordingsError, data_folder, load_recordings
+from paramove.phmm import ModelFileError, MovementDescription, PolynomialPHMM, stored_model
 from paramove.source_code import code_digest
 
 ACTIONS = ("reach_forward", "reach_across")

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.planned_motion import Path, PlannedMotion, RelocationOptions
 from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import fade_in, largest_excess, minimum_jerk, resampled, slowed_times, soft_ends
-from paramove.robots.description import Arm
+from paramove.robots import Arm
 
 _UP = np.array([0.0, 0.0, 1.0])
 _SLOWING_ROUNDS = 6

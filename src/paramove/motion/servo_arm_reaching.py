@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.hand_poses import HandPoses, metres
 from paramove.motion.learned_way import SMOOTHING, LearnedWay, PlacedPerson
@@ -23,8 +23,7 @@ from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.table_clearance import TableClearance
 from paramove.motion.timing import minimum_jerk, ramped, rest_to_rest, smoothed
 from paramove.phmm import ParametricHMM
-from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.out_of_reach import OutOfReachError
+from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
 
 POINTS = 48
 """Of a learned way."""

@@ -9,7 +9,7 @@ from typing import Literal, Self
 from platformdirs import user_cache_path
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from paramove.demonstrations.reaching import train_reaching_model
+from paramove.demonstrations import train_reaching_model
 from paramove.motion.arm_pose import ArmPoseSolver
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.clearance import ClearanceChecker, UprightCylinder, WorkSurface
@@ -19,7 +19,7 @@ from paramove.motion.recorded_reaching import people_model
 from paramove.motion.relocation import RelocationPlanner
 from paramove.motion.synthesizer import Synthesizer
 from paramove.phmm import ParametricHMM
-from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots import DescriptionError, RobotDescription
 
 _log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.arm_state import FELT_OPENING, ArmState
 from paramove.motion.clear_plans import ClearPlans, NoClearPlanError

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.robots.description import Chain, RobotDescription
+from paramove.documents import Floats
+from paramove.robots import Chain, RobotDescription
 
 
 class TableClearance:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 _WINDOW_S = 0.12
 _ACCELERATION_ROUNDS = 6

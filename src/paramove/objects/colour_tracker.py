@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Image
+from paramove.documents import Floats, Image
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize, Size
 from paramove.objects.openings import find_openings

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 PLACE_RADIUS_PX = 24.0
 """Nearer samples belong to one place: about one object's width apart, over which the size changes by < 3 %."""

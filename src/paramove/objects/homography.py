@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration, PlaneCorrespondence
 
 LEAST_FLATNESS = 0.03
@@ -77,6 +77,7 @@ class PlaneHomography:
         return cls(matrix, message.plane_z, message.plane_frame, message.image_frame, known)
 
     def to_message(self, captured_ns: int = 0) -> PlaneCalibration:
+        """The calibration as the message that `from_message` reads."""
         message = PlaneCalibration(
             image_frame=self.image_frame,
             plane_frame=self.plane_frame,

@@ -15,7 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 from paramove.msgs.tracked_objects_pb2 import Opening
 
 SURROUNDINGS_PX = 15

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
 from paramove.objects.homography import PlaneHomography
 from paramove.objects.sinking import Sample

@@ -12,9 +12,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.demonstrations.arm import ArmLengths, across
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.demonstrations import ArmLengths, across
+from paramove.documents import Floats, InputError
 
 POSE_POINTS = ("shoulder", "elbow", "hand")
 """The three points of an arm pose, in this order; the hand is the tip of the index finger."""

@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats, Image
-from paramove.documents.input_error import InputError
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats, Image, InputError
 from paramove.observation.arm_body import ArmSizes, fitted_poses
 from paramove.observation.background import Background
 from paramove.observation.background_kernels import FULL

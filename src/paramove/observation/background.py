@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 from paramove.observation.background_kernels import changes, learn, samples
 
 KNOWN_AFTER_S, FOLLOWS_S, FOLLOWS_LARGE_S = 0.4, 3.0, 20.0

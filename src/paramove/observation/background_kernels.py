@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Bytes
-from paramove.hmm.compilation import compiled
+from paramove.documents import Bytes
+from paramove.hmm import compiled
 
 Signed = NDArray[np.int8]
 Floats32 = NDArray[np.float32]

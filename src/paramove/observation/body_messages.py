@@ -9,7 +9,7 @@ from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from foxglove_schemas_protobuf.PointsAnnotation_pb2 import PointsAnnotation
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from paramove.cameras.calibrated import WORLD_FRAME, CalibratedCamera
+from paramove.cameras import WORLD_FRAME, CalibratedCamera
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.observation.body_tracking import BodyMoment
 

@@ -8,12 +8,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from paramove.cameras.aligned_views import AlignedViews, Views
-from paramove.cameras.calibrated import CalibratedCamera, measured_cameras
-from paramove.cameras.watch import CameraWatch
-from paramove.documents.array_types import Image
-from paramove.documents.input_error import InputError
-from paramove.objects.colour_tracker import Colour
+from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views, measured_cameras
+from paramove.documents import Image, InputError
+from paramove.objects import Colour
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint, StereoBodyTracker
 
 UNSEEN_S = 3.0

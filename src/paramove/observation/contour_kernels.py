@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Bytes
-from paramove.hmm.compilation import compiled, compiled_arithmetic
+from paramove.documents import Bytes
+from paramove.hmm import compiled, compiled_arithmetic
 from paramove.observation.edge_kernels import COSINES, DIRECTIONS, MARGIN, SINES
 from paramove.observation.segment_sums import BASE, FIELDS, LANES, NX, NY, PX, PY, SHARE
 

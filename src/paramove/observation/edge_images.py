@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Image, Ints
+from paramove.documents import Image, Ints
 from paramove.observation.edge_kernels import (
     DIRECTIONS,
     MARGIN,

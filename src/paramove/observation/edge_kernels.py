@@ -7,8 +7,8 @@ image of one direction lies before the next.
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Bytes, Ints
-from paramove.hmm.compilation import compiled, compiled_sums
+from paramove.documents import Bytes, Ints
+from paramove.hmm import compiled, compiled_sums
 
 Floats32 = NDArray[np.float32]
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Bytes, Floats
-from paramove.hmm.compilation import compiled, compiled_arithmetic, compiled_sums
+from paramove.documents import Bytes, Floats
+from paramove.hmm import compiled, compiled_arithmetic, compiled_sums
 from paramove.observation.background_kernels import covered
 from paramove.observation.contour_kernels import (
     LEAST_POINTS,

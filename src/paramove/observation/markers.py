@@ -13,13 +13,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from paramove.cameras.calibrated import WORLD_FRAME, CalibratedCamera
-from paramove.cameras.charuco_board import MARKERS, SIZE_UNTOLD_ID, dictionary
-from paramove.cameras.stereo import StereoRig
-from paramove.documents.array_types import Floats, Image
-from paramove.documents.input_error import InputError
+from paramove.cameras import MARKERS, SIZE_UNTOLD_ID, WORLD_FRAME, CalibratedCamera, StereoRig, dictionary
+from paramove.documents import Floats, Image, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.objects.colour_tracker import Colour, ColourTracker
+from paramove.objects import Colour, ColourTracker
 
 BOARD_IDS = SIZE_UNTOLD_ID + MARKERS
 """Smaller ids are those of calibration boards, which may lie on the table meanwhile."""

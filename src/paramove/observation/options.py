@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 
 Likelihood = Literal["matched", "simple"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.cameras.calibrated import CalibratedCamera
-from paramove.documents.array_types import Floats
+from paramove.cameras import CalibratedCamera
+from paramove.documents import Floats
 from paramove.observation.arm_body import HAND
 from paramove.observation.background_kernels import FULL
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Bytes, Floats
-from paramove.hmm.compilation import compiled, compiled_arithmetic
+from paramove.documents import Bytes, Floats
+from paramove.hmm import compiled, compiled_arithmetic
 
 Ints32 = NDArray[np.int32]
 

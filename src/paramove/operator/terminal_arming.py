@@ -8,9 +8,7 @@ from pathlib import Path
 
 import zmq
 
-from paramove.bus import topics
-from paramove.bus.subscriber import Subscriber
-from paramove.bus.visitor import BusVisitor, say_now
+from paramove.bus import BusVisitor, Subscriber, say_now, topics
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 
 LOOKS_EVERY_S = 0.02

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import zmq
 
-from paramove.bus import topics
-from paramove.bus.endpoint import TopicTakenError
-from paramove.bus.visitor import BusVisitor
+from paramove.bus import BusVisitor, TopicTakenError, topics
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
-from paramove.safety.gate_io import PERSON_STOP
+from paramove.safety import PERSON_STOP
 
 SAID_EVERY_S = 0.02
 

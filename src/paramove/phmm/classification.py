@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.sequences import checked_sequence, checked_sequences
+from paramove.documents import Floats, Ints
+from paramove.hmm import checked_sequence, checked_sequences
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
 from paramove.phmm.performance import BEGINNING_POINTS, FIRST_FRAMES, GROWTH, beginning_features, groups_of

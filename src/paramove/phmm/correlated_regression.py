@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.phmm.features import Monomials
 from paramove.phmm.left_out import folds_of, inflation_of
 from paramove.phmm.noise import distances_with_noise

@@ -10,8 +10,8 @@ from math import comb
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled
+from paramove.documents import Floats, Ints
+from paramove.hmm import compiled
 
 MOST_MONOMIALS = 5000
 MOST_PARAMETERS = 12

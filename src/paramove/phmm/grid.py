@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,8 @@ and durations alike (Fisher's identity).
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled, compiled_sums
-from paramove.hmm.kernels import feasible_ends, stacked_segments
-from paramove.hmm.vector_functions import dot
+from paramove.documents import Floats, Ints
+from paramove.hmm import compiled, compiled_sums, dot, feasible_ends, stacked_segments
 
 NEGLIGIBLE = 1e-7
 LOG_2PI = 1.8378770664093453

@@ -7,8 +7,8 @@ it has kinks. So the search goes from region to region, a region being a cell or
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled
+from paramove.documents import Floats, Ints
+from paramove.hmm import compiled
 from paramove.phmm.interpolation_kernels import expectation_at, value_at
 
 BORDER = 1e-9

@@ -9,10 +9,8 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
-from paramove.hmm.estimation import Evaluator
-from paramove.hmm.sequences import check_length, checked_sequence
+from paramove.documents import Floats, Ints
+from paramove.hmm import Evaluator, LeftRightHMM, Parameters, TrainingOptions, check_length, checked_sequence
 from paramove.phmm import interpolation_kernels, interpolation_search
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.grid import ParameterGrid

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import chdtri  # scipy.stats would take half a second to import
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 MOST_FOLDS = 10
 

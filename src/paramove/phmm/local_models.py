@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 ROUNDING = 1e-6
 

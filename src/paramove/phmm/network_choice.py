@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
 
 NUMBERS_OF_UNITS = (1, 2, 4, 8)

@@ -8,11 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
-from paramove.documents.array_types import Floats
-from paramove.hmm import kernels
-from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
-from paramove.hmm.options import TrainingOptions, TrainingSummary
-from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
+from paramove.documents import Floats
+from paramove.hmm import (
+    ConvergenceMonitor,
+    Evaluator,
+    Parameters,
+    TrainingOptions,
+    TrainingSummary,
+    covariances_of,
+    durations_of,
+    kernels,
+    penalty,
+    pooled_covariance,
+    regularisation_at,
+    root_mean_deviation,
+)
 from paramove.phmm.networks import INNER_DEVIATION, StateNetworks, StateTargets
 
 AFTER_ANNEALING = 10**6

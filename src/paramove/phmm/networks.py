@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 INNER_DEVIATION = 3.0
 """Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""

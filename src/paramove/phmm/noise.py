@@ -14,9 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.hmm import resample
-from paramove.hmm.compilation import compiled_sums
+from paramove.documents import Floats
+from paramove.hmm import compiled_sums, resample
 
 MEDIAN_OF_SQUARES = 0.4549364
 """Of a standard normal variable; a median since reversals, impacts and gaps make a few great differences."""

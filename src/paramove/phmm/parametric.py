@@ -13,17 +13,21 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm import LeftRightHMM, TrainingOptions, TrainingSummary, resample
-from paramove.hmm.sequences import (
+from paramove.documents import Floats, Ints
+from paramove.hmm import (
+    LeftRightHMM,
     SequenceLengthError,
+    Timing,
+    TrainingOptions,
+    TrainingSummary,
+    at_progress,
     check_demonstrations,
     check_length,
     checked_sequence,
     checked_sequences,
+    resample,
 )
-from paramove.hmm.synthesis import Path as PathKind
-from paramove.hmm.synthesis import Timing, at_progress
+from paramove.hmm import Path as PathKind
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 from paramove.hmm import resample
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.estimation import Parameters
+from paramove.documents import Floats, Ints
+from paramove.hmm import Parameters
 from paramove.phmm.left_out import inflation_of
 
 SHRINKAGE = 0.05

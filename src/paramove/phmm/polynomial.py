@@ -9,11 +9,16 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
-from paramove.hmm import LeftRightHMM, Parameters, TrainingOptions
-from paramove.hmm.estimation import Evaluator
-from paramove.hmm.sequences import check_length, checked_sequence
-from paramove.hmm.training import equal_segments
+from paramove.documents import Floats
+from paramove.hmm import (
+    Evaluator,
+    LeftRightHMM,
+    Parameters,
+    TrainingOptions,
+    check_length,
+    checked_sequence,
+    equal_segments,
+)
 from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials

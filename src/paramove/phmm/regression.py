@@ -15,12 +15,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm import kernels
-from paramove.hmm.estimation import Evaluator, Parameters, covariances_of, durations_of, penalty, pooled_covariance
-from paramove.hmm.options import TrainingOptions, TrainingSummary
-from paramove.hmm.sequences import Stack
-from paramove.hmm.training import ConvergenceMonitor, regularisation_at, root_mean_deviation
+from paramove.documents import Floats, Ints
+from paramove.hmm import (
+    ConvergenceMonitor,
+    Evaluator,
+    Parameters,
+    Stack,
+    TrainingOptions,
+    TrainingSummary,
+    covariances_of,
+    durations_of,
+    kernels,
+    penalty,
+    pooled_covariance,
+    regularisation_at,
+    root_mean_deviation,
+)
 
 LEAST_STRENGTH, GREATEST_STRENGTH = 1e-8, 1e8
 CONJUGATE_STEPS = 6

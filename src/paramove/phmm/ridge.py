@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
 """Candidates for the ridge of each degree, as a share of the number of movements."""

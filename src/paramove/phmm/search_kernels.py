@@ -8,10 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paramove.documents.array_types import Floats, Ints
-from paramove.hmm.compilation import compiled, compiled_sums
-from paramove.hmm.kernels import filled, segments_log_likelihood, stacked_segments
-from paramove.hmm.vector_functions import add_multiple, dot
+from paramove.documents import Floats, Ints
+from paramove.hmm import add_multiple, compiled, compiled_sums, dot, filled, segments_log_likelihood, stacked_segments
 from paramove.phmm.features import monomials_at
 
 NEGLIGIBLE = 1e-15  # of a responsibility

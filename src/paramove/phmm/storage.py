@@ -9,10 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.documents.arrays import read_arrays
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError, read_arrays, replacing
 from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.phmm.description import MovementDescription
 

@@ -4,10 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.hmm import Parameters, TrainingOptions
-from paramove.hmm.estimation import Statistics, covariances_of, durations_of
-from paramove.hmm.training import regularisation_at, root_mean_deviation
+from paramove.documents import Floats
+from paramove.hmm import (
+    Parameters,
+    Statistics,
+    TrainingOptions,
+    covariances_of,
+    durations_of,
+    regularisation_at,
+    root_mean_deviation,
+)
 
 AFTER_ANNEALING = 10**6
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaln, stdtr  # scipy.stats would take half a second to import
 
-from paramove.documents.array_types import Floats, Ints
+from paramove.documents import Floats, Ints
 
 LEAST_DEVIATION = 1e-3
 

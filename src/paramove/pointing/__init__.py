@@ -1,1 +1,5 @@
 """Pointing with the arm: targets of tracking in action space, and the window of thesis and paper over an arm's pose."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

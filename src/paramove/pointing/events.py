@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from paramove.action_space.messages import certainty
+from paramove.action_space import certainty
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 

@@ -14,12 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.movement_ends import FRAMES, last_parts
-from paramove.demonstrations.synthetic import FRAME, Action
-from paramove.documents.array_types import Floats
+from paramove.demonstrations import FRAME, FRAMES, Action, last_parts
+from paramove.documents import Floats
 from paramove.hmm import TrainingOptions
-from paramove.phmm import MovementDescription, QuadraticPHMM
-from paramove.phmm.model_cache import cached_model
+from paramove.phmm import MovementDescription, QuadraticPHMM, cached_model
 
 STATES = 8
 PERSONS = 8

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from paramove.bus import topics
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, topics
 from paramove.pointing.events import PointingEventOptions, PointingEvents
 from paramove.pointing.window import PointingWindowOptions
 
@@ -43,7 +42,7 @@ class PointingSetup(BaseModel):
 
     def _window(self, run_folder: Path) -> PointingWindow:
         # Movement models take a second to import: only who hears poses waits for them.
-        from paramove.action_space.setup import measured_person
+        from paramove.action_space import measured_person
         from paramove.pointing.last_part_model import LastPartModel
         from paramove.pointing.window import PointingWindow
 

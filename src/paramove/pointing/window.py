@@ -14,13 +14,10 @@ from math import inf
 import numpy as np
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from paramove.action_space.messages import BALL_M, ball_colour, certainty
-from paramove.action_space.placement import PersonPlacement
-from paramove.cameras.calibrated import WORLD_FRAME
-from paramove.demonstrations import table_place
-from paramove.demonstrations.movement_ends import FRAMES, at_times
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.action_space import BALL_M, PersonPlacement, ball_colour, certainty
+from paramove.cameras import WORLD_FRAME
+from paramove.demonstrations import FRAMES, at_times, table_place
+from paramove.documents import Floats, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.pointing.events import FARTHEST_M

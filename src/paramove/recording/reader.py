@@ -13,7 +13,7 @@ from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import StreamReader
 
 from paramove.bus import topics
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.recording.chunks import RECORD_BYTES, WRONG, allowance, records, whole
 
 MESSAGE_BYTES = 2**24

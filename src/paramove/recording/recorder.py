@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from paramove.bus.node import Bus, Heard
+from paramove.bus import Bus, Heard
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 

@@ -12,8 +12,7 @@ from pathlib import Path
 from mcap.records import Schema
 
 from paramove.bus import topics
-from paramove.documents.atomic_writing import rename_durably
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError, rename_durably
 from paramove.recording.damage import Content, Damage, Sound, Survey, messages_of, survey
 from paramove.recording.writer import RecordingExistsError, RecordingWriter, schema_of
 

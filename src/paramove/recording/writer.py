@@ -19,7 +19,7 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet  # type: ignore[imp
 from mcap.records import Channel, Message, Schema
 from mcap.writer import CompressionType, Writer
 
-from paramove.documents.atomic_writing import rename_durably
+from paramove.documents import rename_durably
 
 CHANNELS = "paramove.channels"
 """Metadata that tells again which channel is which topic: with the chunk that tells it first, all would be lost."""

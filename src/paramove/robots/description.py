@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.documents.wording import nearest
+from paramove.documents import Floats, nearest
 from paramove.robots.arm_kinematics import ArmKinematics
 from paramove.robots.description_file import (
     ArmPart,
@@ -30,7 +29,7 @@ from paramove.robots.description_file import (
 )
 from paramove.robots.joint_units import JointUnits
 from paramove.robots.planar_arm import PlanarArm
-from paramove.safety.limits import MotionLimits
+from paramove.safety import MotionLimits
 
 __all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
 

@@ -7,9 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from paramove.documents.input_error import InputError
-from paramove.documents.key_findings import findings
-from paramove.documents.positions import read_document
+from paramove.documents import InputError, findings, read_document
 
 POSITION_MODE_MOST = 4095
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.robots.out_of_reach import OutOfReachError, describe_miss
 
 Numbers = Floats | np.float64

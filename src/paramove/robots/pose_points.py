@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.robots.description import Chain
 
 ARM_BASE = "arm_base"

@@ -13,9 +13,7 @@ from pathlib import Path
 
 import psutil
 
-from paramove.bus import topics
-from paramove.bus.endpoint import owner_of, socket_path
-from paramove.bus.settings import BusSettings, lock_of
+from paramove.bus import BusSettings, lock_of, owner_of, socket_path, topics
 from paramove.devices import opened_files, serving
 
 PSEUDO_TERMINALS = Path("/dev/pts")

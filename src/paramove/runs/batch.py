@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.documents import exit_codes
 
 APPLICATION = "rule_learning"

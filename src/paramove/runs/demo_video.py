@@ -12,15 +12,15 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.pictures import decoded
+from paramove.documents import replacing
+from paramove.documents import decoded
 from paramove.runs.recorded_run import recording_in
 from paramove.runs.run_summary import RunEvaluation
 from paramove.runs.story import Story
 from paramove.runs.video_frame import SIZE, VideoFrame
 from paramove.runs.video_writer import VideoError, VideoWriter
-from paramove.documents.input_error import InputError
-from paramove.documents.array_types import Image
+from paramove.documents import InputError
+from paramove.documents import Image
 
 
 FRAMES_PER_S = 10.0

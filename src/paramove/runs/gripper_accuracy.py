@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Motion, Relocation
-from paramove.motion.planned_motion import RelocationOptions
-from paramove.robots.description import RobotDescription
-from paramove.documents.array_types import Floats
+from paramove.motion import RelocationOptions
+from paramove.robots import RobotDescription
+from paramove.documents import Floats
 
 
 

@@ -12,8 +12,8 @@ from paramove.bus import topics
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.spread import spread
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.objects.homography import PlaneHomography
-from paramove.documents.array_types import Floats
+from paramove.objects import PlaneHomography
+from paramove.documents import Floats
 
 
 GRID_X = (0.135, 0.190)

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from paramove.demonstrations.reaching import table_place
-from paramove.documents.reports import film, report_page, section
+from paramove.demonstrations import table_place
+from paramove.documents import film, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing_run import PointingRun
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from paramove.bus import topics
 from paramove.runs.recorded_run import RunFolderError, recording_in
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 
 FARTHEST_M = 0.10

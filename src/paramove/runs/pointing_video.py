@@ -17,13 +17,13 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.runs.recorded_run import recording_in
 from paramove.runs.video_writer import VideoWriter
 from paramove.msgs.gesture_pb2 import Gesture
-from paramove.cameras.calibrated import CalibratedCamera, read_cameras
-from paramove.cameras.frames import decode
-from paramove.documents.array_types import Image
+from paramove.cameras import CalibratedCamera, read_cameras
+from paramove.cameras import decode
+from paramove.documents import Image
 
 
 WIDTH_PX = 960

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.bus import topics
-from paramove.documents.positions import read_document
+from paramove.documents import read_document
 from paramove.runs.traffic import Traffic
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.recording.parts import PartedRecording
-from paramove.recording.reader import Recorded
-from paramove.documents.array_types import Floats
+from paramove.recording import PartedRecording
+from paramove.recording import Recorded
+from paramove.documents import Floats
 
 
 HEAVY = frozenset(

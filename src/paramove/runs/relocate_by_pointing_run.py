@@ -14,7 +14,7 @@ from paramove.runs.relocations import Relocation, relocations_of
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 
 SCALE = 0.42

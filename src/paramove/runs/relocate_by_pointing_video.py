@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.runs.pointing_video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in
 from paramove.runs.video_frame import (
@@ -30,8 +30,8 @@ from paramove.runs.video_frame import (
     paste,
 )
 from paramove.runs.video_writer import VideoWriter
-from paramove.cameras.frames import decode
-from paramove.documents.array_types import Image
+from paramove.cameras import decode
+from paramove.documents import Image
 
 
 FRAMES_PER_S = 10.0

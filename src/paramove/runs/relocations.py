@@ -14,7 +14,7 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 
 _LAST = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)

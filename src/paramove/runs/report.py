@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.reports import folded, report_page, section, table
+from paramove.documents import folded, report_page, section, table
 from paramove.runs import plots
 from paramove.runs.plots import svg_of
 from paramove.runs.run_summary import RunEvaluation

@@ -13,12 +13,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.runs.after_a_run import evaluated
 from paramove.runs.recorded_run import load_run
 from paramove.runs.run_summary import RunEvaluation, as_json
 from paramove.runs.verdict_table import show_verdict
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 
 ROBOT = Path("robot_description/hoap3")
 

@@ -19,7 +19,7 @@ from paramove.runs.relocations import Motion, Relocation, motions_of, relocation
 from paramove.runs.spread import spread
 from paramove.runs.traffic import speakers
 from paramove.msgs.rule_pb2 import Speech
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from collections.abc import Iterable
 from typing import Any
 from paramove.runs.relocations import Relocation

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from paramove.bus import topics
-from paramove.documents.positions import read_document
+from paramove.documents import read_document
 from paramove.runs.after_a_run import evaluated, write_run_json
 from paramove.runs.recorded_run import RunFolderError
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.msgs.truth_pb2 import TruthState
-from paramove.recording.parts import PartedRecording
-from paramove.documents.array_types import Floats
+from paramove.recording import PartedRecording
+from paramove.documents import Floats
 
 
 REACHED_M, PLACED_M = 0.015, 0.010

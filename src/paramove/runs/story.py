@@ -11,8 +11,8 @@ from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Relocation
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.recording.reader import Recorded
-from paramove.objects.homography import PlaneHomography
+from paramove.recording import Recorded
+from paramove.objects import PlaneHomography
 
 GESTURE_SHOWN_S = 1.5
 _IN_WORDS = {

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from paramove.bus import topics
-from paramove.documents.positions import read_document
-from paramove.recording.reader import Recorded
-from paramove.supervision.interfaces import InterfaceError, read_interface
+from paramove.documents import read_document
+from paramove.recording import Recorded
+from paramove.supervision import InterfaceError, read_interface
 
 
 @dataclass

@@ -14,7 +14,7 @@ from PIL import ImageDraw, ImageFont
 
 from paramove.runs.story import Moment
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 
 Colour = tuple[int, int, int]
 

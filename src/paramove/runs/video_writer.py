@@ -10,7 +10,7 @@ from typing import Self
 import av
 import numpy as np
 from numpy.typing import NDArray
-from paramove.documents.array_types import Image
+from paramove.documents import Image
 
 
 WAITING_FRAMES = 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.gate_io import Measured, Targets
 from paramove.safety.limits import MotionLimits
 from paramove.safety.stopping import stop_ramp, straight_move

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.gate_io import Clearance, Fault
 from paramove.safety.limits import INWARD_SHARE, MotionLimits
 

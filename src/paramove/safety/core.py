@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.gate_io import (
     ArmWord,

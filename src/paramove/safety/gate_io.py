@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 PERSON_STOP = "person_stop"
 """Code of the fault that a person's stop latches."""

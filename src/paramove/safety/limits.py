@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 # Accelerations are taken over two spans of this length; a span is at least one row. A single 1 ms difference of angles
 # that were rounded to six decimals is noise of 1 rad/s²; over 4 ms it is 0.06 rad/s².

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 
 LINEAR_UP_TO_S = 0.002
 DENSE_UP_TO_S = 0.050

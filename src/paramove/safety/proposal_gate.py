@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.clearance import clearance_fault
 from paramove.safety.gate_io import Clearance, Fault, Measured, Proposal, SafetySettings

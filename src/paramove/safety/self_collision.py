@@ -12,8 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 
 FAR_M = 0.05
 TOUCHING_M = 0.005

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.limits import MotionLimits
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.limits import MotionLimits
 from paramove.safety.path_sampling import largest_detour, sample_path
 

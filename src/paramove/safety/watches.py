@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.safety.gate_io import Fault, Measured
 
 RATE_WINDOW_NS = 250_000_000

@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from paramove.documents.wording import nearest
+from paramove.documents import nearest
 from paramove.supervision.control import Answer
 from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from paramove.bus.endpoint import socket_path
+from paramove.bus import socket_path
 
 NAME = "control"
 LONGEST_REQUEST = 4096

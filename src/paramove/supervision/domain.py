@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.bus.settings import default_folder, lock_of
+from paramove.bus import default_folder, lock_of
 
 LONGEST_FOLDER = 70
 """Bytes of a folder's path; a socket's path may have 107 and the longest topic name needs the rest."""

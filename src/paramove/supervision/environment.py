@@ -14,7 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
-from paramove.bus.settings import default_folder
+from paramove.bus import default_folder
 from paramove.supervision.domain import check_name
 
 OPEN_FILES = 256

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.bus import inspection, topics
-from paramove.bus.topics import CLOCK, Topic
+from paramove.bus import CLOCK, Topic, inspection, topics
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.wiring import on_bus

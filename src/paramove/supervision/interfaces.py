@@ -11,8 +11,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.bus import topics
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, topics
 
 
 class InterfaceError(ValueError):

@@ -11,18 +11,19 @@ from typing import get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from paramove.documents.files import read_text
-from paramove.documents.input_error import InputError
-from paramove.documents.positions import (
+from paramove.documents import (
     MAX_CHARACTERS,
     Document,
     DocumentError,
+    InputError,
     KeyPath,
     Position,
+    closest,
+    nearest,
     raise_any,
     read_mapping,
+    read_text,
 )
-from paramove.documents.wording import closest, nearest
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
 from paramove.supervision.references import with_values, wrong_references
 

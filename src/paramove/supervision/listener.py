@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from paramove.bus import topics
-from paramove.bus.exchange import Exchange
-from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard
+from paramove.bus import BusSettings, Exchange, Heard, topics
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 

@@ -17,8 +17,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from paramove.documents.positions import DocumentError
-from paramove.documents.wording import nearest
+from paramove.documents import DocumentError, nearest
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
-from paramove.documents.wording import printable
+from paramove.documents import printable
 
 _HERE = Path(__file__).parent
 _NO_SITE = ("-I", "-S")  # these two files need the standard library only, and start faster so

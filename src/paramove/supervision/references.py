@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from paramove.documents.positions import Document, DocumentError, Position, read_value
-from paramove.documents.wording import nearest
+from paramove.documents import Document, DocumentError, Position, nearest, read_value
 
 Findings = list[DocumentError]
 

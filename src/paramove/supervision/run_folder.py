@@ -9,7 +9,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.supervision.launch_file import Launch
 
 

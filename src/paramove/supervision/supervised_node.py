@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 import psutil
 
-from paramove.documents.exit_codes import FAILURE, NEVER_RESTARTED, OK, describe
-from paramove.documents.wording import printable
+from paramove.documents import FAILURE, NEVER_RESTARTED, OK, describe, printable
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision.launch_schema import NodeSettings
 from paramove.supervision.processes import SupervisedProcess

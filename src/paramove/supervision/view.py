@@ -12,7 +12,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from paramove.documents.wording import printable
+from paramove.documents import printable
 from paramove.supervision.queued_output import QueuedOutput
 from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 

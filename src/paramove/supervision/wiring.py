@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from paramove.bus import topics
-from paramove.bus.topics import CLOCK, Topic
-from paramove.documents.positions import DocumentError, raise_any
-from paramove.documents.wording import nearest
+from paramove.bus import CLOCK, Topic, topics
+from paramove.documents import DocumentError, nearest, raise_any
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.parameters import wrong_parameters

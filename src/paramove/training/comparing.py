@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.phmm import MovementClassifier, ParametricHMM
 from paramove.training.drawing import bounds, dimension, parameter_names, point_names, raster
 from paramove.training.examining import Examiner

@@ -13,10 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from scipy.stats import chi2
 
-from paramove.demonstrations.plots import POINTS_FIRST
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import nearest
+from paramove.demonstrations import POINTS_FIRST
+from paramove.documents import Floats, InputError, nearest
 from paramove.phmm import ParametricHMM
 from paramove.training.examples import is_place
 

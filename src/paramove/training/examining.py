@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from paramove.demonstrations import DemonstrationError, Movement
-from paramove.demonstrations.body_frame import BODY, in_body_frame, mirrored
-from paramove.demonstrations.timing import resampled
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_frame, mirrored, resampled
+from paramove.documents import Floats, InputError
 from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of

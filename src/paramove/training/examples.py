@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramove.demonstrations import DemonstrationError, DemonstrationSet
-from paramove.demonstrations.movement import AXIS_ENDINGS
-from paramove.documents.array_types import Floats
-from paramove.documents.wording import nearest
+from paramove.demonstrations import AXIS_ENDINGS, DemonstrationError, DemonstrationSet
+from paramove.documents import Floats, nearest
 from paramove.phmm import MovementDescription
-from paramove.robots.pose_points import ARM_BASE
+from paramove.robots import ARM_BASE
 
 VARIES = 0.1
 """A coordinate of a place whose range is a smaller share of the widest coordinate's is taken for constant."""

@@ -11,10 +11,9 @@ from scipy.spatial import Delaunay, QhullError
 from scipy.stats import chi2
 
 from paramove.alignment import movement_distance
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.hmm import resample
-from paramove.phmm import InterpolativePHMM, ParametricHMM
-from paramove.phmm.performance import groups_of
+from paramove.phmm import InterpolativePHMM, ParametricHMM, groups_of
 from paramove.training.examples import Examples, is_place
 
 LeftOutBy = Literal["theta", "subject", "repetition"]

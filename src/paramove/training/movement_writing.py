@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.pose_recording import BILLION, PoseRecording, write_poses
-from paramove.documents.array_types import Floats
-from paramove.documents.atomic_writing import replacing
+from paramove.demonstrations import BILLION, PoseRecording, write_poses
+from paramove.documents import Floats, replacing
 from paramove.phmm import MovementDescription, ParametricHMM
 from paramove.training.drawing import point_names
 

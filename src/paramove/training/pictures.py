@@ -11,8 +11,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from paramove.documents.array_types import Floats
-from paramove.hmm.synthesis import expected_durations
+from paramove.documents import Floats
+from paramove.hmm import expected_durations
 from paramove.phmm import ParametricHMM
 from paramove.training.drawing import (
     ACTION_COLOURS,

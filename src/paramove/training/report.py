@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from paramove.documents.reports import image, report_page
+from paramove.documents import image, report_page
 from paramove.training.drawing import ACTION_COLOURS, INK, WARN, bounds, new_figure, with_unit
 from paramove.training.leaving_out import LeaveOutResult, worst
 from paramove.training.pictures import plot_model

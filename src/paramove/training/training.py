@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from paramove.documents.atomic_writing import replacing
+from paramove.documents import replacing
 from paramove.phmm import MovementClassifier, ParametricHMM
 from paramove.training.examples import Examples
 from paramove.training.kinds import kind_of

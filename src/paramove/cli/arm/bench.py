@@ -14,7 +14,7 @@ from paramove.cli.bus_options import JsonOption
 from paramove.documents import exit_codes
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel.bus.bench import BusBench
+    from paramove.robots.dynamixel import BusBench
 
 FINDING = 3
 LEAST_COMPLETE = 0.99
@@ -34,7 +34,7 @@ def bench(
     Exit codes: 0 measured; 3 it cannot hold --rate, more than one read in 100 is not complete, or the adapter's latency
     timer is slow; 69 no adapter or servo.
     """
-    from paramove.robots.dynamixel.bus.bench import bench_bus, latency_timer_ms, slow_timer
+    from paramove.robots.dynamixel import bench_bus, latency_timer_ms, slow_timer
 
     with open_arm(by_id, serial, data, baud_rate) as arm:
         numbers = sorted({servo.number for servo in arm.chain.ping_all()})

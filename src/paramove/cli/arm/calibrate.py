@@ -28,9 +28,7 @@ def calibrate(
     77 the data folder cannot be written, which is told at the start; 78 what was shown does not fit the description,
     with the cause; 130 Ctrl-C, and the old file stays.
     """
-    from paramove.robots.dynamixel.calibration.arm_calibration import check_can_be_kept
-    from paramove.robots.dynamixel.calibration.arm_plan import load_plan
-    from paramove.robots.dynamixel.calibration.procedure import ArmCalibrator
+    from paramove.robots.dynamixel import ArmCalibrator, check_can_be_kept, load_plan
 
     with explained():
         plan = load_plan(robot)

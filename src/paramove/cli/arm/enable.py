@@ -53,9 +53,8 @@ def disable(domain: DomainOption = None) -> None:
 
 
 def _answer(armed: bool, domain: str | None) -> SafetyState:
-    from paramove.bus.endpoint import BusFolderError, TopicTakenError
-    from paramove.bus.settings import default_folder
-    from paramove.operator.terminal_arming import arm_by_word
+    from paramove.bus import BusFolderError, TopicTakenError, default_folder
+    from paramove.operator import arm_by_word
 
     folder = default_folder(domain)
     if not folder.is_dir():
@@ -75,7 +74,7 @@ def _answer(armed: bool, domain: str | None) -> SafetyState:
 
 
 def _is(state: SafetyState, armed: bool) -> bool:
-    from paramove.operator.terminal_arming import obeyed
+    from paramove.operator import obeyed
 
     return obeyed(state, armed)
 

@@ -19,11 +19,10 @@ def estop(domain: DomainOption = None) -> None:
 
     Exit codes: 0 the safety gate has answered; 69 it has not within 1 s.
     """
-    from paramove.bus.endpoint import BusFolderError, TopicTakenError
-    from paramove.bus.settings import default_folder
+    from paramove.bus import BusFolderError, TopicTakenError, default_folder
     from paramove.msgs.safety_state_pb2 import SafetyState
-    from paramove.operator.terminal_stop import stop_arm
-    from paramove.safety.gate_io import PERSON_STOP
+    from paramove.operator import stop_arm
+    from paramove.safety import PERSON_STOP
 
     folder = default_folder(domain)
     if not folder.is_dir():

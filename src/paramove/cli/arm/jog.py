@@ -16,13 +16,11 @@ import typer
 from paramove.cli.arm.options import ended
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
 from paramove.cli.bus_options import DomainOption, bus_folder
-from paramove.documents import exit_codes
-from paramove.documents.wording import printable
-from paramove.supervision.queued_output import QueuedOutput
+from paramove.documents import exit_codes, printable
+from paramove.supervision import QueuedOutput
 
 if TYPE_CHECKING:
-    from paramove.bus.publisher import Publisher
-    from paramove.bus.subscriber import Subscriber
+    from paramove.bus import Publisher, Subscriber
 
 PERIOD_S, PATIENCE_S, STOP_S = 0.02, 3.0, 1.0
 SILENT_S = 2.0
@@ -41,7 +39,7 @@ def jog(
 
     Exit codes: 0 ended by q; 1 no bus; 69 no arm is heard; 75 another program says trajectories.
     """
-    from paramove.bus.endpoint import TopicTakenError
+    from paramove.bus import TopicTakenError
 
     folder = bus_folder(domain)
     try:
@@ -68,10 +66,8 @@ class _Link:
     """The bus as jogging needs it, while it is a context; by_person: a person presses the keys, and no program."""
 
     def __init__(self, folder: Path, step: float, by_person: bool) -> None:
-        from paramove.bus import topics
-        from paramove.bus.visitor import BusVisitor
-        from paramove.operator.arming_key import ArmingKey
-        from paramove.operator.jogging import Jogging
+        from paramove.bus import BusVisitor, topics
+        from paramove.operator import ArmingKey, Jogging
 
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
         self._folder, self._topics, self._by_person = folder, topics, by_person
@@ -107,9 +103,8 @@ class _Link:
 
     def press(self, key: str) -> None:
         """Does what a key stands for."""
-        from paramove.bus.visitor import say_now
-        from paramove.operator.terminal_arming import TERMINAL
-        from paramove.operator.terminal_stop import stop_arm
+        from paramove.bus import say_now
+        from paramove.operator import TERMINAL, stop_arm
 
         if key.isdecimal():
             self.jogging.choose(int(key) - 1)
@@ -177,10 +172,9 @@ class _Link:
         self._shown = what
 
     def _arm(self) -> None:
-        from paramove.bus.endpoint import TopicTakenError
-        from paramove.bus.visitor import say_now
+        from paramove.bus import TopicTakenError, say_now
         from paramove.msgs.safety_state_pb2 import ArmRequest
-        from paramove.operator.terminal_arming import TERMINAL
+        from paramove.operator import TERMINAL
 
         try:
             self._arms = self._arms or self._bus.says(self._topics.OPERATOR_ARM)

@@ -12,15 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import printable
-from paramove.robots.dynamixel.bus.serial_adapters import BY_ID_VARIABLE, SerialAdapter, serial_adapter
-from paramove.robots.dynamixel.calibration.arm_calibration import DATA_VARIABLE, calibration_path
+from paramove.documents import InputError, exit_codes, printable
+from paramove.robots.dynamixel import BY_ID_VARIABLE, DATA_VARIABLE, SerialAdapter, calibration_path, serial_adapter
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel import ArmCalibration, ServoChain
 
 DEFAULT_BAUD_RATE = 1_000_000
 LATENCY_S = 0.1
@@ -67,7 +63,7 @@ class OpenArm:
 
     def calibration(self) -> ArmCalibration:
         """Of this arm. Raises CalibrationError."""
-        from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+        from paramove.robots.dynamixel import ArmCalibration
 
         return ArmCalibration.load(self.path, self.adapter.serial)
 
@@ -75,8 +71,7 @@ class OpenArm:
 @contextlib.contextmanager
 def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int = 0) -> Iterator[OpenArm]:
     """The adapter's port, open at this baud rate or the calibrated one; ends the command, with the cause, on errors."""
-    from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-    from paramove.robots.dynamixel.bus.servo_port import ServoPort
+    from paramove.robots.dynamixel import ServoChain, ServoPort
 
     with explained():
         try:
@@ -96,8 +91,7 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
     """Ends the command with a sentence where a servo, the port or a file is not as it must be, and at Ctrl-C."""
-    from paramove.robots.dynamixel.bus.servo_chain import ServoError, ServoSilentError
-    from paramove.robots.dynamixel.bus.servo_port import PortLostError
+    from paramove.robots.dynamixel import PortLostError, ServoError, ServoSilentError
 
     try:
         yield
@@ -122,7 +116,7 @@ def ended(sentence: str, code: int) -> typer.Exit:
 
 def configured_baud_rate(path: Path) -> int:
     """As calibrated, 0 without a calibration that can be read."""
-    from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+    from paramove.robots.dynamixel import ArmCalibration
 
     try:
         return ArmCalibration.read(path).bus.baud_rate

@@ -25,17 +25,23 @@ def reboot(
     Exit codes: 0 rebooted and without error; 1 it still has a hardware error; 2 its joint carries something, so hold
     the arm and say --yes; 69 it does not answer.
     """
-    from paramove.robots.dynamixel.bus import servo_reboot
+    from paramove.robots.dynamixel import (
+        ServoLoadedError,
+        check_unloaded,
+        reboot_sentences,
+        reboot_servo,
+        servo_before_reboot,
+    )
 
     with open_arm(by_id, serial, data, baud_rate) as arm:
-        servo = servo_reboot.servo_before_reboot(arm.chain, number)
-        typer.echo("\n".join(servo_reboot.sentences(servo)))
+        servo = servo_before_reboot(arm.chain, number)
+        typer.echo("\n".join(reboot_sentences(servo)))
         try:
             if not yes:
-                servo_reboot.check_unloaded(arm.chain, servo)
-        except servo_reboot.ServoLoadedError as error:
+                check_unloaded(arm.chain, servo)
+        except ServoLoadedError as error:
             raise ended(str(error), exit_codes.USAGE) from error
-        after = servo_reboot.reboot_servo(arm.chain, number)
+        after = reboot_servo(arm.chain, number)
     if after.hardware_error:
-        raise ended(f"rebooted, but {servo_reboot.sentences(after)[0]}", exit_codes.FAILURE)
+        raise ended(f"rebooted, but {reboot_sentences(after)[0]}", exit_codes.FAILURE)
     typer.echo(f"servo {number} was rebooted: no hardware error, torque off")

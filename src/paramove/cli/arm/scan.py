@@ -10,11 +10,10 @@ import typer
 from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
 from paramove.cli.bus_options import JsonOption, show
 from paramove.documents import exit_codes
-from paramove.robots.dynamixel.bus.hardware_error import in_words
-from paramove.robots.dynamixel.bus.serial_adapters import serial_adapters
+from paramove.robots.dynamixel import in_words, serial_adapters
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel.bus.scan import FoundServo
+    from paramove.robots.dynamixel import FoundServo
 
 FINDING = 3
 
@@ -37,7 +36,7 @@ def scan(
     Exit codes: 0 servos were found; 3 something about them must be put right; 69 no adapter, or no servo answers;
     75 the adapter is in use; 77 not allowed to open it.
     """
-    from paramove.robots.dynamixel.bus.scan import USUAL_BAUD_RATES, listed, scan_bus
+    from paramove.robots.dynamixel import USUAL_BAUD_RATES, listed, scan_bus
 
     adapters = [one for one in serial_adapters(by_id) if serial in ("", one.serial)]
     if not adapters:

@@ -10,13 +10,10 @@ import typer
 
 from paramove.cli.arm.options import ByIdOption, DataOption, RobotOption, SerialOption, ended, explained, open_arm
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
-from paramove.documents import exit_codes
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError, exit_codes
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel.bus.scan import FoundServo
-    from paramove.robots.dynamixel.bus.servo_chain import ServoChain
-    from paramove.robots.dynamixel.calibration.arm_plan import ArmPlan, PlannedServo
+    from paramove.robots.dynamixel import ArmPlan, FoundServo, PlannedServo, ServoChain
 
 
 def setup(
@@ -35,7 +32,7 @@ def setup(
 
     Exit codes: 0 all are set up; 1 ended before; 69 no adapter; 78 no such joint or description; 130 Ctrl-C.
     """
-    from paramove.robots.dynamixel.calibration.arm_plan import load_plan
+    from paramove.robots.dynamixel import load_plan
 
     with explained():
         plan = load_plan(robot)
@@ -66,8 +63,7 @@ def _set_up(
     chain: ServoChain, plan: ArmPlan, servo: PlannedServo, person: TerminalPerson, done: Sequence[PlannedServo]
 ) -> None:
     """Asks until the right servo is connected alone and has taken its settings; it is none of those that are done."""
-    from paramove.robots.dynamixel.bus.servo_chain import ServoError
-    from paramove.robots.dynamixel.bus.servo_setup import only_servo, set_up
+    from paramove.robots.dynamixel import ServoError, only_servo, set_up
 
     while True:
         person.until_done(f"Connect the servo of {servo.joint} ({servo.model}) and no other.", list)

@@ -23,14 +23,13 @@ from paramove.cli.arm.options import (
     open_arm,
 )
 from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
-from paramove.documents import exit_codes
-from paramove.documents.wording import printable
-from paramove.supervision.queued_output import QueuedOutput
+from paramove.documents import exit_codes, printable
+from paramove.supervision import QueuedOutput
 
 if TYPE_CHECKING:
-    from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
-    from paramove.robots.description import RobotDescription
-    from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+    from paramove.demonstrations import KinestheticTeacher
+    from paramove.robots import RobotDescription
+    from paramove.robots.dynamixel import LimpArm
 
 PERIOD_S = 0.02
 KEYS = "space begins and ends a segment, d drops the last one, q ends"
@@ -58,10 +57,9 @@ def teach(
     77 the set cannot be written; 78 there is a set already, or it has other parameters; 130 Ctrl-C, segments that have
     ended are kept.
     """
-    from paramove.demonstrations.kinesthetic_teaching import KinestheticTeacher
-    from paramove.robots.description import RobotDescription
-    from paramove.robots.dynamixel.arm.floating_arm import FloatingArm
-    from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+    from paramove.demonstrations import KinestheticTeacher
+    from paramove.robots import RobotDescription
+    from paramove.robots.dynamixel import FloatingArm, LimpArm
 
     with explained():
         description = RobotDescription.load(robot)
@@ -119,7 +117,7 @@ def _lead(limp: LimpArm, teacher: KinestheticTeacher, person: TerminalPerson) ->
 
 def _press(key: str, teacher: KinestheticTeacher) -> None:
     """Does what a key stands for, and tells it."""
-    from paramove.demonstrations.movement import DemonstrationError
+    from paramove.demonstrations import DemonstrationError
 
     try:
         if key == " " and not teacher.is_recording:

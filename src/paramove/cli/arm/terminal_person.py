@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import typer
 
-from paramove.documents.wording import printable
+from paramove.documents import printable
 
 PERIOD_S = 0.02
 """From look to look: a joint that is moved by hand turns by a few degrees."""

@@ -51,9 +51,7 @@ def verify(
     Exit codes: 0 no difference; 2 contrary options; 3 differences, in a table; 66 no calibration; 69 no adapter, or no
     servo answers; 78 the file is damaged, edited and not signed, or of another arm.
     """
-    from paramove.robots.dynamixel.calibration.arm_calibration import sign_again
-    from paramove.robots.dynamixel.calibration.arm_plan import load_plan
-    from paramove.robots.dynamixel.calibration.servo_settings import adopted, compare
+    from paramove.robots.dynamixel import adopted, compare, load_plan, sign_again
 
     if write and adopt:
         raise ended("--write and --adopt are contrary: choose one", exit_codes.USAGE)
@@ -80,7 +78,7 @@ def verify(
 
 def _check_baud_rate(arm: OpenArm) -> None:
     """Looks for the servos at other baud rates if none answers, and ends the command."""
-    from paramove.robots.dynamixel.bus.scan import USUAL_BAUD_RATES, scan_bus
+    from paramove.robots.dynamixel import USUAL_BAUD_RATES, scan_bus
 
     rate = arm.chain.port.baud_rate
     if any(arm.chain.ping(joint.id) for joint in arm.calibration().joints.values()):
@@ -91,7 +89,7 @@ def _check_baud_rate(arm: OpenArm) -> None:
 
 
 def _write(arm: OpenArm) -> None:
-    from paramove.robots.dynamixel.calibration.servo_settings import write_settings
+    from paramove.robots.dynamixel import write_settings
 
     for name, joint in arm.calibration().joints.items():
         for register, (before, after) in write_settings(arm.chain, joint).items():

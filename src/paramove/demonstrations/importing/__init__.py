@@ -1,6 +1,5 @@
 """Files of motion capture read into takes: C3D, BVH, CSV and NPZ."""
 
-from paramove.demonstrations.importing.conversion import ImportOptions, axes_matrix, read_mapping_file
-from paramove.demonstrations.importing.files import SUFFIXES, Imported, import_file
+import lazy_loader
 
-__all__ = ["SUFFIXES", "ImportOptions", "Imported", "axes_matrix", "import_file", "read_mapping_file"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

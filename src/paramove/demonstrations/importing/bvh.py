@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from paramove.demonstrations import DemonstrationError
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.array_types import Floats
-from paramove.documents.files import read_text
+from paramove.documents import Floats, read_text
 
 MOST_LEVELS = 200
 MOST_JOINTS = 1000

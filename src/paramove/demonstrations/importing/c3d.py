@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from paramove.demonstrations import DemonstrationError
 from paramove.demonstrations.importing import c3d_process
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.arrays import read_arrays
-from paramove.documents.files import size_of
+from paramove.documents import read_arrays, size_of
 
 TIME_LIMIT_S = 120.0
 

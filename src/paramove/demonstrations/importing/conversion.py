@@ -11,12 +11,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from paramove.demonstrations import DemonstrationError, Take, place_of_theta, recording_name
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError, place_of_theta
-from paramove.demonstrations.writing import Take, recording_name
-from paramove.documents.array_types import Floats
-from paramove.documents.positions import read_document
-from paramove.documents.wording import closest, nearest
+from paramove.documents import Floats, closest, nearest, read_document
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 FRAME = "laboratory"

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from paramove.demonstrations import DemonstrationError
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.documents.array_types import Floats
-from paramove.documents.files import size_of, unreadable
+from paramove.documents import Floats, size_of, unreadable
 
 COLUMN = re.compile(r"(.+?)[ _.:/-]?([xyz])", re.IGNORECASE)
 TIMES = {"time": 1.0, "time_s": 1.0, "t": 1.0, "time_ms": 1e-3, "time_ns": 1e-9, "timestamp": 1.0}

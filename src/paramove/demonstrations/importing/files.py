@@ -8,16 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from paramove.demonstrations.gaps import fill_gaps
+from paramove.demonstrations import DemonstrationError, Label, Take, fill_gaps, movements_by_speed, recording_name
 from paramove.demonstrations.importing.bvh import read_bvh
 from paramove.demonstrations.importing.c3d import read_c3d
 from paramove.demonstrations.importing.conversion import ImportOptions, converted
 from paramove.demonstrations.importing.csv_file import read_csv
 from paramove.demonstrations.importing.npz import read_npz
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.labelling import movements_by_speed
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.demonstrations.writing import Label, Take, recording_name
 
 READERS: dict[str, Callable[[Path], list[RawTake]]] = {
     ".c3d": read_c3d,

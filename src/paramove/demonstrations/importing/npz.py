@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from paramove.demonstrations import DemonstrationError, Label
 from paramove.demonstrations.importing.raw import RawTake
-from paramove.demonstrations.movement import DemonstrationError
-from paramove.demonstrations.writing import Label
-from paramove.documents.array_types import Floats
-from paramove.documents.arrays import read_arrays
+from paramove.documents import Floats, read_arrays
 
 TARGET = ("target_x", "target_y", "target_z")
 SIDES = {"L": "left", "R": "right", "left": "left", "right": "right"}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from paramove.demonstrations.writing import Label
-from paramove.documents.array_types import Floats
+from paramove.demonstrations import Label
+from paramove.documents import Floats
 
 
 @dataclass(frozen=True)

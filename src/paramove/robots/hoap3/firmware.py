@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.documents import Floats
+from paramove.robots import DescriptionError, RobotDescription
 
 
 class Firmware:

@@ -14,18 +14,29 @@ from dataclasses import dataclass
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyFault, SafetyState, StopRequest
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from paramove.robots.streaming.execution import Execution
 from paramove.robots.streaming.robot_report import RobotReport
 from paramove.robots.streaming.stream import StreamWriter
-from paramove.safety.core import TOUCHED, SafetyCore
-from paramove.safety.gate_io import PERSON_STOP, ArmWord, Clearance, Fault, Inputs, Proposal, SafetySettings, State
-from paramove.safety.stopping import longest_path_s
-from paramove.safety.trajectory_check import TrajectoryRefusedError, check_trajectory
+from paramove.safety import (
+    PERSON_STOP,
+    TOUCHED,
+    ArmWord,
+    Clearance,
+    Fault,
+    Inputs,
+    Proposal,
+    SafetyCore,
+    SafetySettings,
+    State,
+    TrajectoryRefusedError,
+    check_trajectory,
+    longest_path_s,
+)
 
 SAFETY_STATES = {
     State.DISCONNECTED: SafetyState.STATE_DISCONNECTED,

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from paramove.robots.streaming.robot_report import RobotReport
-from paramove.safety.gate_io import Fault
+from paramove.safety import Fault
 
 START_TIMEOUT_S = 0.5
 SETTLE_TIMEOUT_S = 1.0

@@ -8,11 +8,10 @@ import numpy as np
 from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
-from paramove.robots.description import RobotDescription
-from paramove.robots.joint_units import JointRangeError
-from paramove.safety.gate_io import Measured
+from paramove.robots import JointRangeError, RobotDescription
+from paramove.safety import Measured
 
 
 @dataclass(frozen=True, eq=False)

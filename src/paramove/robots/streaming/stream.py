@@ -12,9 +12,9 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
+from paramove.documents import Floats
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 
 Frames = NDArray[np.int16]
 

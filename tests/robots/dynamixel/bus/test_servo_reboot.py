@@ -6,8 +6,8 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoSilentError
 from paramove.robots.dynamixel.bus.servo_reboot import (
     ServoLoadedError,
     check_unloaded,
+    reboot_sentences,
     reboot_servo,
-    sentences,
     servo_before_reboot,
 )
 from tests.robots.dynamixel.small_arm import small_arm
@@ -26,10 +26,10 @@ def test_the_error_is_told_and_cleared_and_the_others_hold(arm):
     with arm.emulator.lock:
         arm.emulator.bus.servos[1].memory["Hardware Error Status"] = 0x20
     servo = servo_before_reboot(arm.chain, 2)
-    assert sentences(servo) == ["servo 2: overloaded; take the load off; look for what blocked the joint"]
+    assert reboot_sentences(servo) == ["servo 2: overloaded; take the load off; look for what blocked the joint"]
     after = reboot_servo(arm.chain, 2)
     assert (after.hardware_error, after.torque) == (0, False)
-    assert sentences(after) == ["servo 2: no hardware error"]
+    assert reboot_sentences(after) == ["servo 2: no hardware error"]
     assert [arm.memory(joint)["Torque Enable"] for joint in ("pan", "lift", "elbow")] == [1, 0, 1]
 
 

@@ -12,19 +12,17 @@ from typing import Any, Self
 import mujoco
 import numpy as np
 
-from paramove.bus import topics
-from paramove.bus.topics import Topic
+from paramove.bus import Topic, topics
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory
 from paramove.msgs.motor_status_pb2 import MotorStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, StopRequest
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings, ServoLoop
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.streaming.driver import ArmDriver
-from paramove.safety.gate_io import SafetySettings, State
-from paramove.safety.self_collision import SelfCollision
+from paramove.robots.streaming import ArmDriver
+from paramove.safety import SafetySettings, SelfCollision, State
 
 FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from where it is commanded: more means that somebody or something holds it."""

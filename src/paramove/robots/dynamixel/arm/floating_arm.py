@@ -7,9 +7,8 @@ import time
 import mujoco
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
-from paramove.robots.description import RobotDescription
+from paramove.documents import Floats, InputError
+from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.robots.description import RobotDescription
+from paramove.documents import Floats
+from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
+from paramove.robots import INT16_RANGE
 from paramove.robots.dynamixel.arm.servo_checks import (
     ENDS,
     JointServo,
@@ -25,8 +25,7 @@ from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import Answered, ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
-from paramove.robots.joint_units import INT16_RANGE
-from paramove.safety.gate_io import Fault
+from paramove.safety import Fault
 
 Counts = NDArray[np.int16]
 

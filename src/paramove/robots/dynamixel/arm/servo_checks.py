@@ -13,7 +13,7 @@ from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
 from paramove.robots.dynamixel.calibration.arm_calibration import JointCalibration
-from paramove.safety.gate_io import Fault
+from paramove.safety import Fault
 
 POSITION_MODE, GRIP_MODE = 3, 5
 OLDEST_FIRMWARE = 42

@@ -17,19 +17,16 @@ from typing import Self
 
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
-from paramove.robots.description import RobotDescription
+from paramove.robots import RESTARTED, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, Patience, ServoArm
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
-from paramove.robots.streaming.driver import ArmDriver, DriverSays
-from paramove.robots.streaming.stream import StreamReader
-from paramove.robots.this_launch import RESTARTED, ThisLaunch
-from paramove.safety.gate_io import Fault, State
+from paramove.robots.streaming import ArmDriver, DriverSays, StreamReader
+from paramove.safety import Fault, State
 
 SLOW_SHARE = 0.5
 """Of the operating velocity."""

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from paramove.robots.description import DescriptionError, RobotDescription
+from paramove.robots import DescriptionError, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
 from paramove.robots.dynamixel.arm.servo_arm import Patience
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
@@ -19,8 +19,7 @@ from paramove.robots.dynamixel.bus.serial_adapters import serial_of
 from paramove.robots.dynamixel.bus.servo_models import CURRENT_UNIT_MA, model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
-from paramove.robots.this_launch import ThisLaunch
-from paramove.safety.gate_io import Fault
+from paramove.safety import Fault
 
 LATENCY_SHARE = 0.8
 """Of the time for reading all servos: so long the loop may wait for one. A missing one costs periods, one that is late

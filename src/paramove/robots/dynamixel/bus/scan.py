@@ -14,7 +14,7 @@ from functools import cache
 from dynamixel_easy_sdk.control_table import ControlTable
 from dynamixel_easy_sdk.dynamixel_error import DxlRuntimeError
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.servo_chain import PingedServo, ServoChain
 from paramove.robots.dynamixel.bus.servo_models import MODELS, Register, ServoModel
 from paramove.robots.dynamixel.bus.servo_port import PortLostError

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 
 BY_ID = Path("/dev/serial/by-id")
 BY_ID_VARIABLE = "PARAMOVE_SERIAL_BY_ID"

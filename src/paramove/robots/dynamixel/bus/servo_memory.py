@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from paramove.documents.input_error import InputError
-from paramove.documents.wording import nearest
+from paramove.documents import InputError, nearest
 from paramove.robots.dynamixel.bus.packets import StatusError
 from paramove.robots.dynamixel.bus.servo_models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
 

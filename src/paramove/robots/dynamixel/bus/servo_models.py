@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from dynamixel_easy_sdk.control_table import ControlTable
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 
 RAM_BEGINS = 64
 """Addresses below are kept without power, and locked while torque is on."""

@@ -22,7 +22,7 @@ from typing import Any, Self
 import serial
 
 from paramove.devices import holders, serial_remedy
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.packets import BEFORE_INSTRUCTION, BEFORE_LENGTH, HEADER, Packet, encoded
 from paramove.robots.dynamixel.bus.serial_adapters import default_by_id, serial_adapters
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
@@ -28,7 +28,7 @@ def servo_before_reboot(chain: ServoChain, number: int) -> FoundServo:
     return looked_at(chain, pinged)
 
 
-def sentences(servo: FoundServo) -> list[str]:
+def reboot_sentences(servo: FoundServo) -> list[str]:
     """Its hardware errors in words, each with what helps."""
     if servo.hardware_error is None:
         return [f"servo {servo.number}: its hardware error cannot be read"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, FoundServo, listed, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, ServoModel

@@ -24,12 +24,9 @@ from platformdirs import user_data_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 
-from paramove.documents.atomic_writing import replacing
-from paramove.documents.input_error import InputError
-from paramove.documents.key_findings import findings
-from paramove.documents.positions import read_document
+from paramove.documents import InputError, findings, read_document, replacing
+from paramove.robots import JointUnits
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
-from paramove.robots.joint_units import JointUnits
 
 DATA_VARIABLE = "PARAMOVE_DATA"
 POSITION: Literal[3] = 3

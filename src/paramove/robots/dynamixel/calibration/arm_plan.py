@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramove.documents.input_error import InputError
-from paramove.robots.description import Chain, RobotDescription
+from paramove.documents import InputError
+from paramove.robots import Chain, RobotDescription
 from paramove.robots.dynamixel.bus.servo_models import model_named
 
 YAW = (

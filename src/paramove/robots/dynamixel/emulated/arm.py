@@ -11,9 +11,9 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.msgs.truth_pb2 import TruthState
-from paramove.robots.description import RobotDescription
+from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.bus.servo_memory import CURRENT_BASED_POSITION_MODE
 from paramove.robots.dynamixel.bus.servo_models import model_named
 from paramove.robots.dynamixel.emulated.control import ControlSocket

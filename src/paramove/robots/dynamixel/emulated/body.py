@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import IntFlag
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.servo_memory import CURRENT_MODE, PWM_MODE, TRIPPED, ServoMemory
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, ServoModel
 from paramove.robots.dynamixel.emulated.loops import PROFILE_ONGOING, STEP_S, VELOCITY_UNIT, Loops

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 
 LONGEST_PATH = 107
 """Bytes of the name of a Unix socket."""

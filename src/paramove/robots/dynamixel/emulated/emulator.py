@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.emulated.bus import EmulatedBus
 from paramove.robots.dynamixel.emulated.mechanics import Mechanics
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo

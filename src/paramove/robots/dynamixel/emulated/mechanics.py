@@ -11,8 +11,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
-from paramove.documents.array_types import Floats
-from paramove.documents.input_error import InputError
+from paramove.documents import Floats, InputError
 from paramove.robots.dynamixel.emulated.loops import STEP_S
 from paramove.robots.dynamixel.emulated.motor import RAD_PER_PULSE, Effort
 

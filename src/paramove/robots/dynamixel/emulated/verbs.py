@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, model_named
 from paramove.robots.dynamixel.emulated.body import HardwareError
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator

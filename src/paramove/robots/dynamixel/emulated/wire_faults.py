@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from paramove.documents.input_error import InputError
+from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.packets import decoded, encoded
 
 LONGEST_NOISE = 12

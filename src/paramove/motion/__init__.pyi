@@ -1,0 +1,15 @@
+from .arm_pose import ArmPoseSolver as ArmPoseSolver
+from .clear_plans import ClearPlans as ClearPlans
+from .clear_plans import NoClearPlanError as NoClearPlanError
+from .conversion import RobotMovement as RobotMovement
+from .hand_poses import FARTHEST_M as FARTHEST_M
+from .hand_poses import metres as metres
+from .planned_motion import PlannedMotion as PlannedMotion
+from .planned_motion import RelocationOptions as RelocationOptions
+from .planned_motion import motion_message as motion_message
+from .reaching_movement import ArmPoses as ArmPoses
+from .servo_arm_reaching import ServoArmReaching as ServoArmReaching
+from .setup import MovementSource as MovementSource
+from .setup import SurfaceParameters as SurfaceParameters
+from .setup import plans_for as plans_for
+from .setup import synthesizer_for as synthesizer_for

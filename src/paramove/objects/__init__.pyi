@@ -1,0 +1,9 @@
+from .colour_tracker import DEFAULT_COLOURS as DEFAULT_COLOURS
+from .colour_tracker import Colour as Colour
+from .colour_tracker import ColourTracker as ColourTracker
+from .homography import HomographyError as HomographyError
+from .homography import PlaneHomography as PlaneHomography
+from .object_motion import MotionThresholds as MotionThresholds
+from .pointing import PointingThresholds as PointingThresholds
+from .recognizer import Recognizer as Recognizer
+from .recognizer import RecognizerOptions as RecognizerOptions

@@ -1,0 +1,1 @@
+from .source import PointingSetup as PointingSetup

@@ -1,0 +1,10 @@
+from .parts import PartedRecording as PartedRecording
+from .reader import Recorded as Recorded
+from .reader import read as read
+from .recorder import Recorder as Recorder
+from .recovery import Recovery as Recovery
+from .recovery import RecoveryError as RecoveryError
+from .recovery import StillWrittenError as StillWrittenError
+from .recovery import recover as recover
+from .writer import RecordingExistsError as RecordingExistsError
+from .writer import RecordingWriter as RecordingWriter

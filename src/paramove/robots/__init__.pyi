@@ -1,0 +1,16 @@
+from .arm_kinematics import ArmKinematics as ArmKinematics
+from .description import Arm as Arm
+from .description import Chain as Chain
+from .description import DescriptionError as DescriptionError
+from .description import RobotDescription as RobotDescription
+from .joint_units import INT16_RANGE as INT16_RANGE
+from .joint_units import JointRangeError as JointRangeError
+from .joint_units import JointUnits as JointUnits
+from .out_of_reach import OutOfReachError as OutOfReachError
+from .planar_arm import PlanarArm as PlanarArm
+from .pose_points import ARM_BASE as ARM_BASE
+from .pose_points import POINT_NAMES as POINT_NAMES
+from .pose_points import arm_points as arm_points
+from .this_launch import RESTARTED as RESTARTED
+from .this_launch import ThisLaunch as ThisLaunch
+from .this_launch import started_before as started_before

@@ -1,0 +1,1 @@
+from .firmware import Firmware as Firmware
