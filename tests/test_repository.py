@@ -78,6 +78,12 @@ def test_modules_of_the_library_begin_with_a_docstring():
     assert [name(path) for path in WRITTEN if path.stat().st_size and not ast.get_docstring(parsed(path))] == []
 
 
+def test_no_source_is_ignored():
+    """What git ignores is missing in clones, and in the wheel."""
+    sources = {path for suffix in ("*.py", "*.pyi") for path in (ROOT / "src").rglob(suffix)}
+    assert sorted(map(name, sources - set(FILES))) == []
+
+
 def test_files_are_named_by_what_they_compute():
     vague = re.compile(r"(utils?|common|helpers?|managers?|misc)$")
     assert [name(path) for path in PYTHON if vague.search(path.stem)] == []

@@ -1,0 +1,15 @@
+from .batch import BatchOptions as BatchOptions
+from .batch import finished as finished
+from .batch import run_batch as run_batch
+from .batch import seeds_of as seeds_of
+from .batch import SeedsError as SeedsError
+from .batch_table import enough as enough
+from .batch_table import LEGEND as LEGEND
+from .batch_table import table_of as table_of
+from .batch_table import TABLE_WIDTH as TABLE_WIDTH
+from .batch_table import totals_of as totals_of
+from .rule_learning.homography_accuracy import accuracy_of as accuracy_of
+from .rule_learning.homography_accuracy import GOAL_MM as GOAL_MM
+from .plots import STYLE as STYLE
+from .recorded_run import load_run as load_run
+from .recorded_run import RunFolderError as RunFolderError
