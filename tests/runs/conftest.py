@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from paramove.runs.recorded_run import load_run
-from paramove.runs.run_summary import RunEvaluation
 from paramove.robots.description import RobotDescription
+from paramove.runs.recorded_run import load_run
+from paramove.runs.rule_learning.summary import RunEvaluation
 from tests.runs.synthetic_run import SyntheticRun
 
 ROOT = Path(__file__).parents[2]

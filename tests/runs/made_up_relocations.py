@@ -10,12 +10,12 @@ from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 
 from paramove.action_space.messages import TablePlace
 from paramove.bus import topics
+from paramove.cameras.frames import Frame, encode
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.truth_pb2 import TruthArm, TruthBody, TruthLayout, TruthState
 from paramove.recording.writer import RecordingWriter
-from paramove.cameras.frames import Frame, encode
 
 PERIOD_NS = 66_666_667
 EVERY_S = 10.0

@@ -2,12 +2,12 @@
 
 import pytest
 
-from paramove.runs.recorded_run import RecordingGap, load_run
-from paramove.runs.report import page
-from paramove.runs.run_summary import RunEvaluation
 from paramove.recording.parts import next_part
 from paramove.recording.reader import read
 from paramove.recording.writer import RecordingWriter
+from paramove.runs.recorded_run import RecordingGap, load_run
+from paramove.runs.rule_learning.report import page
+from paramove.runs.rule_learning.summary import RunEvaluation
 from tests.runs.conftest import ROOT
 from tests.runs.synthetic_run import END_S, SyntheticRun
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from paramove.bus import topics
-from paramove.runs import servo_arm
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
+from paramove.runs import servo_arm
 from tests.recording.small_disk import fill, small_disk
 
 TASKS = "parameters: {tasks: [{reach: [0.2, 0.0, 0.1]}, {pick: [0.1, 0.1, 0.02], place: [0.2, 0.1, 0.02]}]}\n"

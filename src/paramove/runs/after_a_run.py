@@ -11,9 +11,8 @@ from typing import Any
 
 from rich.console import Console
 
-from paramove.documents import replacing
+from paramove.documents import exit_codes, replacing
 from paramove.runs.recorded_run import RunFolderError, gaps_in
-from paramove.documents import exit_codes
 from paramove.supervision import QueuedOutput
 
 Evaluate = Callable[[argparse.Namespace, Console], bool | None]

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paramove.documents import replacing
-from paramove.documents import exit_codes
+from paramove.documents import exit_codes, replacing
 
 APPLICATION = "rule_learning"
 EVALUATOR = "paramove.runs.rule_learning"

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from paramove.bus import topics
-from paramove.runs.homography_accuracy import GOAL_MM, GRID_STEPS, GRID_X, GRID_Y
 from paramove.runs.relocations import stages_of
-from paramove.runs.run_summary import RunEvaluation
+from paramove.runs.rule_learning.homography_accuracy import GOAL_MM, GRID_STEPS, GRID_X, GRID_Y
+from paramove.runs.rule_learning.summary import RunEvaluation
 
 COLOURS = {"yellow": "#d9a400", "green": "#2f9e57", "blue": "#3367d6"}
 STAGE_COLOURS = {"calibrate": "#b9c6d6", "learn": "#f2c894", "apply": "#a9d6bd", "failed": "#e6a4a0"}

@@ -17,14 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.bus import topics
-from paramove.documents import read_document
-from paramove.runs.traffic import Traffic
-from paramove.documents import InputError
+from paramove.documents import Floats, InputError, read_document
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.recording import PartedRecording
-from paramove.recording import Recorded
-from paramove.documents import Floats
-
+from paramove.recording import PartedRecording, Recorded
+from paramove.runs.traffic import Traffic
 
 HEAVY = frozenset(
     topic.name

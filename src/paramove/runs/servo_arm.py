@@ -14,18 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 
 from paramove.bus import topics
-from paramove.documents import read_document
-from paramove.runs.after_a_run import evaluated, write_run_json
-from paramove.runs.recorded_run import RunFolderError
-from paramove.documents import InputError
+from paramove.documents import Floats, InputError, read_document
 from paramove.msgs.truth_pb2 import TruthState
 from paramove.recording import PartedRecording
-from paramove.documents import Floats
-
+from paramove.runs.after_a_run import evaluated, write_run_json
+from paramove.runs.recorded_run import RunFolderError
 
 REACHED_M, PLACED_M = 0.015, 0.010
 """The hand hangs below where it is commanded: a servo holds a load by the error of its position."""

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Self
 
 import av
-import numpy as np
-from numpy.typing import NDArray
-from paramove.documents import Image
 
+from paramove.documents import Image
 
 WAITING_FRAMES = 8
 ENCODER = {"deadline": "realtime", "cpu-used": "7", "row-mt": "1", "crf": "34", "b": "0", "g": "20"}

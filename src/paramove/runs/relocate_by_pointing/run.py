@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.bus import topics
-from paramove.runs.recorded_run import RecordedRun, RunFolderError, recording_in
-from paramove.runs.relocations import Relocation, relocations_of
+from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import Speech
-from paramove.documents import Floats
-
+from paramove.runs.recorded_run import RecordedRun, RunFolderError, recording_in
+from paramove.runs.relocations import Relocation, relocations_of
 
 SCALE = 0.42
 """Of the simulated person and table over a grown person at a table of usual size."""

@@ -5,24 +5,24 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import platform
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+
 import numpy as np
+
 from paramove.bus import topics
-from paramove.runs.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
-from paramove.runs.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
-from paramove.runs.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
-from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
-from paramove.runs.spread import spread
-from paramove.runs.traffic import speakers
 from paramove.msgs.rule_pb2 import Speech
 from paramove.robots import RobotDescription
-from collections.abc import Iterable
-from typing import Any
-from paramove.runs.relocations import Relocation
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
+from paramove.runs.rule_learning.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
+from paramove.runs.rule_learning.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
+from paramove.runs.rule_learning.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
+from paramove.runs.spread import spread
+from paramove.runs.traffic import speakers
 
 WHERE = ("inside", "outside")
 DECIMALS = 6

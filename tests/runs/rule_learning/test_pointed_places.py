@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.runs.batch_table import table_of, totals_of
-from paramove.runs.recorded_run import load_run
-from paramove.runs.report import page
-from paramove.runs.run_summary import RunEvaluation
-from paramove.runs.verdict_table import rows_of
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
+from paramove.runs.batch_table import table_of, totals_of
+from paramove.runs.recorded_run import load_run
+from paramove.runs.rule_learning.report import page
+from paramove.runs.rule_learning.summary import RunEvaluation
+from paramove.runs.verdict_table import rows_of
 from tests.runs.conftest import ROOT
 from tests.runs.synthetic_run import PERIOD_NS, SyntheticRun
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from paramove.bus import topics
-from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.relocations import Relocation
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage
-from paramove.recording import Recorded
 from paramove.objects import PlaneHomography
+from paramove.recording import Recorded
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.relocations import Relocation
 
 GESTURE_SHOWN_S = 1.5
 _IN_WORDS = {

@@ -12,19 +12,15 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents import replacing
+from paramove.cameras import CalibratedCamera, decode, read_cameras
+from paramove.documents import Image, replacing
+from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import recording_in
 from paramove.runs.video_writer import VideoWriter
-from paramove.msgs.gesture_pb2 import Gesture
-from paramove.cameras import CalibratedCamera, read_cameras
-from paramove.cameras import decode
-from paramove.documents import Image
-
 
 WIDTH_PX = 960
 RATE_HZ = 15.0

@@ -7,21 +7,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents import replacing
-from paramove.documents import decoded
+from paramove.documents import Image, InputError, decoded, replacing
 from paramove.runs.recorded_run import recording_in
-from paramove.runs.run_summary import RunEvaluation
-from paramove.runs.story import Story
-from paramove.runs.video_frame import SIZE, VideoFrame
+from paramove.runs.rule_learning.story import Story
+from paramove.runs.rule_learning.summary import RunEvaluation
+from paramove.runs.rule_learning.video_frame import SIZE, VideoFrame
 from paramove.runs.video_writer import VideoError, VideoWriter
-from paramove.documents import InputError
-from paramove.documents import Image
-
 
 FRAMES_PER_S = 10.0
 CAMERA_HZ = 15.0

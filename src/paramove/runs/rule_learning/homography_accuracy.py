@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paramove.bus import topics
-from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.spread import spread
+from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects import PlaneHomography
-from paramove.documents import Floats
-
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.spread import spread
 
 GRID_X = (0.135, 0.190)
 GRID_Y = (-0.100, 0.076)

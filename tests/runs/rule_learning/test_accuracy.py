@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.runs.homography_accuracy import accuracy_of, project
+from paramove.runs.rule_learning.homography_accuracy import accuracy_of, project
 from paramove.runs.spread import spread
 from tests.runs.synthetic_run import SHOULDER, layout
 

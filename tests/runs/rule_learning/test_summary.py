@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from paramove.runs.run_summary import as_json, rounded
+from paramove.runs.rule_learning.summary import as_json, rounded
 from tests.runs.synthetic_run import END_S, PERIOD_NS
 
 

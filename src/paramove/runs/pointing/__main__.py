@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from paramove.runs.after_a_run import evaluated, write_run_json
-from paramove.runs.pointing_run import FARTHEST_M, MEDIAN_M, load_pointing_run
+from paramove.runs.pointing.run import FARTHEST_M, MEDIAN_M, load_pointing_run
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,8 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
     run = load_pointing_run(options.run_folder)
-    from paramove.runs.pointing_report import write_pointing_report
-    from paramove.runs.pointing_video import write_pointing_video
+    from paramove.runs.pointing.report import write_pointing_report
+    from paramove.runs.pointing.video import write_pointing_video
 
     summary = run.summary()
     numbers = write_run_json(run.folder, summary)

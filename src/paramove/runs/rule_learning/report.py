@@ -11,7 +11,7 @@ from typing import Any
 from paramove.documents import folded, report_page, section, table
 from paramove.runs import plots
 from paramove.runs.plots import svg_of
-from paramove.runs.run_summary import RunEvaluation
+from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.verdict_table import percent, rows_of
 
 

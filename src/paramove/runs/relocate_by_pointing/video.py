@@ -9,15 +9,15 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import track
 
 from paramove.bus import topics
-from paramove.documents import replacing
-from paramove.runs.pointing_video import drawn
+from paramove.cameras import decode
+from paramove.documents import Image, replacing
+from paramove.runs.pointing.video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in
-from paramove.runs.video_frame import (
+from paramove.runs.rule_learning.video_frame import (
     ACCENT,
     BACK,
     BOTTOM_PX,
@@ -30,9 +30,6 @@ from paramove.runs.video_frame import (
     paste,
 )
 from paramove.runs.video_writer import VideoWriter
-from paramove.cameras import decode
-from paramove.documents import Image
-
 
 FRAMES_PER_S = 10.0
 EVERY = 3

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from paramove.demonstrations import table_place
 from paramove.documents import film, report_page, section
 from paramove.runs import plots
-from paramove.runs.pointing_run import PointingRun
+from paramove.runs.pointing.run import PointingRun
 
 TRUE, BELIEVED = "#1d2530", "#2f9e57"
 

@@ -14,11 +14,11 @@ from pathlib import Path
 from rich.console import Console
 
 from paramove.documents import replacing
+from paramove.robots import RobotDescription
 from paramove.runs.after_a_run import evaluated
 from paramove.runs.recorded_run import load_run
-from paramove.runs.run_summary import RunEvaluation, as_json
+from paramove.runs.rule_learning.summary import RunEvaluation, as_json
 from paramove.runs.verdict_table import show_verdict
-from paramove.robots import RobotDescription
 
 ROBOT = Path("robot_description/hoap3")
 
@@ -46,8 +46,8 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     evaluation = evaluate(options.run_folder, Path.cwd())
     written = [write_summary(evaluation)]
     if not options.no_report:
-        from paramove.runs.demo_video import write_video
-        from paramove.runs.report import write_report
+        from paramove.runs.rule_learning.report import write_report
+        from paramove.runs.rule_learning.video import write_video
 
         video = None if options.no_video else write_video(evaluation, console)
         written = [write_report(evaluation, video), *([video] if video is not None else []), *written]

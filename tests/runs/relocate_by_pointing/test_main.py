@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.runs import relocate_by_pointing
 from paramove.runs.recorded_run import load_run
-from paramove.runs.relocate_by_pointing_run import GOAL, SCALE, pointed_relocations_of, summary_of
-from paramove.msgs.relocation_pb2 import RelocationStatus
+from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 from sim import small_person
 from tests.runs.made_up_relocations import GOOD, REFUSED, write_run
 

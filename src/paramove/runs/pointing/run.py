@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.bus import topics
-from paramove.runs.recorded_run import RunFolderError, recording_in
-from paramove.msgs.gesture_pb2 import Gesture
 from paramove.documents import Floats
-
+from paramove.msgs.gesture_pb2 import Gesture
+from paramove.runs.recorded_run import RunFolderError, recording_in
 
 FARTHEST_M = 0.10
 MEDIAN_M = 0.04

@@ -7,14 +7,13 @@ from typing import Any
 
 import cv2
 import numpy as np
-from matplotlib import font_manager
-from numpy.typing import NDArray
 import PIL.Image
+from matplotlib import font_manager
 from PIL import ImageDraw, ImageFont
 
-from paramove.runs.story import Moment
-from paramove.msgs.tracked_objects_pb2 import TrackedObject
 from paramove.documents import Image
+from paramove.msgs.tracked_objects_pb2 import TrackedObject
+from paramove.runs.rule_learning.story import Moment
 
 Colour = tuple[int, int, int]
 

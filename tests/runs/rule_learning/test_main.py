@@ -6,7 +6,7 @@ import re
 import cv2
 import pytest
 
-from paramove.runs.rule_learning import main
+from paramove.runs.rule_learning.__main__ import main
 from tests.runs.conftest import ROOT
 from tests.runs.synthetic_run import SyntheticRun
 

@@ -10,14 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
+from paramove.action_space import ball_colour
 from paramove.bus import topics
+from paramove.cameras import Frame, decode, encode
 from paramove.documents import film, image, report_page, section
 from paramove.runs import plots
-from paramove.runs.pointing_video import drawn
+from paramove.runs.pointing.video import drawn
 from paramove.runs.recorded_run import RecordedRun, recording_in
-from paramove.runs.relocate_by_pointing_run import GOAL, SCALE, PointedRelocation
-from paramove.cameras import Frame, decode, encode
-from paramove.action_space import ball_colour
+from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, PointedRelocation
 
 TRUE, ENDED = "#1d2530", "#d9a400"
 RADIUS_CM = 1.0

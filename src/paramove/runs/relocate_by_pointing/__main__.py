@@ -18,7 +18,7 @@ from rich.table import Table
 
 from paramove.runs.after_a_run import evaluated, write_run_json
 from paramove.runs.recorded_run import load_run
-from paramove.runs.relocate_by_pointing_run import GOAL, SCALE, pointed_relocations_of, summary_of
+from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,8 +30,8 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
     run = load_run(options.run_folder)
     relocations = pointed_relocations_of(run)
     summary = summary_of(run, relocations)
-    from paramove.runs.relocate_by_pointing_report import write_relocation_report
-    from paramove.runs.relocate_by_pointing_video import write_relocation_video
+    from paramove.runs.relocate_by_pointing.report import write_relocation_report
+    from paramove.runs.relocate_by_pointing.video import write_relocation_video
 
     numbers = write_run_json(run.folder, summary)
     video = None if options.no_video else write_relocation_video(run, console)

@@ -9,15 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paramove.bus import topics
-from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.relocations import Motion, Relocation
+from paramove.documents import Floats
 from paramove.motion import RelocationOptions
 from paramove.robots import RobotDescription
-from paramove.documents import Floats
-
+from paramove.runs.recorded_run import RecordedRun
+from paramove.runs.relocations import Motion, Relocation
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from paramove.bus import topics
+from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import RecordedRun, Truth
 from paramove.runs.relocations import Relocation, stages_of
 from paramove.runs.spread import spread
-from paramove.msgs.gesture_pb2 import Gesture
 
 POINTS_AT = "points at "
 """What the instructor does then, before the object's name, in the recorded truth."""

@@ -1,0 +1,1 @@
+"""A run of the pointing application: verdict, report, film; `python -m paramove.runs.pointing`."""
