@@ -6,7 +6,7 @@ from .grid import ParameterGrid as ParameterGrid
 from .interpolative import InterpolativePHMM as InterpolativePHMM
 from .model_cache import cached_model as cached_model
 from .model_cache import stored_model as stored_model
-from .neural import NeuralPHMM as NeuralPHMM
+from .network.model import NeuralPHMM as NeuralPHMM
 from .parametric import ParameterEstimate as ParameterEstimate
 from .parametric import ParametricHMM as ParametricHMM
 from .performance import groups_of as groups_of

@@ -15,8 +15,8 @@ from paramove.demonstrations.edge import strongly_nonlinear_movement, strongly_n
 from paramove.hmm import TrainingOptions
 from paramove.hmm.training import LikelihoodDecreaseWarning
 from paramove.phmm import NeuralPHMM, QuadraticPHMM
-from paramove.phmm.network_choice import Choice, _better, _left_out_errors
-from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
+from paramove.phmm.network.choice import Choice, _better, _left_out_errors
+from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_inner
 from tests.phmm.movements import numerical_gradient, shown, wave
 from tests.phmm.table import RASTER_CM, table_movements
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents import Floats, Ints
-from paramove.phmm.networks import StateNetworks, StateTargets, drawn_inner
+from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_inner
 
 NUMBERS_OF_UNITS = (1, 2, 4, 8)
 DECAYS = (1e-4, 1e-2)

@@ -21,7 +21,7 @@ from paramove.phmm.correlated_regression import (
     shrunk,
 )
 from paramove.phmm.left_out import folds_of, inflation_of
-from paramove.phmm.networks import StateNetworks, hidden_units
+from paramove.phmm.network.networks import StateNetworks, hidden_units
 from paramove.phmm.performance import part_averages
 from paramove.phmm.ridge import residuals_left_out
 

@@ -23,10 +23,10 @@ from paramove.phmm import search_kernels
 from paramove.phmm.description import MovementDescription
 from paramove.phmm.features import Monomials
 from paramove.phmm.local_models import check_local_models
-from paramove.phmm.network_choice import chosen_units, with_decay
-from paramove.phmm.network_performance import NetworkPerformances, StateAverages, parts_of
-from paramove.phmm.network_training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
-from paramove.phmm.networks import StateNetworks
+from paramove.phmm.network.choice import chosen_units, with_decay
+from paramove.phmm.network.networks import StateNetworks
+from paramove.phmm.network.performance import NetworkPerformances, StateAverages, parts_of
+from paramove.phmm.network.training import NetworkParameters, NetworkPrior, SequenceMoments, train_networks
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance import state_averages
 from paramove.phmm.regression import RegressedParameters, train_regressed

@@ -23,7 +23,7 @@ from paramove.hmm import (
     regularisation_at,
     root_mean_deviation,
 )
-from paramove.phmm.networks import INNER_DEVIATION, StateNetworks, StateTargets
+from paramove.phmm.network.networks import INNER_DEVIATION, StateNetworks, StateTargets
 
 AFTER_ANNEALING = 10**6
 
