@@ -20,7 +20,7 @@ import psutil
 import zmq
 from bus_peers import PAYLOAD_BYTES, paced
 
-from paramove.bus import Bus, BusSettings, Heard, Subscriber, topics
+from paramove.bus import Bus, BusSettings, Received, Subscriber, topics
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 
 SMALL = topics.WIRE_HOAP3_STREAM
@@ -74,7 +74,7 @@ def hear(folder: Path, sleeping: bool) -> None:
     with Bus("sleeper" if sleeping else f"listener_{os.getpid()}", BusSettings(folder=folder), (SMALL, IMAGES)) as bus:
         said: list[int] | None = None
         for heard in bus.events(tick=True):
-            if isinstance(heard, Heard):
+            if isinstance(heard, Received):
                 if not any(latencies.values()):
                     tell("hearing")
                 latencies[heard.topic.name].append(time.monotonic_ns() - heard.published_ns)
@@ -83,7 +83,7 @@ def hear(folder: Path, sleeping: bool) -> None:
             elif said is None and zmq.select([sys.stdin], [], [], 0)[0]:
                 said = json.loads(sys.stdin.readline())
             known = [bus.exchange.subscribers[topic.name].counter.sequence for topic in (SMALL, IMAGES)]
-            if known == said and not isinstance(heard, Heard):
+            if known == said and not isinstance(heard, Received):
                 bus.stop()
         result = {}
         for topic in (SMALL, IMAGES):

@@ -32,7 +32,7 @@ ALLOWED_S = 0.5
 SMALL, IMAGE, STATUS = topics.GESTURES, topics.CAMERA_IMAGE, topics.status("recorder")
 
 
-class Speaker:
+class RecordedPublisher:
     """A bus, a recorder that hears it, and what was said: topic and sequence number -> when, s."""
 
     def __init__(self, folder: Path) -> None:
@@ -80,7 +80,7 @@ class Speaker:
 
 def killed(folder: Path, rng: random.Random, in_silence: bool) -> dict[str, Any]:
     """One kill: how old the oldest message was that is lost, and how many were older than allowed."""
-    speaker = Speaker(folder)
+    speaker = RecordedPublisher(folder)
     for _ in range(rng.randrange(3)):
         speaker.burst(time.monotonic() + rng.uniform(0.2, 1.5), rng.uniform(20, 200), 50_000, 15)
         speaker.bus.idle(rng.uniform(0.0, 1.5))
@@ -101,7 +101,7 @@ def killed(folder: Path, rng: random.Random, in_silence: bool) -> dict[str, Any]
 
 def loaded(folder: Path, seconds: float) -> dict[str, Any]:
     """1000 small messages and 15 images of 2 MB a second, and then an end in order."""
-    speaker = Speaker(folder)
+    speaker = RecordedPublisher(folder)
     speaker.burst(time.monotonic() + seconds, 1000, 2_000_000, 15)
     speaker.bus.idle(1.5)
     speaker.recorder.terminate()

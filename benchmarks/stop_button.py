@@ -31,15 +31,15 @@ from tests.robots.hoap3.movements import HOAP3  # noqa: E402
 from tests.robots.streaming.fake_robot import FakeRobot, trajectory  # noqa: E402
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0}
-HEARS = (topics.ARM_SAFETY, topics.WIRE_HOAP3_STREAM)
-SAYS = (topics.WIRE_HOAP3_STATE, topics.OPERATOR_ARM, topics.ARM_TRAJECTORY)
+SUBSCRIBES = (topics.ARM_SAFETY, topics.WIRE_HOAP3_STREAM)
+PUBLISHES = (topics.WIRE_HOAP3_STATE, topics.OPERATOR_ARM, topics.ARM_TRAJECTORY)
 
 
 class World:
     """The robot's side of the wire and the person at the page."""
 
     def __init__(self, folder: Path, press_at_s: float) -> None:
-        self.bus = Bus("world", BusSettings(folder=folder / "bus"), HEARS, SAYS)
+        self.bus = Bus("world", BusSettings(folder=folder / "bus"), SUBSCRIBES, PUBLISHES)
         self.folder = folder
         self.robot = FakeRobot()
         self.robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
@@ -50,7 +50,7 @@ class World:
         """Seconds from the press to "stopping" and to the batch with the ramp."""
         played_s = time.monotonic()
         with self.bus:
-            for event in self.bus.events(*HEARS, tick=True):
+            for event in self.bus.events(*SUBSCRIBES, tick=True):
                 now_s = time.monotonic()
                 if isinstance(event, Tick):
                     self.robot.play(round(1e3 * (now_s - played_s)))

@@ -12,8 +12,8 @@ from paramove.action_space import TrackingSetup, arm_pose_message, estimate_mess
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.cameras import FrameError, decode
 
-HEARS = topics.CAMERA_IMAGES
-SAYS = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
+SUBSCRIBES = topics.CAMERA_IMAGES
+PUBLISHES = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
 
 
 class Config(NodeConfig, TrackingSetup):
@@ -27,7 +27,7 @@ def run(bus: Bus, config: Config) -> None:
     sentence = f"tracking {', '.join(names)} with {', '.join(tracker.cameras)}"
     bus.ready(sentence)
     told = tracker.kind_of_trouble
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
             tracker.tick(event.now_ns)
         elif (camera := event.topic.name.removesuffix("/image")) in tracker.cameras:
@@ -47,4 +47,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

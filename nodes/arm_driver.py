@@ -19,8 +19,8 @@ from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotDescription, ThisLaunch
 from paramove.robots.streaming import ArmDriver
 
-HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
-SAYS = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
+SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS, topics.WIRE_HOAP3_STATE)
+PUBLISHES = (topics.WIRE_HOAP3_STREAM, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
 class Config(NodeConfig):
@@ -37,21 +37,21 @@ def run(bus: Bus, config: Config) -> None:
     hear |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
     hear |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.sentence)
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             hear[event.topic](event.message, event.captured_ns)
             if event.topic not in topics.STOPS:
                 continue  # a stop does not wait for the next period
-        says = driver.tick(bus.now_ns)
-        if says.stream is not None:
-            bus.publish(topics.WIRE_HOAP3_STREAM, says.stream)
-        if says.joint_states is not None:
-            bus.publish(topics.ARM_JOINT_STATES, says.joint_states, says.joint_states.timestamp.ToNanoseconds())
-        for status in says.statuses:
+        output = driver.tick(bus.now_ns)
+        if output.stream is not None:
+            bus.publish(topics.WIRE_HOAP3_STREAM, output.stream)
+        if output.joint_states is not None:
+            bus.publish(topics.ARM_JOINT_STATES, output.joint_states, output.joint_states.timestamp.ToNanoseconds())
+        for status in output.statuses:
             bus.publish(topics.ARM_TRAJECTORY_STATUS, status)
-        bus.publish(topics.ARM_SAFETY, says.safety)
+        bus.publish(topics.ARM_SAFETY, output.safety)
         bus.ready(driver.sentence)
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -11,8 +11,8 @@ from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.cameras import FrameError, decode
 from paramove.observation import BodyTrackingSetup, arm_pose_message, outline_message, scene_message
 
-HEARS = topics.CAMERA_IMAGES
-SAYS = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
+SUBSCRIBES = topics.CAMERA_IMAGES
+PUBLISHES = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
 
 
 class Config(NodeConfig, BodyTrackingSetup):
@@ -26,14 +26,14 @@ def run(bus: Bus, config: Config) -> None:
     sentence = f"looking for {', '.join(tracking.point_names)} with {', '.join(tracking.cameras)}"
     bus.ready(sentence)
     told = ""
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
             tracking.tick(event.now_ns)
         elif (camera := event.topic.name.removesuffix("/image")) in tracking.cameras:
             try:
                 for moment in tracking.see(camera, event.captured_ns, decode(event.message)):
                     messages = (arm_pose_message(moment), outline_message(moment, first), scene_message(moment))
-                    for topic, message in zip(SAYS, messages, strict=True):
+                    for topic, message in zip(PUBLISHES, messages, strict=True):
                         bus.publish(topic, message, moment.captured_ns)
             except FrameError as error:
                 tracking.cannot_see(camera, event.captured_ns, str(error))
@@ -43,4 +43,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -6,11 +6,11 @@ Says    camera/image   foxglove.CompressedImage   15 Hz   camera_optical
 
 from pydantic import Field
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.cameras import EndOfFrames, FrameChecks, FrameError, encode, open_source
 
-HEARS = (topics.CAMERA_LIGHT,)
-SAYS = (topics.CAMERA_IMAGE,)
+SUBSCRIBES = (topics.CAMERA_LIGHT,)
+PUBLISHES = (topics.CAMERA_IMAGE,)
 
 
 class Config(NodeConfig):
@@ -29,7 +29,7 @@ def run(bus: Bus, config: Config) -> None:
     fault = ""
     try:
         for event in bus.events(topics.CAMERA_LIGHT, tick=True) if source.hears_light else bus.events(tick=True):
-            now_ns, light = (event.captured_ns, event.message) if isinstance(event, Heard) else (event.now_ns, None)
+            now_ns, light = (event.captured_ns, event.message) if isinstance(event, Received) else (event.now_ns, None)
             try:
                 frame = source.frame(now_ns, light)
                 if frame is None:
@@ -51,4 +51,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -8,8 +8,8 @@ from paramove.bus import Bus, NodeConfig, main, topics
 from paramove.cameras import FrameError, decode
 from paramove.objects import DEFAULT_COLOURS, Colour, ColourTracker
 
-HEARS = (topics.CAMERA_IMAGE,)
-SAYS = (topics.OBJECTS_TRACKED,)
+SUBSCRIBES = (topics.CAMERA_IMAGE,)
+PUBLISHES = (topics.OBJECTS_TRACKED,)
 
 
 class Config(NodeConfig):
@@ -37,4 +37,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from pydantic import Field
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, hear_nodes
 from paramove.robots import RobotDescription
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
 DECISION = (topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH, topics.RELOCATION_GOAL, topics.RELOCATION_STATUS)
-HEARS = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ACTION_OUTLINE)
-SAYS = (topics.OPERATOR_STOP,)
+SUBSCRIBES = (*PERCEPTION, *DECISION, topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ACTION_OUTLINE)
+PUBLISHES = (topics.OPERATOR_STOP,)
 
 
 class Config(NodeConfig):
@@ -36,7 +36,7 @@ def run(bus: Bus, config: Config) -> None:
         bus.when_readable(page.pressed, lambda: button.look(bus.now_ns))
         bus.ready(f"page on port {page.port} of this machine")
         for event in bus.events(tick=True):
-            if isinstance(event, Heard):
+            if isinstance(event, Received):
                 picture.hear(event)
                 button.hear(event)
                 continue
@@ -50,4 +50,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

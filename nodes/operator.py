@@ -10,8 +10,8 @@ from paramove.bus import Bus, NodeConfig, main, topics
 from paramove.operator import REAL_ROBOT, Operator
 from paramove.robots import started_before
 
-HEARS = (topics.ARM_SAFETY,)
-SAYS = (topics.OPERATOR_ARM_AT_START,)
+SUBSCRIBES = (topics.ARM_SAFETY,)
+PUBLISHES = (topics.OPERATOR_ARM_AT_START,)
 
 
 class Config(NodeConfig):
@@ -39,4 +39,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -14,8 +14,8 @@ from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
 from paramove.motion import MovementSource, ServoArmReaching
 from paramove.robots import RobotDescription
 
-HEARS = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)
-SAYS = (topics.ARM_TRAJECTORY, topics.SPEECH)
+SUBSCRIBES = (topics.ARM_JOINT_STATES, topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS)
+PUBLISHES = (topics.ARM_TRAJECTORY, topics.SPEECH)
 
 
 class Config(NodeConfig):
@@ -33,12 +33,12 @@ def run(bus: Bus, config: Config) -> None:
     task = ReachTask(reaching, config.tasks, f"reach-{bus.now_ns}")
     hear = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
     bus.ready(task.sentence)
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[HEARS.index(event.topic)](event.message)
+            hear[SUBSCRIBES.index(event.topic)](event.message)
             continue
-        said = task.tick(event.now_ns)
-        publish_each(bus, SAYS, (said.trajectories, said.speech))
+        output = task.tick(event.now_ns)
+        publish_each(bus, PUBLISHES, (output.trajectories, output.speech))
         if task.failure:
             bus.failed(task.failure)
         if task.finished or task.failure:
@@ -47,4 +47,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -20,8 +20,8 @@ from paramove.objects import (
 )
 from paramove.pointing import PointingSetup
 
-HEARS = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE, topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE)
-SAYS = (topics.GESTURES, topics.GESTURES_SCENE)
+SUBSCRIBES = (topics.OBJECTS_TRACKED, topics.CALIBRATION_PLANE, topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE)
+PUBLISHES = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
 class Config(NodeConfig, PointingSetup):
@@ -35,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
     pointing = config.pointing_source(bus.run_folder)
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")
-    for heard in bus.events(*HEARS):
+    for heard in bus.events(*SUBSCRIBES):
         for topic, message in pointing.hear(heard.topic, heard.message):
             bus.publish(topic, message, heard.captured_ns)
         if heard.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
@@ -54,4 +54,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -5,11 +5,11 @@ When its process is started again, or the disk was full, it goes on in `recordin
 Hears   every topic that the topic table marks as recorded
 """
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.recording import Recorder
 
-HEARS = topics.RECORDED
-SAYS = ()
+SUBSCRIBES = topics.RECORDED
+PUBLISHES = ()
 
 REPORT_EVERY = 1500
 
@@ -25,8 +25,8 @@ def run(bus: Bus, config: Config) -> None:
     with Recorder(bus, bus.run_folder / config.file, "paramove recorder") as recording:
         count, sentence = 0, f"recording to {recording.part_name}"
         recording.tell(sentence)
-        for event in bus.events(*HEARS, tick=True):
-            if isinstance(event, Heard):
+        for event in bus.events(*SUBSCRIBES, tick=True):
+            if isinstance(event, Received):
                 recording.keep(event)
                 count += 1
                 if count % REPORT_EVERY == 0:
@@ -35,4 +35,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -12,8 +12,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
 from paramove.applications import Relocator, RelocatorOptions
 from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
 
-HEARS = (topics.GESTURES, topics.ACTION_ESTIMATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
-SAYS = (topics.RELOCATION_GOAL, topics.APPLICATION_STAGE, topics.SPEECH)
+SUBSCRIBES = (topics.GESTURES, topics.ACTION_ESTIMATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
+PUBLISHES = (topics.RELOCATION_GOAL, topics.APPLICATION_STAGE, topics.SPEECH)
 
 
 class Config(NodeConfig, RelocatorOptions):
@@ -25,12 +25,12 @@ def run(bus: Bus, config: Config) -> None:
     relocator = Relocator(config, f"goal-{bus.now_ns}")
     hear = (relocator.on_gesture, relocator.on_estimate, relocator.on_goal_status, relocator.on_safety)
     bus.ready("waiting for the arm")
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[HEARS.index(event.topic)](event.message)
+            hear[SUBSCRIBES.index(event.topic)](event.message)
             continue
-        said = relocator.tick(event.now_ns * 1e-9)
-        publish_each(bus, SAYS, (said.goals, said.stages, said.speech))
+        output = relocator.tick(event.now_ns * 1e-9)
+        publish_each(bus, PUBLISHES, (output.goals, output.stages, output.speech))
         if relocator.failure:
             bus.failed(relocator.failure)
         if relocator.finished or relocator.failure:
@@ -39,4 +39,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

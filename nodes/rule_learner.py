@@ -13,8 +13,8 @@ Says    relocation/goal      RelocationGoal     event    right_shoulder
 from paramove.applications import Pointing, RuleLearner, RuleLearnerOptions, Surface
 from paramove.bus import Bus, NodeConfig, Tick, main, publish_each, topics
 
-HEARS = (topics.GESTURES, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
-SAYS = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH)
+SUBSCRIBES = (topics.GESTURES, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
+PUBLISHES = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, topics.APPLICATION_STAGE, topics.SPEECH)
 
 
 class Config(NodeConfig):
@@ -37,12 +37,12 @@ def run(bus: Bus, config: Config) -> None:
     learner = RuleLearner(options, f"goal-{bus.now_ns}")
     hear = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[HEARS.index(event.topic)](event.message)
+            hear[SUBSCRIBES.index(event.topic)](event.message)
             continue
-        said = learner.tick(event.now_ns * 1e-9)
-        publish_each(bus, SAYS, (said.goals, said.calibrations, said.rules, said.stages, said.speech))
+        output = learner.tick(event.now_ns * 1e-9)
+        publish_each(bus, PUBLISHES, (output.goals, output.calibrations, output.rules, output.stages, output.speech))
         if learner.failure:
             bus.failed(learner.failure)
         if learner.finished or learner.failure:
@@ -51,4 +51,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -16,9 +16,9 @@ from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import ThisLaunch
 from paramove.robots.dynamixel import DrivenArm, ServoArmSetup
 
-HEARS = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
+SUBSCRIBES = (topics.ARM_TRAJECTORY, *topics.ARMINGS, *topics.STOPS)
 JOINTS = (topics.ARM_JOINT_STATES, topics.ARM_JOINT_STATES_FAST)
-SAYS = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
+PUBLISHES = (*JOINTS, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY, topics.ARM_MOTORS)
 
 
 class Config(NodeConfig, ServoArmSetup):
@@ -35,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
             **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
             **dict.fromkeys(topics.STOPS, arm.on_stop),
         }
-        for event in bus.events(*HEARS, tick=True):
+        for event in bus.events(*SUBSCRIBES, tick=True):
             if not isinstance(event, Tick):
                 hear[event.topic](event.message, event.captured_ns)
             bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.sentence)
@@ -48,4 +48,4 @@ def say(bus: Bus, arm: DrivenArm) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -12,8 +12,8 @@ from pathlib import Path
 from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.motion import MovementSource, SurfaceParameters, synthesizer_for
 
-HEARS = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
-SAYS = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)
+SUBSCRIBES = (topics.RELOCATION_GOAL, topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS)
+PUBLISHES = (topics.ARM_TRAJECTORY, topics.RELOCATION_STATUS)
 
 
 class Config(NodeConfig):
@@ -35,17 +35,17 @@ def run(bus: Bus, config: Config) -> None:
         topics.ARM_TRAJECTORY_STATUS: synthesizer.on_trajectory_status,
     }
     bus.ready(synthesizer.sentence)
-    for event in bus.events(*HEARS, tick=True):
+    for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             hear[event.topic](event.message)
             continue
-        says = synthesizer.tick(event.now_ns)
-        for trajectory in says.trajectories:
+        output = synthesizer.tick(event.now_ns)
+        for trajectory in output.trajectories:
             bus.publish(topics.ARM_TRAJECTORY, trajectory)
-        for status in says.statuses:
+        for status in output.statuses:
             bus.publish(topics.RELOCATION_STATUS, status)
         bus.ready(synthesizer.sentence)
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -7,11 +7,11 @@ Writes `truth.mcap` into the run folder, and goes on in `truth.2.mcap`, … when
 
 from __future__ import annotations
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.recording import Recorder
 
-HEARS = (topics.TRUTH_ARM,)
-SAYS = ()
+SUBSCRIBES = (topics.TRUTH_ARM,)
+PUBLISHES = ()
 
 
 class Config(NodeConfig):
@@ -22,11 +22,11 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
     with Recorder(bus, bus.run_folder / "truth.mcap", "paramove, judge of an arm") as recording:
         recording.tell("records the truth")
-        for event in bus.events(*HEARS, tick=True):
-            if isinstance(event, Heard):
+        for event in bus.events(*SUBSCRIBES, tick=True):
+            if isinstance(event, Received):
                 recording.keep(event)
             recording.tell("records the truth")
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

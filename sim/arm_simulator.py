@@ -27,8 +27,8 @@ from sim import simulator
 from sim.arm_simulation import ArmSimulation
 from sim.simulation import Simulation
 
-HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
-SAYS = (
+SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
+PUBLISHES = (
     topics.CLOCK,
     topics.CAMERA_LIGHT,
     *topics.STEREO_LIGHTS,
@@ -66,4 +66,4 @@ def say_of_arm(bus: Bus, simulation: Simulation, every: int = 1) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -11,8 +11,8 @@ from paramove.bus import Bus, NodeConfig, Tick, main, topics
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel import EmulatedArm
 
-HEARS = ()
-SAYS = (topics.TRUTH_STATE,)
+SUBSCRIBES = ()
+PUBLISHES = (topics.TRUTH_STATE,)
 
 REPORT_TICKS = 75
 
@@ -53,4 +53,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

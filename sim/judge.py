@@ -23,15 +23,15 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from pydantic import Field
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.documents import replacing
 from paramove.recording import PartedRecording, Recorder
 from sim.verdict import Verdict
 
 _log = logging.getLogger(__name__)
 
-HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
-SAYS = ()
+SUBSCRIBES = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_VIEW)
+PUBLISHES = ()
 
 RENEW_STATES = 75
 
@@ -60,8 +60,8 @@ def run(bus: Bus, config: Config) -> None:
         tell = bus.ready if recording is None else recording.tell
         ending.callback(judge.write)
         tell(sentence)
-        for event in bus.events(*HEARS, tick=True):
-            if isinstance(event, Heard):
+        for event in bus.events(*SUBSCRIBES, tick=True):
+            if isinstance(event, Received):
                 if event.topic is topics.TRUTH_LAYOUT:
                     judge.begin(event.message)
                 elif event.topic is topics.TRUTH_STATE:
@@ -142,4 +142,4 @@ def compressed(image: RawImage, jpeg_quality: int) -> CompressedImage:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -21,8 +21,8 @@ from paramove.bus import Bus, main, topics
 from sim import arm_simulator, simulator
 from sim.place_simulation import PlaceSimulation
 
-HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
-SAYS = (
+SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
+PUBLISHES = (
     topics.CLOCK,
     *topics.STEREO_LIGHTS,
     topics.WIRE_HOAP3_STATE,
@@ -43,4 +43,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -18,8 +18,8 @@ from pydantic import Field
 from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
 from sim.pointing_world import PointingWorld
 
-HEARS = ()
-SAYS = (topics.CLOCK, *topics.CAMERA_LIGHTS, topics.TRUTH_ARM)
+SUBSCRIBES = ()
+PUBLISHES = (topics.CLOCK, *topics.CAMERA_LIGHTS, topics.TRUTH_ARM)
 
 CAMERA_HZ = 15
 REPORT_S = 5
@@ -75,4 +75,4 @@ def _loop(bus: Bus, config: Config, world: PointingWorld) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -10,7 +10,7 @@ from typing import BinaryIO
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from paramove.bus import Heard, topics
+from paramove.bus import Received, topics
 from paramove.documents import Floats, Image
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.robots import RobotDescription
@@ -96,7 +96,7 @@ class Simulation:
     def write_measures(self, folder: Path) -> None:
         """Writes what people measure before the run: nothing in this world."""
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, heard: Received) -> None:
         """Take in a message of the stream or of what the robot says."""
         if heard.topic is topics.WIRE_HOAP3_STREAM:
             self.stream.offer(heard.message)

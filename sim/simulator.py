@@ -27,8 +27,8 @@ from sim.simulation import CAMERA_HZ, Simulation
 from sim.tool_box import NOMINAL, Measures
 from sim.world import log_warnings_of_mujoco
 
-HEARS = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
-SAYS = (
+SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
+PUBLISHES = (
     topics.CLOCK,
     topics.CAMERA_LIGHT,
     topics.WIRE_HOAP3_STATE,
@@ -150,4 +150,4 @@ def _sentence(simulation: Simulation, wall_s: float) -> str:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -14,12 +14,12 @@ from __future__ import annotations
 import cv2
 from pydantic import Field
 
-from paramove.bus import Bus, Heard, NodeConfig, main, topics
+from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.recording import Recorder
 from sim.judge import compressed
 
-HEARS = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_ARM, topics.TRUTH_VIEW)
-SAYS = ()
+SUBSCRIBES = (topics.TRUTH_LAYOUT, topics.TRUTH_STATE, topics.TRUTH_ARM, topics.TRUTH_VIEW)
+PUBLISHES = ()
 
 
 class Config(NodeConfig):
@@ -33,12 +33,12 @@ def run(bus: Bus, config: Config) -> None:
     cv2.setNumThreads(1)
     with Recorder(bus, bus.run_folder / "truth.mcap", "paramove truth recorder") as recording:
         recording.tell("records the truth")
-        for event in bus.events(*HEARS, tick=True):
-            if isinstance(event, Heard):
+        for event in bus.events(*SUBSCRIBES, tick=True):
+            if isinstance(event, Received):
                 view = event.topic is topics.TRUTH_VIEW
                 recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
             recording.tell("records the truth")
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -62,14 +62,14 @@ def test_nodes_are_plumbing():
 
 
 def test_headers_of_nodes_name_their_topics():
-    """Every topic of HEARS and SAYS is in the table, and the header tells of it."""
+    """Every topic of SUBSCRIBES and PUBLISHES is in the table, and the header tells of it."""
     known, missing = {topic.name for topic in topics.TOPICS}, []
     for path in PROCESSES:
         interface = read_interface(f"{path.parent.name}.{path.stem}", ROOT)
         header = ast.get_docstring(parsed(path)) or ""
-        named = [topic.name for topic in (*interface.hears, *interface.says)]
+        named = [topic.name for topic in (*interface.subscribes, *interface.publishes)]
         assert set(named) <= known
-        if len(interface.hears) < 10:  # one that hears nearly everything says so in words
+        if len(interface.subscribes) < 10:  # one that hears nearly everything says so in words
             missing += [f"{name(path)}: {topic}" for topic in named if topic not in header]
     assert missing == []
 

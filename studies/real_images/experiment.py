@@ -12,7 +12,7 @@ import numpy as np
 from paramove.demonstrations import RecordingsError, data_folder
 from paramove.documents import InputError
 from studies.real_images import seated_person
-from studies.real_images.replay import RATE_HZ, RETARGETED, Said, replayed
+from studies.real_images.replay import RATE_HZ, RETARGETED, ReplayedEstimate, replayed
 from studies.real_images.scores import GOAL_PX, Distances, distances, is_met, read_reference
 
 DATA_SET = "rgbd_pointing"
@@ -43,7 +43,7 @@ class Replay:
 
     case: Case
     seed: int
-    said: list[Said]
+    said: list[ReplayedEstimate]
     found: Distances
 
 
@@ -96,5 +96,5 @@ def resting_numbers(folder: Path) -> dict[str, Any]:
     """What a hand scores that is believed to stay on the knee: no tracker may do worse."""
     camera, reference = seated_person.camera(folder), read_reference(folder)
     rest = seated_person.resting_pose(camera)
-    said = [Said(frame, rest, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in range(len(reference))]
+    said = [ReplayedEstimate(frame, rest, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in range(len(reference))]
     return distances(said, reference, camera).numbers()

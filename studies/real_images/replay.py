@@ -42,7 +42,7 @@ CAMERA = "camera_1"
 
 
 @dataclass(frozen=True)
-class Said:
+class ReplayedEstimate:
     """What the tracker says about one frame.
 
     Attributes:
@@ -61,7 +61,7 @@ class Said:
 
 def replayed(
     folder: Path, *, rate_hz: float = RATE_HZ, retargeted: float = RETARGETED, seed: int = 0, models: Path | None = None
-) -> list[Said]:
+) -> list[ReplayedEstimate]:
     """All frames of the recording of a folder. Raises InputError where something of it is missing.
 
     Args:
@@ -112,13 +112,13 @@ def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) ->
         source.close()
 
 
-def _heard(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> Said:
+def _heard(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> ReplayedEstimate:
     """The three messages, read as a listener reads them."""
     estimate, pose = ActionEstimate.FromString(estimate_data), ArmPose.FromString(pose_data)
     outline = ImageAnnotations.FromString(outline_data).points[0].points
     progress = np.array(estimate.progress)
     middles = (np.arange(len(progress)) + 0.5) / len(progress)
-    return Said(
+    return ReplayedEstimate(
         frame=frame,
         pose=np.array([value for point in pose.points for value in (point.x, point.y, point.z)]),
         outline=np.array([(point.x, point.y) for point in outline]).reshape(-1, 2),

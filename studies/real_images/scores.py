@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats, InputError, Ints, read_arrays
 from paramove.observation import fitted_poses
-from studies.real_images.replay import Said
+from studies.real_images.replay import ReplayedEstimate
 from studies.real_images.seated_person import SIZES
 
 REFERENCE = "hand_reference.npz"
@@ -80,7 +80,7 @@ def middle_of_hand(poses: ArrayLike) -> Floats:
     return np.asarray(fitted[:, 3:6] + share * (fitted[:, 6:9] - fitted[:, 3:6]))
 
 
-def distances(said: Sequence[Said], reference: Floats, camera: CalibratedCamera) -> Distances:
+def distances(said: Sequence[ReplayedEstimate], reference: Floats, camera: CalibratedCamera) -> Distances:
     """Of the believed hand from the reference. Raises InputError where they are not of the same frames."""
     frames = np.array([one.frame for one in said], dtype=np.int64)
     if len(frames) == 0 or frames.max() >= len(reference):

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from paramove.applications.relocator import Relocator
 from paramove.applications.relocator_options import RelocatorOptions
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
@@ -42,7 +42,7 @@ class PointingStory:
     def __init__(self, run_name: str = "run", **options) -> None:
         self.relocator = Relocator(RelocatorOptions(**{"aligns": False, **options}), run_name)
         self.offsets: list[Place] = [(0.004, -0.008)]
-        self.events: list[Heard | Tick] = []
+        self.events: list[Received | Tick] = []
         self.now_ns = 0
         self.goals: list[RelocationGoal] = []
         self.sent: list[RelocationGoal] = []
@@ -149,7 +149,7 @@ class PointingStory:
         self._hear(topics.RELOCATION_STATUS, message, self.relocator.on_goal_status)
 
     def _hear(self, topic: topics.Topic, message, on: Callable) -> None:
-        self.events.append(Heard(topic, message, self.now_ns, self.now_ns, len(self.events)))
+        self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
         on(message)
 
     # What was said

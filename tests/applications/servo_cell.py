@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.applications.reach_task import ReachStep, ReachTask
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.rule_pb2 import Speech
@@ -41,7 +41,7 @@ class ServoCell:
         self.reason = self.code = ""
         self.angles = self.plan.base_angles.copy() if start is None else start
         self.safety = SafetyState(state=SafetyState.STATE_ARMED)
-        self.events: list[Heard | Tick] = []
+        self.events: list[Received | Tick] = []
         self.sent: list[JointTrajectory] = []
         self.speech: list[Speech] = []
         self._waiting: list[TrajectoryStatus] = []
@@ -85,5 +85,5 @@ class ServoCell:
 
     def _hear(self, topic: topics.Topic, message: Any, hear: Any) -> None:
         now_ns = self._number * PERIOD_NS
-        self.events.append(Heard(topic, message, now_ns, now_ns, self._number))
+        self.events.append(Received(topic, message, now_ns, now_ns, self._number))
         hear(message)

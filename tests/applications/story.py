@@ -10,7 +10,7 @@ from paramove.applications.rule_learner import RuleLearner
 from paramove.applications.stage import RuleLearnerOptions
 from paramove.applications.table import Surface
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
@@ -47,7 +47,7 @@ class Story:
 
     def __init__(self, run_name: str = "run", options: RuleLearnerOptions = OPTIONS) -> None:
         self.learner = RuleLearner(options, run_name)
-        self.events: list[Heard | Tick] = []
+        self.events: list[Received | Tick] = []
         self.now_ns = 0
         self._number = 0
         self.goals: list[RelocationGoal] = []
@@ -210,7 +210,7 @@ class Story:
         self.learner.on_goal_status(status)
 
     def _heard(self, topic: topics.Topic, message: Gesture | RelocationStatus) -> None:
-        self.events.append(Heard(topic, message, self.now_ns, self.now_ns, len(self.events)))
+        self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
     # What was said
 

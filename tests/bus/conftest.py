@@ -68,7 +68,7 @@ def wait() -> Wait:
     return until
 
 
-class RawSpeaker:
+class RawPublisher:
     """A program that is not ours at a topic's socket: it says any bytes, with an envelope that fits if wanted."""
 
     def __init__(self, context: zmq.Context[Any], folder: Path, topic: Topic, epoch: int = 1) -> None:

@@ -32,10 +32,10 @@ def _compute(seconds: float) -> None:
 
 
 def main(node: str, folder: str, log: str, seed: str, role: str) -> None:
-    hears, says = ROLES[role]
+    subscribes, publishes = ROLES[role]
     pace = random.Random(seed)
     settings = BusSettings(folder=Path(folder), clock="simulated", lockstep=True)
-    with Bus(node, settings, hears, says) as bus, Path(log).open("w", encoding="utf-8") as written:
+    with Bus(node, settings, subscribes, publishes) as bus, Path(log).open("w", encoding="utf-8") as written:
         signal.signal(signal.SIGTERM, lambda *_: bus.stop())
         _compute(pace.uniform(0.0, 0.2))
         if role == "speech":

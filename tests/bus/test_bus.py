@@ -28,8 +28,8 @@ def speaker(folder: Path) -> Iterator[Bus]:
 
 @pytest.fixture
 def listener(folder: Path, speaker: Bus, wait: Wait) -> Iterator[Bus]:
-    hears = (topics.GESTURES, topics.RULES, topics.status("recognizer"))
-    with Bus("rule_learner", BusSettings(folder=folder), hears, ()) as bus:
+    subscribes = (topics.GESTURES, topics.RULES, topics.status("recognizer"))
+    with Bus("rule_learner", BusSettings(folder=folder), subscribes, ()) as bus:
         heard = bus.exchange.subscribers
         wait(
             lambda: all(item.welcomed for item in heard.values()),
@@ -91,9 +91,9 @@ def test_ticks_come_without_messages(listener: Bus) -> None:
 
 
 def test_an_unknown_topic_is_refused_with_what_to_do(speaker: Bus, listener: Bus) -> None:
-    with pytest.raises(KeyError, match=r"recognizer does not say speech.*Add the topic to SAYS"):
+    with pytest.raises(KeyError, match=r"recognizer does not say speech.*Add the topic to PUBLISHES"):
         speaker.publish(topics.SPEECH, topics.SPEECH.type())
-    with pytest.raises(KeyError, match="add the topic to HEARS"):
+    with pytest.raises(KeyError, match="add the topic to SUBSCRIBES"):
         next(listener.events(topics.SPEECH))
 
 

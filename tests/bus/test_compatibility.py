@@ -33,9 +33,9 @@ def newer() -> Topic:
     return replace(topics.GESTURES, type=classes_of(schemas)[name])
 
 
-def _one_message(context: Context, folder: Path, wait: Wait, says: Topic, hears: Topic, message: Any) -> Any:
-    publisher = Publisher(context, folder, says, "recognizer")
-    subscriber = Subscriber(context, folder, hears)
+def _one_message(context: Context, folder: Path, wait: Wait, publishes: Topic, subscribes: Topic, message: Any) -> Any:
+    publisher = Publisher(context, folder, publishes, "recognizer")
+    subscriber = Subscriber(context, folder, subscribes)
     wait(lambda: subscriber.receive() is None and subscriber.welcomed, publisher.serve)
     publisher.publish(message, 0, 0)
     return wait(subscriber.receive)

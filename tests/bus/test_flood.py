@@ -22,7 +22,7 @@ from paramove.bus.subscriber import Subscriber
 from paramove.bus.turns import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
-from tests.bus.conftest import RawSpeaker, Wait
+from tests.bus.conftest import RawPublisher, Wait
 
 Context = zmq.Context[Any]
 SECOND_NS = 10**9
@@ -67,7 +67,7 @@ def test_events_have_no_budget(context: Context, folder: Path, wait: Wait) -> No
 
 @pytest.mark.parametrize("kind", ["refused", "repeated", "beyond the budget"])
 def test_one_call_passes_over_no_more_than_two_hundred(kind: str, context: Context, folder: Path, wait: Wait) -> None:
-    speaker = RawSpeaker(context, folder, topics.OBJECTS_TRACKED)
+    speaker = RawPublisher(context, folder, topics.OBJECTS_TRACKED)
     subscriber = Subscriber(context, folder, topics.OBJECTS_TRACKED)
     wait(speaker.subscribed)
     for _ in range(900):

@@ -14,7 +14,7 @@ from benchmarks.fuzz_bus import KINDS, Fuzzer, fuzz, memory_mib
 from paramove.bus import topics
 from paramove.bus.envelope import RefusedError
 from paramove.bus.subscriber import Subscriber
-from tests.bus.conftest import RawSpeaker, Wait
+from tests.bus.conftest import RawPublisher, Wait
 
 
 def test_nothing_but_refusals() -> None:
@@ -58,7 +58,7 @@ def test_any_payload_decodes_or_is_refused(kind: Any, payload: bytes) -> None:
 
 def test_a_subscriber_survives_a_thousand_inputs(context: zmq.Context[Any], folder: Path, wait: Wait) -> None:
     """The same inputs over a real socket; afterwards a speaker that starts anew is heard."""
-    speaker = RawSpeaker(context, folder, topics.TRUTH_STATE)
+    speaker = RawPublisher(context, folder, topics.TRUTH_STATE)
     subscriber = Subscriber(context, folder, topics.TRUTH_STATE)
     wait(speaker.subscribed)
     fuzzer = Fuzzer(2)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.recorded import RecordedBus, Said, with_ticks
-from paramove.bus.subscriber import Heard
+from paramove.bus.recorded import Published, RecordedBus, with_ticks
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import Rules, Speech
 
 
-def _gesture(time_ns: int, name: str = "") -> Heard:
-    return Heard(topics.GESTURES, Gesture(object=name), time_ns, time_ns, time_ns)
+def _gesture(time_ns: int, name: str = "") -> Received:
+    return Received(topics.GESTURES, Gesture(object=name), time_ns, time_ns, time_ns)
 
 
 def test_events_in_order_and_time_follows_them() -> None:
@@ -22,8 +22,8 @@ def test_events_in_order_and_time_follows_them() -> None:
     for event in bus.events(topics.GESTURES, tick=True):
         seen.append((type(event).__name__, bus.now_ns))
         bus.publish(topics.SPEECH, Speech(sentence=str(bus.now_ns)))
-    assert seen == [("Heard", 3), ("Tick", 5), ("Heard", 7), ("Tick", 10)]
-    assert bus.said[1] == Said(topics.SPEECH, Speech(sentence="5"), 5, 5)
+    assert seen == [("Received", 3), ("Tick", 5), ("Received", 7), ("Tick", 10)]
+    assert bus.said[1] == Published(topics.SPEECH, Speech(sentence="5"), 5, 5)
     assert len(bus.said_on(topics.SPEECH)) == 4
     assert bus.said_on(topics.GESTURES) == []
 
@@ -36,7 +36,7 @@ def test_latest_conflates_between_ticks() -> None:
 
 
 def test_other_topics_wait_for_a_later_loop() -> None:
-    bus = RecordedBus([_gesture(1), Heard(topics.RULES, Rules(), 2, 2, 1), _gesture(3)])
+    bus = RecordedBus([_gesture(1), Received(topics.RULES, Rules(), 2, 2, 1), _gesture(3)])
     for heard in bus.events(topics.RULES):
         assert heard.topic is topics.RULES
         break

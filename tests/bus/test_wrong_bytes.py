@@ -15,14 +15,14 @@ import zmq
 from paramove.bus import topics
 from paramove.bus.envelope import Reason
 from paramove.bus.schemas import hash_of, schema_hash
-from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
-from tests.bus.conftest import RawSpeaker, Wait
+from tests.bus.conftest import RawPublisher, Wait
 
 Context = zmq.Context[Any]
-Hear = Callable[[], Heard]
+Hear = Callable[[], Received]
 EVERY_TOPIC = [*topics.TOPICS, topics.status("camera")]
 
 
@@ -30,7 +30,7 @@ class Pair:
     """A raw speaker and our subscriber to it."""
 
     def __init__(self, context: Context, folder: Path, topic: Topic, wait: Wait) -> None:
-        self.speaker = RawSpeaker(context, folder, topic)
+        self.speaker = RawPublisher(context, folder, topic)
         self.subscriber = Subscriber(context, folder, topic)
         self._wait = wait
         wait(self.speaker.subscribed)
@@ -41,10 +41,10 @@ class Pair:
         self._wait(lambda: self.subscriber.receive() is None and counts[reason] >= count)
         assert counts[reason] == count
 
-    def hears_the_next(self, payload: bytes = b"") -> Heard:
+    def hears_the_next(self, payload: bytes = b"") -> Received:
         """Says a good message and waits for it."""
         self.speaker.say(payload)
-        heard: Heard = self._wait(self.subscriber.receive)
+        heard: Received = self._wait(self.subscriber.receive)
         assert heard.sequence == self.speaker.sequence
         return heard
 

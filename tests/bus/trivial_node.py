@@ -10,8 +10,8 @@ from paramove.bus.node import Bus, NodeConfig, main
 from paramove.documents.input_error import InputError
 from paramove.msgs.rule_pb2 import Speech
 
-HEARS = (topics.GESTURES,)
-SAYS = (topics.SPEECH,)
+SUBSCRIBES = (topics.GESTURES,)
+PUBLISHES = (topics.SPEECH,)
 
 
 class Config(NodeConfig):
@@ -34,4 +34,4 @@ def run(bus: Bus, config: Config) -> None:
 
 
 if __name__ == "__main__":
-    main(run, HEARS, SAYS, Config)
+    main(run, SUBSCRIBES, PUBLISHES, Config)

@@ -10,7 +10,7 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.topics import Topic
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
@@ -110,9 +110,9 @@ def messages() -> list[tuple[Topic, Any]]:
     ]
 
 
-def heard(said: list[tuple[Topic, Any]], from_ns: int = 1_000_000_000) -> list[Heard]:
+def heard(said: list[tuple[Topic, Any]], from_ns: int = 1_000_000_000) -> list[Received]:
     """The same as a bus hands it out, a millisecond apart."""
     return [
-        Heard(topic, message, from_ns + 1_000_000 * number, from_ns + 1_000_000 * number, number + 1)
+        Received(topic, message, from_ns + 1_000_000 * number, from_ns + 1_000_000 * number, number + 1)
         for number, (topic, message) in enumerate(said)
     ]

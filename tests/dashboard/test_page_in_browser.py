@@ -62,7 +62,7 @@ class Run:
             self.page.__enter__()
             self.alive = True
 
-    def says(self, *said: tuple[topics.Topic, Any]) -> None:
+    def publish(self, *said: tuple[topics.Topic, Any]) -> None:
         with self._lock:
             self._number += 1
             for heard in scene.heard(list(said), self._number * 1_000_000_000):
@@ -82,7 +82,7 @@ class Run:
                 self.button.look(self._number * 1_000_000_000)
                 self._show()
             if self.said and self.obeys:
-                self.says((topics.ARM_SAFETY, scene.safety(SafetyState.STATE_HOLD, (PERSON_STOP, STOPPED))))
+                self.publish((topics.ARM_SAFETY, scene.safety(SafetyState.STATE_HOLD, (PERSON_STOP, STOPPED))))
 
     def __enter__(self) -> Run:
         self.page.__enter__()
@@ -116,7 +116,7 @@ def browser(one_browser: Browser) -> Iterator[Browser]:
 
 
 def opened(browser: Browser, run: Run) -> None:
-    run.says(*scene.messages())
+    run.publish(*scene.messages())
     browser.open(run.page.link)
     browser.until("document.getElementById('gate-state')?.textContent === 'armed'", "the gate's state is shown")
 
@@ -256,7 +256,7 @@ def test_names_and_sentences_are_text_whatever_they_hold(run: Run, browser: Brow
     goal = scene.goal()
     goal.id, goal.object = "goal-10", payload
     failed = RelocationStatus(goal_id="goal-10", state=RelocationStatus.STATE_FAILED, reason=payload, phase=payload)
-    run.says(
+    run.publish(
         (topics.OBJECTS_TRACKED, tracked),
         (topics.RULES, Rules(rules=[Rule(object=payload, x=0.13, y=0.0)])),
         (topics.RELOCATION_GOAL, goal),
@@ -288,7 +288,7 @@ def test_a_lost_connection_is_told_and_comes_back(run: Run, browser: Browser) ->
     browser.click("#stop")
     browser.until("document.getElementById('alert').textContent.includes('NOT confirmed')", "no stop is pretended")
     run.comes_back()
-    run.says((topics.SPEECH, Speech(sentence="Here I am again.")))
+    run.publish((topics.SPEECH, Speech(sentence="Here I am again.")))
     browser.until("document.getElementById('sentence').textContent === 'Here I am again.'", "it goes on by itself")
 
 

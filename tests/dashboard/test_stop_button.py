@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.dashboard.stop_button import Progress, StopButton
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState, StopRequest
 from paramove.safety.gate_io import PERSON_STOP
@@ -28,7 +28,7 @@ class Rig:
 
     def gate(self, state: SafetyState.State, code: str | None, at_ns: int) -> None:
         faults = [SafetyFault(code=code, sentence=SENTENCE)] if code else []
-        self.button.hear(Heard(topics.ARM_SAFETY, SafetyState(state=state, faults=faults), at_ns, at_ns, 1))
+        self.button.hear(Received(topics.ARM_SAFETY, SafetyState(state=state, faults=faults), at_ns, at_ns, 1))
 
 
 def test_not_pressed_says_nothing() -> None:

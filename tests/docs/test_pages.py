@@ -78,8 +78,8 @@ def test_topic_table_is_that_of_the_code():
             topic.profile.value,
             topic.frame or "–",
             "yes" if topic.recorded else "–",
-            who(topic, "says"),
-            who(topic, "hears"),
+            who(topic, "publishes"),
+            who(topic, "subscribes"),
         ]
         for topic in topics.TOPICS
     ]

@@ -55,7 +55,7 @@ def test_it_moves_its_last_joint_a_little_and_back(robot, port):
         person.arms_and_waits()
         angle = person.angles[-1][place]
         there = angle - np.copysign(A_LITTLE, angle)
-        person.says("a little", [joint], [(0.0, [angle]), (1.0, [there]), (2.0, [angle])])
+        person.publish("a little", [joint], [(0.0, [angle]), (1.0, [there]), (2.0, [angle])])
         person.is_told("SUCCEEDED")
         angles = np.array(person.angles)[:, place]
         assert np.abs(angles - there).min() < np.deg2rad(1.0)

@@ -10,7 +10,7 @@ from foxglove_schemas_protobuf.JointState_pb2 import JointState
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.planned_motion import PlannedMotion
@@ -190,7 +190,7 @@ class Cell:
         self.driver = driver or FakeDriver()
         self.synthesizer = Synthesizer(RememberedPlans(planner(), checker()))
         self.statuses: list[RelocationStatus] = []
-        self.events: list[Heard | Tick] = []
+        self.events: list[Received | Tick] = []
         self.now_ns = 0
         self.feel()
 
@@ -207,9 +207,9 @@ class Cell:
     def tick(self) -> None:
         self.now_ns += PERIOD_NS
         self.events.append(Tick(len(self.events), self.now_ns))
-        says = self.synthesizer.tick(self.now_ns)
-        self.statuses.extend(says.statuses)
-        answers = [status for trajectory in says.trajectories for status in self.driver.hear(trajectory)]
+        output = self.synthesizer.tick(self.now_ns)
+        self.statuses.extend(output.statuses)
+        answers = [status for trajectory in output.trajectories for status in self.driver.hear(trajectory)]
         answers.extend(self.driver.step())
         self.feel()
         for answer in answers:
@@ -217,7 +217,7 @@ class Cell:
             self.synthesizer.on_trajectory_status(answer)
 
     def _heard(self, topic: topics.Topic, message: Any) -> None:
-        self.events.append(Heard(topic, message, self.now_ns, self.now_ns, len(self.events)))
+        self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
     def do(self, wanted: RelocationGoal, patience: int = 1200) -> RelocationStatus:
         """Sends the goal and ticks until its last status, which is returned."""

@@ -11,8 +11,8 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from nodes import action_tracker, camera, recognizer
 from paramove.bus import topics
-from paramove.bus.recorded import RecordedBus, Said, with_ticks
-from paramove.bus.subscriber import Heard
+from paramove.bus.recorded import Published, RecordedBus, with_ticks
+from paramove.bus.subscriber import Received
 
 Image = np.ndarray
 
@@ -34,10 +34,10 @@ def light(image: Image, time_ns: int) -> RawImage:
     return message
 
 
-def heard(said: Sequence[Said], topic: topics.Topic) -> Iterator[Heard]:
+def heard(said: Sequence[Published], topic: topics.Topic) -> Iterator[Received]:
     """What was said, as the next process hears it."""
     for number, one in enumerate(said, start=1):
-        yield Heard(topic, one.message, one.captured_ns, one.captured_ns, number)
+        yield Received(topic, one.message, one.captured_ns, one.captured_ns, number)
 
 
 def through_the_chain(
@@ -51,14 +51,14 @@ def through_the_chain(
         for image, time_s in zip(stream, times_s, strict=True):
             time_ns = round(time_s * 1e9) + 1
             if image is not None:
-                lights.append(Heard(topics.CAMERA_LIGHT, light(image, time_ns), time_ns, time_ns, len(lights) + 1))
+                lights.append(Received(topics.CAMERA_LIGHT, light(image, time_ns), time_ns, time_ns, len(lights) + 1))
         bus = RecordedBus(lights)
         camera.run(bus, camera.Config(width=width, height=height))
         states.append(bus.states)
         images += heard(bus.said, topic)
     images.sort(key=lambda one: one.captured_ns)
     end_ns = round(times_s[-1] * 1e9) + 1
-    nobody = Heard(topics.CAMERA_LIGHT, RawImage(), end_ns, end_ns, 1)  # time goes on when no camera gives images
+    nobody = Received(topics.CAMERA_LIGHT, RawImage(), end_ns, end_ns, 1)  # time goes on when no camera gives images
     tracking = RecordedBus(with_ticks([*images, nobody]))
     action_tracker.run(tracking, config)
     estimates = [one for one in tracking.said if one.topic is topics.ACTION_ESTIMATE]

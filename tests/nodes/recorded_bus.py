@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
 
@@ -16,7 +16,7 @@ PERIOD_NS = 66_666_667
 def bus_that_heard(messages: Iterable[tuple[Topic, Any]]) -> RecordedBus:
     """One message each tick period, from the first on; no ticks."""
     return RecordedBus(
-        Heard(topic, message, number * PERIOD_NS, number * PERIOD_NS, number)
+        Received(topic, message, number * PERIOD_NS, number * PERIOD_NS, number)
         for number, (topic, message) in enumerate(messages, start=1)
     )
 

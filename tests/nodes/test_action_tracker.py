@@ -9,7 +9,7 @@ from nodes import action_tracker
 from paramove.action_space.messages import TablePlace
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.cameras.frames import Frame, encode
 from paramove.demonstrations import table_place
 from tests.action_space.drawn_arm import camera, drawn, pointing, write_setup
@@ -23,14 +23,14 @@ def config(tmp_path_factory):
 def heard(images, times, topic=topics.CAMERA_IMAGES[0]):
     for number, (image, time_s) in enumerate(zip(images, times, strict=True), start=1):
         time_ns = round(time_s * 1e9) + 1
-        yield Heard(topic, encode(Frame(image, time_ns, number)), time_ns, time_ns, number)
+        yield Received(topic, encode(Frame(image, time_ns, number)), time_ns, time_ns, number)
 
 
 def test_says_estimate_pose_outline_and_ball_of_each_image(config):
     times, poses = pointing((0.5, 0.5))
     bus = RecordedBus(heard(drawn(poses, camera(1)), times))
     action_tracker.run(bus, config)
-    assert [one.topic for one in bus.said[:4]] == list(action_tracker.SAYS)
+    assert [one.topic for one in bus.said[:4]] == list(action_tracker.PUBLISHES)
     assert len(bus.said) == 4 * len(times)
     estimates = [one.message for one in bus.said[::4]]
     assert estimates[0].actions[0].action == "pointing"

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from nodes import arm_driver
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
@@ -26,7 +26,7 @@ def replayed(ticks: int, more: dict[int, list], until_state: int | None = None) 
         heard = list(more.get(number, []))
         if until_state is None or number < until_state:
             heard.insert(0, (topics.WIRE_HOAP3_STATE, robot.state(now_ns)))
-        events += [Heard(topic, message, now_ns, now_ns, number) for topic, message in heard]
+        events += [Received(topic, message, now_ns, now_ns, number) for topic, message in heard]
         events.append(Tick(number, now_ns))
     bus = RecordedBus(events)
     arm_driver.run(bus, CONFIG)
@@ -47,7 +47,7 @@ def test_says_joints_and_safety_once_a_tick() -> None:
     assert_allclose([found[name] for name in HOAP3.joint_names], HOAP3.base_pose, rtol=0, atol=np.deg2rad(0.8))
     assert set(states(bus)[1:]) == {SafetyState.STATE_DISARMED}
     assert bus.said_on(topics.WIRE_HOAP3_STREAM) == []
-    assert {said.topic for said in bus.said} <= set(arm_driver.SAYS)
+    assert {said.topic for said in bus.said} <= set(arm_driver.PUBLISHES)
 
 
 def test_a_disarmed_driver_refuses_trajectories_and_streams_nothing() -> None:

@@ -31,7 +31,7 @@ from nodes import (
 )
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.cameras.calibrated import write_cameras
 from paramove.cameras.frames import Frame, encode
@@ -55,8 +55,8 @@ from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import FakeRobot, trajectory
 
 PERIOD_NS = 66_666_667
-Event = Heard | Tick
-Said = tuple[topics.Topic, Any]
+Event = Received | Tick
+Published = tuple[topics.Topic, Any]
 
 
 class FaultyBus(RecordedBus):
@@ -67,7 +67,7 @@ class FaultyBus(RecordedBus):
         left_out: Faults that the bus did not hand out.
     """
 
-    def __init__(self, sound: list[Event], faulty: list[tuple[str, Said]], folder: Path, protected: bool) -> None:
+    def __init__(self, sound: list[Event], faulty: list[tuple[str, Published]], folder: Path, protected: bool) -> None:
         self.fault = "none"
         self.left_out: set[str] = set()
         self._faults: dict[int, str] = {}
@@ -80,7 +80,7 @@ class FaultyBus(RecordedBus):
                     now_ns = event.now_ns + number * 1_000_000  # newer than all before, or it would be passed over
                     if "captured" in message.DESCRIPTOR.fields_by_name and "captured" not in name:
                         message.captured.FromNanoseconds(now_ns)
-                    events.append(Heard(topic, message, now_ns, now_ns, 1))
+                    events.append(Received(topic, message, now_ns, now_ns, 1))
                     self._faults[id(events[-1])] = name
         self._all = events  # keeps their ids
         super().__init__(events, run_folder=folder, protected=protected)
@@ -89,7 +89,7 @@ class FaultyBus(RecordedBus):
     def goes_on(self) -> bool:
         return bool(self._waiting)
 
-    def hands_out(self, heard: Heard) -> bool:
+    def hands_out(self, heard: Received) -> bool:
         self.fault = self._faults.get(id(heard), self.fault)
         sound = super().hands_out(heard)
         if not sound:
@@ -102,12 +102,12 @@ class FaultyBus(RecordedBus):
         assert not found, f"it said {topic.name} with {found}"
 
 
-def timed(messages: Iterable[Said]) -> list[Event]:
+def timed(messages: Iterable[Published]) -> list[Event]:
     """A message a tick, then the tick."""
     events: list[Event] = []
     for number, (topic, message) in enumerate(messages, start=1):
         now_ns = number * PERIOD_NS
-        events += [Heard(topic, message, now_ns, now_ns, number), Tick(number, now_ns)]
+        events += [Received(topic, message, now_ns, now_ns, number), Tick(number, now_ns)]
     return events
 
 
@@ -130,7 +130,7 @@ def of_colour_tracker() -> list[Event]:
 def of_recognizer() -> list[Event]:
     plane = [(0.1, -0.1), (0.2, -0.1), (0.2, 0.1), (0.1, 0.1)]
     calibration = PlaneHomography.fit([(300, 300), (300, 200), (100, 200), (100, 300)], plane).to_message()
-    said: list[Said] = [(topics.CALIBRATION_PLANE, calibration)]
+    said: list[Published] = [(topics.CALIBRATION_PLANE, calibration)]
     for n in range(2, 150):
         u = 200 + 40 * np.sin(n / 25)
         seen = image_of(
@@ -159,7 +159,9 @@ def of_action_tracker() -> list[Event]:
 
 def of_pointing_poses() -> list[Event]:
     """A recognizer that hears poses; what it hears besides is as in `of_recognizer`."""
-    said: list[Said] = [(event.topic, event.message) for event in of_recognizer()[:12] if isinstance(event, Heard)]
+    said: list[Published] = [
+        (event.topic, event.message) for event in of_recognizer()[:12] if isinstance(event, Received)
+    ]
     return timed([*said, *((topics.HUMAN_ARM_POSE, pose) for pose in poses(performed("pointing", [(0.4, 0.5)])))])
 
 
@@ -176,7 +178,7 @@ def of_rule_learner() -> list[Event]:
     for place in range(0, len(events), 50):
         if isinstance(events[place], Tick):
             now_ns = events[place].now_ns
-            events.insert(place + 1, Heard(topics.ARM_SAFETY, safety, now_ns, now_ns, 1))
+            events.insert(place + 1, Received(topics.ARM_SAFETY, safety, now_ns, now_ns, 1))
     return events
 
 
@@ -205,7 +207,7 @@ def of_reacher() -> list[Event]:
 def of_arm_driver() -> list[Event]:
     robot, events = FakeRobot(), []
     robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
-    more: dict[int, Said] = {
+    more: dict[int, Published] = {
         5: (topics.OPERATOR_ARM, ArmRequest(source="a person", armed=True, by_person=True)),
         6: (topics.OPERATOR_ARM_AT_START, ArmRequest(source="a program", armed=True)),
         8: (topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0)),
@@ -215,7 +217,7 @@ def of_arm_driver() -> list[Event]:
     for number in range(1, 60):
         now_ns = number * PERIOD_NS
         heard = [(topics.WIRE_HOAP3_STATE, robot.state(now_ns))] + ([more[number]] if number in more else [])
-        events += [Heard(topic, message, now_ns, now_ns, number) for topic, message in heard]
+        events += [Received(topic, message, now_ns, now_ns, number) for topic, message in heard]
         events.append(Tick(number, now_ns))
     return events
 
@@ -261,11 +263,11 @@ def _config(node: str, folder: Path) -> Any:
     return module.Config.model_validate(parameters)
 
 
-def _faulty(sound: list[Event], protected: bool) -> list[tuple[str, Said]]:
+def _faulty(sound: list[Event], protected: bool) -> list[tuple[str, Published]]:
     """Every fault of the richest message of each topic. Times that no clock has are for the bus to leave out."""
-    richest: dict[str, Heard] = {}
+    richest: dict[str, Received] = {}
     for event in sound:
-        if isinstance(event, Heard):
+        if isinstance(event, Received):
             known = richest.get(event.topic.name)
             if known is None or event.message.ByteSize() > known.message.ByteSize():
                 richest[event.topic.name] = event
@@ -294,7 +296,7 @@ def test_no_message_makes_a_node_fall_over(node: str, protected: bool, tmp_path:
     except Exception as error:
         raise AssertionError(f"after {bus.fault}: {type(error).__name__}: {error}") from error
     assert bus.fault == faulty[-1][0]
-    assert bus.said or not module.SAYS
+    assert bus.said or not module.PUBLISHES
     numbers = [fault for fault, _ in faulty if "=nan" in fault]
     assert all(fault in bus.left_out for fault in numbers) or not protected
 
@@ -302,5 +304,7 @@ def test_no_message_makes_a_node_fall_over(node: str, protected: bool, tmp_path:
 @pytest.mark.parametrize("node", NODES)
 def test_every_message_that_a_node_hears_is_tried(node: str) -> None:
     module, record, _ = NODES[node]
-    tried = {event.topic.name for event in record() if isinstance(event, Heard)}
-    assert {topic.name for topic in module.HEARS} <= tried or node == "recorder"  # hears everything, looks at nothing
+    tried = {event.topic.name for event in record() if isinstance(event, Received)}
+    assert {
+        topic.name for topic in module.SUBSCRIBES
+    } <= tried or node == "recorder"  # hears everything, looks at nothing

@@ -8,7 +8,7 @@ import pytest
 from nodes import body_tracker
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.cameras.calibrated import write_cameras
 from paramove.cameras.frames import Frame, encode
@@ -37,7 +37,7 @@ def moments(pictures, count, seeing=lambda moment: BOTH):
         now_ns = moment * PERIOD_NS
         for camera in seeing(moment):
             frame = encode(Frame(pictures[camera], now_ns, moment))
-            yield Heard(topics.CAMERA_IMAGES[camera], frame, now_ns, now_ns, moment)
+            yield Received(topics.CAMERA_IMAGES[camera], frame, now_ns, now_ns, moment)
         yield Tick(moment, now_ns)
 
 
@@ -54,7 +54,7 @@ def poses(bus):
 
 def test_says_pose_outline_and_scene_of_each_moment(cameras, images):
     bus = run(cameras, moments(images, 3))
-    assert [one.topic for one in bus.said] == list(body_tracker.SAYS) * 3
+    assert [one.topic for one in bus.said] == list(body_tracker.PUBLISHES) * 3
     found = poses(bus)[-1]
     assert list(found) == ["elbow", "wrist", "index"]
     for name, place in found.items():
@@ -115,7 +115,7 @@ def test_black_images_give_no_points(cameras, images):
 
 def test_late_images_are_left_out(cameras, images):
     events = list(moments(images, 6))
-    late = [event for event in events[:4] if isinstance(event, Heard)]
+    late = [event for event in events[:4] if isinstance(event, Received)]
     assert len(poses(run(cameras, [*events, *late]))) == len(poses(run(cameras, events)))
 
 

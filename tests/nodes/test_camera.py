@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from nodes import camera
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import Tick
 from paramove.cameras.frames import FrameError, decode
 from paramove.documents.input_error import InputError
@@ -101,9 +101,9 @@ def _bus_of(*events: Any) -> RecordedBus:
 
 def test_silence_of_the_light_is_told_after_a_second_and_once() -> None:
     topic, light = _light(_picture(1))
-    events: list[Any] = [Heard(topic, light, PERIOD_NS, PERIOD_NS, 1)]
+    events: list[Any] = [Received(topic, light, PERIOD_NS, PERIOD_NS, 1)]
     events += [Tick(n, n * PERIOD_NS) for n in range(1, 40)]
-    events.append(Heard(topic, _light(_picture(2))[1], 40 * PERIOD_NS, 40 * PERIOD_NS, 2))
+    events.append(Received(topic, _light(_picture(2))[1], 40 * PERIOD_NS, 40 * PERIOD_NS, 2))
     bus = _bus_of(*events)
     camera.run(bus, camera.Config())
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]

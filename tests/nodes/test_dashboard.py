@@ -25,8 +25,8 @@ SENTENCE = "stopped from the page by a person"
 
 
 def test_hears_nothing_of_the_truth_and_says_nothing_but_the_stop() -> None:
-    assert not any(topic.truth for topic in dashboard.HEARS)
-    assert dashboard.SAYS == (topics.OPERATOR_STOP,)
+    assert not any(topic.truth for topic in dashboard.SUBSCRIBES)
+    assert dashboard.PUBLISHES == (topics.OPERATOR_STOP,)
 
 
 def test_a_replay_shows_all_and_says_nothing(tmp_path: Path) -> None:
@@ -51,8 +51,8 @@ def test_a_pressed_button_is_said_on_the_bus_at_once(tmp_path: Path) -> None:
     folder = tmp_path / "bus"
     settings = BusSettings(folder=folder, clock="simulated")  # nobody says the clock, so there are no ticks
     with (
-        Bus("dashboard", settings, dashboard.HEARS, dashboard.SAYS, tmp_path) as bus,
-        Bus("driver", BusSettings(folder=folder), hears=(topics.OPERATOR_STOP,)) as driver,
+        Bus("dashboard", settings, dashboard.SUBSCRIBES, dashboard.PUBLISHES, tmp_path) as bus,
+        Bus("driver", BusSettings(folder=folder), subscribes=(topics.OPERATOR_STOP,)) as driver,
     ):
         failures: list[BaseException] = []
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from nodes import operator
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.msgs.safety_state_pb2 import SafetyState
 
 SECOND = 1_000_000_000
@@ -14,7 +14,7 @@ SECOND = 1_000_000_000
 def replayed(folder: Path, arms_at_start: bool, *states: SafetyState.State) -> RecordedBus:
     """The gate says a state each second."""
     heard = [
-        Heard(topics.ARM_SAFETY, SafetyState(state=state), number * SECOND, number * SECOND, number)
+        Received(topics.ARM_SAFETY, SafetyState(state=state), number * SECOND, number * SECOND, number)
         for number, state in enumerate(states, start=1)
     ]
     bus = RecordedBus(heard, run_folder=folder)

@@ -14,7 +14,7 @@ from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import Speech
 from paramove.recording.parts import PartedRecording
@@ -23,9 +23,9 @@ from tests.supervision.conftest import until
 
 ROOT = Path(__file__).parents[2]
 HEARD = [
-    Heard(topics.GESTURES, Gesture(object="blue"), 100, 110, 1),
-    Heard(topics.SPEECH, Speech(sentence="hello"), 90, 120, 1),
-    Heard(topics.GESTURES, Gesture(object="green"), 130, 140, 2),
+    Received(topics.GESTURES, Gesture(object="blue"), 100, 110, 1),
+    Received(topics.SPEECH, Speech(sentence="hello"), 90, 120, 1),
+    Received(topics.GESTURES, Gesture(object="green"), 130, 140, 2),
 ]
 
 
@@ -39,12 +39,12 @@ def test_keeps_every_message_with_its_times(tmp_path: Path) -> None:
 
 
 def test_hears_all_that_is_marked_and_no_truth() -> None:
-    assert {topic.name for topic in recorder.HEARS} == {topic.name for topic in topics.TOPICS if topic.recorded}
-    assert not any(topic.truth for topic in recorder.HEARS)
+    assert {topic.name for topic in recorder.SUBSCRIBES} == {topic.name for topic in topics.TOPICS if topic.recorded}
+    assert not any(topic.truth for topic in recorder.SUBSCRIBES)
 
 
 def test_tells_now_and_then_how_much_it_has(tmp_path: Path) -> None:
-    many = [Heard(topics.SPEECH, Speech(), n, n, n) for n in range(2 * recorder.REPORT_EVERY + 5)]
+    many = [Received(topics.SPEECH, Speech(), n, n, n) for n in range(2 * recorder.REPORT_EVERY + 5)]
     bus = RecordedBus(many, run_folder=tmp_path)
     recorder.run(bus, recorder.Config(file="other.mcap"))
     assert [sentence for _, sentence in bus.states] == [

@@ -22,7 +22,7 @@ def test_replays_the_whole_story():
         (topics.SPEECH, story.speech),
     ):
         assert [said.message for said in bus.said_on(topic)] == expected, topic.name
-    assert {said.topic for said in bus.said} <= set(relocator.SAYS)
+    assert {said.topic for said in bus.said} <= set(relocator.PUBLISHES)
     assert bus.states[-1][0] == "ready"
 
 

@@ -28,7 +28,7 @@ def test_replays_the_whole_story(story: Story) -> None:
         (topics.APPLICATION_STAGE, story.stages),
     ):
         assert [said.message for said in bus.said_on(topic)] == expected, topic.name
-    assert {said.topic for said in bus.said} <= set(rule_learner.SAYS)
+    assert {said.topic for said in bus.said} <= set(rule_learner.PUBLISHES)
     assert bus.states[0] == ("ready", "waiting for the arm")
     assert bus.states[-1][0] == "ready"
 

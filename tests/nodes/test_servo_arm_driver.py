@@ -29,7 +29,7 @@ FOLDER = Path("robot_description/open_manipulator_x")
 ROBOT = RobotDescription.load(FOLDER)
 PATIENT_S = 120.0
 PATIENCE = {"silent_s": 2.0, "watchdog_s": 2.54, "read_s": 0.4}
-HEARS = (topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS, topics.ARM_JOINT_STATES_FAST)
+SUBSCRIBES = (topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS, topics.ARM_JOINT_STATES_FAST)
 MOVE = """
 import sys
 from pathlib import Path
@@ -61,7 +61,7 @@ class Run:
         self.folder, self.emulator = folder, emulator
         self.safety, self.angles = SafetyState(), None
         self.statuses: list[TrajectoryStatus] = []
-        self._events = bus.events(*HEARS, tick=True)
+        self._events = bus.events(*SUBSCRIBES, tick=True)
 
     def hears_until(self, what) -> None:
         until_s = time.monotonic() + PATIENT_S
@@ -106,13 +106,15 @@ def run():
         made: list[Bus] = []
 
         def drive() -> None:
-            with Bus("driver", BusSettings(folder=folder), servo_arm_driver.HEARS, servo_arm_driver.SAYS) as bus:
+            with Bus(
+                "driver", BusSettings(folder=folder), servo_arm_driver.SUBSCRIBES, servo_arm_driver.PUBLISHES
+            ) as bus:
                 made.append(bus)
                 servo_arm_driver.run(bus, config)
 
         thread = threading.Thread(target=drive)
         thread.start()
-        with Bus("test", BusSettings(folder=folder), HEARS) as bus:
+        with Bus("test", BusSettings(folder=folder), SUBSCRIBES) as bus:
             run = Run(folder, emulator, bus)
             try:
                 run.waits_for("DISARMED")

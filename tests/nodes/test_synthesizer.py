@@ -44,7 +44,7 @@ def test_replays_a_relocation(config: synthesizer.Config) -> None:
     for one, other in zip(trajectories, cell.driver.heard, strict=True):
         assert one.phases == other.phases
         np.testing.assert_allclose(one.points[-1].position_rad, other.points[-1].position_rad, rtol=0, atol=1e-9)
-    assert {said.topic for said in bus.said} <= set(synthesizer.SAYS)
+    assert {said.topic for said in bus.said} <= set(synthesizer.PUBLISHES)
 
 
 def test_without_goals_it_says_nothing(config: synthesizer.Config) -> None:

@@ -16,7 +16,7 @@ import pytest
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.msgs.rule_pb2 import Speech
 from paramove.recording import recorder
 from paramove.recording.parts import PartedRecording
@@ -28,9 +28,9 @@ from tests.supervision.conftest import PATIENCE_S, until
 ROOT = Path(__file__).parents[2]
 
 
-def speech(number: int, size: int = 0) -> Heard:
+def speech(number: int, size: int = 0) -> Received:
     """A message that cannot be compressed."""
-    return Heard(topics.SPEECH, Speech(sentence=os.urandom(size // 2).hex()), number, number, number)
+    return Received(topics.SPEECH, Speech(sentence=os.urandom(size // 2).hex()), number, number, number)
 
 
 def numbers_in(path: Path) -> list[int]:

@@ -49,11 +49,11 @@ class ArmingMachine(RuleBasedStateMachine):
     )
     def somebody_arms(self, age_ms: int, source: str, checks_ms: int, by_person: bool, emulated: bool) -> None:
         self.checks_ms, self.emulated = checks_ms, emulated
-        self.says(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True, by_person))
+        self.publish(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True, by_person))
 
     @rule()
     def somebody_disarms(self) -> None:
-        self.says(ArmWord(self.arm.now + 10 * MS, "a person", False, by_person=True))
+        self.publish(ArmWord(self.arm.now + 10 * MS, "a person", False, by_person=True))
 
     @rule(goal=st.sampled_from(range(len(GOALS))), steps=st.integers(0, 25))
     def all_is_well_and_the_arm_moves(self, goal: int, steps: int) -> None:
@@ -61,7 +61,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.pressed, self.source_speaks, self.checks = False, True, ()
         for _ in range(12):
             self.step(ms=50)
-        self.says(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
+        self.publish(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
         assert self.arm.core.state is State.ARMED
         self.a_movement_is_asked_for(goal)
         for _ in range(steps):
@@ -132,7 +132,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.source_heard_ns = self.only_later_ns = self.arm.now
         self.step()
 
-    def says(self, word: ArmWord) -> None:
+    def publish(self, word: ArmWord) -> None:
         self.words.append(word)
         self.step(word=word)
 

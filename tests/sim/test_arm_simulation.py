@@ -148,7 +148,7 @@ def test_images_of_the_arm_come_as_often_as_asked_for() -> None:
         for name in ("bus", "truth"):
             (folder / name).mkdir(mode=0o700)
         settings = BusSettings(folder=folder / "bus", truth_folder=folder / "truth", clock="simulated")
-        with Bus("simulator", settings, arm_simulator.HEARS, arm_simulator.SAYS, folder) as bus:
+        with Bus("simulator", settings, arm_simulator.SUBSCRIBES, arm_simulator.PUBLISHES, folder) as bus:
             config = arm_simulator.Config(seed=1, robot=ROBOT, max_duration_s=0.6, pace=1000.0, arm_image_every=2)
             arm_simulator.run(bus, config)
             said = {name: publisher.sequence for name, publisher in bus.exchange.publishers.items()}

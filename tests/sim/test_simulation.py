@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from paramove.bus import topics
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State
 from paramove.msgs.rule_pb2 import Speech
 from paramove.objects.colour_tracker import ColourTracker
@@ -128,5 +128,5 @@ def test_missing_graphics_are_named_with_what_would_work(world: World, monkeypat
         Eye(world.model, 64, 48)
 
 
-def _heard(topic: topics.Topic, message: object) -> Heard:
-    return Heard(topic, message, 0, 0, 1)
+def _heard(topic: topics.Topic, message: object) -> Received:
+    return Received(topic, message, 0, 0, 1)

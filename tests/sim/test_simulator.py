@@ -34,7 +34,7 @@ def _bus(folder: Path) -> Bus:
     for name in ("bus", "truth"):
         (folder / name).mkdir(mode=0o700)
     settings = BusSettings(folder=folder / "bus", truth_folder=folder / "truth", clock="simulated")
-    return Bus("simulator", settings, simulator.HEARS, simulator.SAYS, folder)
+    return Bus("simulator", settings, simulator.SUBSCRIBES, simulator.PUBLISHES, folder)
 
 
 def test_runs_to_its_longest_duration_and_says_every_topic_at_15_hz(folder: Path) -> None:
@@ -66,9 +66,9 @@ def test_wrong_parameters_are_refused(parameters: dict[str, float]) -> None:
 
 
 def test_only_evaluators_hear_of_the_truth() -> None:
-    assert all(topic.truth for topic in judge.HEARS)
-    assert judge.SAYS == ()
-    assert topics.TRUTH_STATE not in simulator.HEARS
+    assert all(topic.truth for topic in judge.SUBSCRIBES)
+    assert judge.PUBLISHES == ()
+    assert topics.TRUTH_STATE not in simulator.SUBSCRIBES
 
 
 def test_judge_writes_a_verdict_that_can_be_read_at_any_time(folder: Path) -> None:

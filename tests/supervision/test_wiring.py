@@ -14,7 +14,7 @@ NODES = [
     f"{folder}.{path.stem}"
     for folder in ("nodes", "sim")
     for path in sorted((ROOT / folder).glob("*.py"))
-    if "\nHEARS = " in path.read_text()
+    if "\nSUBSCRIBES = " in path.read_text()
 ]
 
 
@@ -28,7 +28,7 @@ def checked(workspace, text):
 
 def test_topics_with_a_speaker_pass(workspace):
     interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
-    assert interfaces["ear"].hears == (topics.SPEECH,)
+    assert interfaces["ear"].subscribes == (topics.SPEECH,)
     assert interfaces["ear"].parameters == ("loudness", "language")
     assert clock_speaker(interfaces) is None
 
@@ -84,32 +84,40 @@ def test_optional_topic_needs_no_speaker(workspace):
 
 
 @pytest.mark.parametrize(
-    ("source", "hears"),
+    ("source", "subscribes"),
     [
-        ("_TWO = (topics.SPEECH, topics.CLOCK)\nHEARS = _TWO + (topics.RULES,)", ["speech", "clock", "rules"]),
-        ("HEARS = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/light", "rules"]),
-        ("HEARS = tuple(t for t in topics.TOPICS if t.name == 'rules')", ["rules"]),
-        ("HEARS = topics.TOPICS", [topic.name for topic in topics.TOPICS]),
+        ("_TWO = (topics.SPEECH, topics.CLOCK)\nSUBSCRIBES = _TWO + (topics.RULES,)", ["speech", "clock", "rules"]),
+        ("SUBSCRIBES = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/light", "rules"]),
+        ("SUBSCRIBES = tuple(t for t in topics.TOPICS if t.name == 'rules')", ["rules"]),
+        ("SUBSCRIBES = topics.TOPICS", [topic.name for topic in topics.TOPICS]),
     ],
 )
-def test_interface_is_read_from_the_source_or_by_import(workspace, source, hears):
-    (workspace.root / "nodes" / "odd.py").write_text(f"from paramove.bus import topics\n{source}\nSAYS = ()\n")
-    assert [topic.name for topic in read_interface("nodes.odd", workspace.root).hears] == hears
+def test_interface_is_read_from_the_source_or_by_import(workspace, source, subscribes):
+    (workspace.root / "nodes" / "odd.py").write_text(f"from paramove.bus import topics\n{source}\nPUBLISHES = ()\n")
+    assert [topic.name for topic in read_interface("nodes.odd", workspace.root).subscribes] == subscribes
 
 
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("HEARS = ()", "SAYS is missing"),
-        ("HEARS = (topics.CLOK,)\nSAYS = ()", r"odd\.py:1: there is no topic topics.CLOK"),
-        ("HEARS = (\nSAYS = ()", r"odd\.py:1: "),
-        ("HEARS = f()\nSAYS = ()", "cannot be imported: NameError"),
+        ("SUBSCRIBES = ()", "PUBLISHES is missing"),
+        ("SUBSCRIBES = (topics.CLOK,)\nPUBLISHES = ()", r"odd\.py:1: there is no topic topics.CLOK"),
+        ("SUBSCRIBES = (\nPUBLISHES = ()", r"odd\.py:1: "),
+        ("SUBSCRIBES = f()\nPUBLISHES = ()", "cannot be imported: NameError"),
     ],
 )
 def test_unreadable_interface_is_told(workspace, source, message):
     (workspace.root / "nodes" / "odd.py").write_text(source)
     with pytest.raises(InterfaceError, match=message):
         read_interface("nodes.odd", workspace.root)
+
+
+def test_names_of_the_release_before_are_read_with_a_warning(workspace):
+    (workspace.root / "nodes" / "odd.py").write_text(
+        "from paramove.bus import topics\nHEARS = (topics.SPEECH,)\nPUBLISHES = ()"
+    )
+    with pytest.warns(UserWarning, match="HEARS is called SUBSCRIBES"):
+        assert read_interface("nodes.odd", workspace.root).subscribes == (topics.SPEECH,)
 
 
 @pytest.mark.parametrize("module", NODES)

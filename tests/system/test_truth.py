@@ -79,9 +79,9 @@ def test_a_bus_without_the_folder_refuses_topics_of_truth(tmp_path):
     settings = BusSettings(folder=tmp_path / "bus")
     for topic in truth:
         with pytest.raises(ValueError, match=ONLY):
-            Bus("node", settings, hears=(topic,))
+            Bus("node", settings, subscribes=(topic,))
         with pytest.raises(ValueError, match=ONLY):
-            Bus("node", settings, says=(topic,))
+            Bus("node", settings, publishes=(topic,))
 
 
 def test_a_remap_does_not_lead_to_the_truth(tmp_path):

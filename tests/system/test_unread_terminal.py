@@ -31,7 +31,7 @@ def await_motion(launcher):
         started = f'"event": "ready", "node": "{node}"'
         until(lambda started=started: started in log.read_text(), f"{node} is ready")
     with BusVisitor(Path(launcher.environment["XDG_RUNTIME_DIR"]) / "paramove" / "test", "onlooker") as bus:
-        states = bus.hears(topics.ARM_JOINT_STATES)
+        states = bus.subscriber(topics.ARM_JOINT_STATES)
 
         def moving():
             states.revive()

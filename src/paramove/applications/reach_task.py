@@ -79,7 +79,7 @@ class ReachStep(BaseModel):
 
 
 @dataclass
-class ReachSays:
+class ReachOutput:
     """What a tick gives."""
 
     trajectories: list[JointTrajectory] = field(default_factory=list)
@@ -124,7 +124,7 @@ class ReachTask:
         self._sent = 0
         self._at: Floats | None = None
         self._running: _Running | None = None
-        self._says = ReachSays()
+        self._output = ReachOutput()
         self._now_ns = 0
         self._unarmed = self.sentence = "waiting for the arm's driver"
         self._unarmed_since_ns, self._unarmed_told = 0, ""
@@ -160,7 +160,7 @@ class ReachTask:
         elif status.state in _STOPPED:
             self._fail(f"the arm's driver {_STOPPED[status.state]} the motion: {status.reason or 'it gives no reason'}")
 
-    def tick(self, now_ns: int) -> ReachSays:
+    def tick(self, now_ns: int) -> ReachOutput:
         """Once per turn: what is to be said."""
         self._now_ns = now_ns
         running = self._running
@@ -175,9 +175,9 @@ class ReachTask:
         elif not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS:
             running.message.captured.FromNanoseconds(now_ns)
             running.sent_ns = now_ns
-            self._says.trajectories.append(running.message)
-        says, self._says = self._says, ReachSays()
-        return says
+            self._output.trajectories.append(running.message)
+        output, self._output = self._output, ReachOutput()
+        return output
 
     @property
     def _what(self) -> str:
@@ -257,7 +257,7 @@ class ReachTask:
     def _tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
         speech = Speech(request=request, sentence=sentence)
         speech.captured.FromNanoseconds(self._now_ns)
-        self._says.speech.append(speech)
+        self._output.speech.append(speech)
         self.sentence = sentence
         _log.info("%.1f s: %s", self._now_ns * 1e-9, sentence)
 

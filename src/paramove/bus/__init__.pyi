@@ -27,7 +27,7 @@ from .sequence import SequenceCounter as SequenceCounter
 from .settings import BusSettings as BusSettings
 from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
-from .subscriber import Heard as Heard
+from .subscriber import Received as Received
 from .subscriber import Subscriber as Subscriber
 from .topics import CLOCK as CLOCK
 from .topics import HUMAN_ARM_POSE as HUMAN_ARM_POSE

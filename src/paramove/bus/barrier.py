@@ -25,7 +25,7 @@ from paramove.bus.envelope import Reason, RefusedError, unpack
 from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.turns import TICK_PERIOD_NS
 from paramove.msgs.clock_pb2 import Clock, TickDone
 
@@ -91,7 +91,7 @@ class LockstepBarrier:
         self._bus.release()
         return not self._exchange.stopped
 
-    def advance(self, now_ns: int) -> list[Heard]:
+    def advance(self, now_ns: int) -> list[Received]:
         """Says the next beat and, in lockstep, waits until all members are done with it.
 
         Args:

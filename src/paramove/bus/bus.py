@@ -16,7 +16,7 @@ from paramove.bus.exchange import Exchange, Marks
 from paramove.bus.lockstep import LockstepTurns, read_up_to
 from paramove.bus.settings import BusSettings
 from paramove.bus.status import StatusReporter
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.topics import Topic
 from paramove.bus.turns import KeptTime, RealTimeTurns, SimulatedTurns, Tick, Turns
 from paramove.msgs.node_status_pb2 import NodeStatus
@@ -51,29 +51,29 @@ class Bus:
         self,
         node: str,
         settings: BusSettings,
-        hears: Iterable[Topic] = (),
-        says: Iterable[Topic] = (),
+        subscribes: Iterable[Topic] = (),
+        publishes: Iterable[Topic] = (),
         run_folder: Path | None = None,
     ) -> None:
         self.node = node
         self.settings = settings
         self.run_folder = run_folder or Path()
         self.dropped: Counter[str] = Counter()
-        self._taken_up: Heard | Tick | None = None
+        self._taken_up: Received | Tick | None = None
         self.exchange = Exchange(node, settings)
         self._heard: list[str] = []
-        self._backlog: list[Heard] = []
+        self._backlog: list[Received] = []
         self._held: list[tuple[Topic, Any, int | None]] = []
         self._tick: Tick | None = None
         self._frozen = False
         try:
-            says = tuple(says)
+            publishes = tuple(publishes)
             self._status = StatusReporter(self.exchange, node)
-            for topic in says:
+            for topic in publishes:
                 self.exchange.say(topic)
-            for topic in hears:
+            for topic in subscribes:
                 self.hear(topic)
-            self._turns = self._source_of_time(topics.CLOCK in says)
+            self._turns = self._source_of_time(topics.CLOCK in publishes)
         except BaseException:
             self.exchange.close()
             raise
@@ -137,18 +137,18 @@ class Bus:
         self.exchange.check_process()
         if topic.name not in self.exchange.publishers:
             said = ", ".join(sorted(self.exchange.publishers))
-            raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to SAYS")
+            raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to PUBLISHES")
         if self._turns.may_say:
             self.say_at_once(topic, message, captured_ns)
         else:
             self._held.append((topic, message, captured_ns))
 
     @overload
-    def events(self, *wanted: Topic, tick: Literal[False] = False) -> Iterator[Heard]: ...
+    def events(self, *wanted: Topic, tick: Literal[False] = False) -> Iterator[Received]: ...
     @overload
-    def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Heard | Tick]: ...
+    def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Received | Tick]: ...
 
-    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
+    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
         """Every message of these topics (default: of all heard, also later on), oldest first, until the bus is stopped.
 
         Messages of other topics are kept for a later loop, as many as the topic's high water mark.
@@ -159,10 +159,10 @@ class Bus:
         """
         return self._events(wanted, tick, conflate=False)
 
-    def latest(self, *wanted: Topic) -> Iterator[Heard]:
+    def latest(self, *wanted: Topic) -> Iterator[Received]:
         """Like `events`, but of each topic only the newest message that has arrived."""
         for event in self._events(wanted, tick=False, conflate=True):
-            assert isinstance(event, Heard)
+            assert isinstance(event, Received)
             yield event
 
     def starting(self, sentence: str) -> None:
@@ -220,8 +220,8 @@ class Bus:
         while not (self._status.has_listener or self.stopped) and (left_s := end_s - time.monotonic()) > 0:
             self.exchange.wait(left_s)
 
-    def read_up_to(self, marks: Marks, keep: bool = False) -> list[Heard]:
-        """Waits for everything heard up to the marks; returns it in the order of publish time, then of HEARS.
+    def read_up_to(self, marks: Marks, keep: bool = False) -> list[Received]:
+        """Waits for everything heard up to the marks; returns it in the order of publish time, then of SUBSCRIBES.
 
         Args:
             marks: Topic name on the bus -> epoch and sequence.
@@ -273,10 +273,10 @@ class Bus:
             return RealTimeTurns(self.exchange)
         return LockstepTurns(self.exchange, self.node) if self.settings.lockstep else SimulatedTurns(self.exchange)
 
-    def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Heard | Tick]:
+    def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Received | Tick]:
         names = {topic.name for topic in wanted}
         if unheard := names - set(self._heard):
-            raise KeyError(f"{self.node} does not hear {', '.join(sorted(unheard))}; add the topic to HEARS")
+            raise KeyError(f"{self.node} does not hear {', '.join(sorted(unheard))}; add the topic to SUBSCRIBES")
         while not self.stopped:
             while not self.stopped and (heard := self._next_of(names or set(self._heard), conflate)) is not None:
                 yield from self._timed(heard)
@@ -286,7 +286,7 @@ class Bus:
             if not self._next_turn():
                 return
 
-    def _timed(self, event: Heard | Tick) -> Iterator[Heard | Tick]:
+    def _timed(self, event: Received | Tick) -> Iterator[Received | Tick]:
         """Yields one event and accounts for the time until the node comes back."""
         started_ns = time.perf_counter_ns()
         self._taken_up = event
@@ -296,7 +296,7 @@ class Bus:
             self._status.processing_ns += time.perf_counter_ns() - started_ns
             self._status.processed += 1
 
-    def _next_of(self, names: set[str], conflate: bool) -> Heard | None:
+    def _next_of(self, names: set[str], conflate: bool) -> Received | None:
         """Takes the oldest message of these topics out of the backlog; with `conflate` also all others of its topic."""
         for index, heard in enumerate(self._backlog):
             if heard.topic.name not in names:

@@ -16,7 +16,7 @@ from paramove.bus.endpoint import Ownership
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.node_status_pb2 import NodeStatus
@@ -45,7 +45,7 @@ class Exchange:
         self.every_second: Callable[[], None] = lambda: None
         self.context: zmq.Context[Any] = zmq.Context()
         self._owned: list[Ownership] = []
-        self._pending: dict[str, deque[tuple[int, Heard]]] = {}
+        self._pending: dict[str, deque[tuple[int, Received]]] = {}
         self._callbacks: dict[int, Callable[[], None]] = {}
         self._poller = zmq.Poller()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -140,18 +140,18 @@ class Exchange:
                     break
                 pending.append((subscriber.counter.epoch or 0, heard))
 
-    def take(self, topics: Iterable[str]) -> list[Heard]:
+    def take(self, topics: Iterable[str]) -> list[Received]:
         """Everything drained of these topics, in the order of publish time, then of the topics."""
-        found: list[Heard] = []
+        found: list[Received] = []
         for name in topics:
             pending = self._pending[name]
             found += [heard for _, heard in pending]
             pending.clear()
         return sorted(found, key=_published)
 
-    def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Heard]:
+    def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Received]:
         """Like `take`, but leaves what was said after the marks. A topic without a mark is taken whole."""
-        found: list[Heard] = []
+        found: list[Received] = []
         for name in topics:
             pending = self._pending[name]
             subscriber = self.subscribers[name]
@@ -184,7 +184,7 @@ class Exchange:
             if item.topic.type not in (Clock, NodeStatus)
         }
 
-    def pop(self, topic: Topic) -> Heard | None:
+    def pop(self, topic: Topic) -> Received | None:
         """The oldest drained message of a topic."""
         pending = self._pending[topic.name]
         return pending.popleft()[1] if pending else None
@@ -249,5 +249,5 @@ class Exchange:
             self.every_second()
 
 
-def _published(heard: Heard) -> int:
+def _published(heard: Received) -> int:
     return heard.published_ns

@@ -15,14 +15,14 @@ import zmq
 
 from paramove.bus import topics
 from paramove.bus.endpoint import holder_of, is_held, socket_path
-from paramove.bus.subscriber import Heard, Subscriber
+from paramove.bus.subscriber import Received, Subscriber
 from paramove.bus.topics import Topic
 
 _POLL_MS = 50
 
 
 @dataclass(frozen=True)
-class Speaker:
+class PublisherOnBus:
     """Whether and by whom a topic is said.
 
     Attributes:
@@ -80,20 +80,20 @@ class Measurement:
         return self.bytes_total / self.messages if self.messages else 0.0
 
 
-def speakers(folder: Path) -> list[Speaker]:
+def speakers(folder: Path) -> list[PublisherOnBus]:
     """Every topic of the table, and every status topic that was said in the folder."""
     nodes = sorted(path.name.removeprefix("status.") for path in folder.glob("status.*") if path.suffix != ".lock")
     public = [topic for topic in topics.TOPICS if not topic.truth]
     return [speaker(folder, topic) for topic in (*public, *(topics.status(node) for node in nodes))]
 
 
-def speaker(folder: Path, topic: Topic) -> Speaker:
+def speaker(folder: Path, topic: Topic) -> PublisherOnBus:
     """Who says one topic."""
     path = socket_path(folder, topic.name)
-    return Speaker(topic, is_held(path), holder_of(path))
+    return PublisherOnBus(topic, is_held(path), holder_of(path))
 
 
-def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Heard]:
+def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Received]:
     """Messages of the topics, decoded, as they arrive within `seconds`."""
     end_s = time.monotonic() + seconds
     with zmq.Context() as context:

@@ -1,4 +1,4 @@
-"""The entry of every node: `main(run, HEARS, SAYS, Config)`.
+"""The entry of every node: `main(run, SUBSCRIBES, PUBLISHES, Config)`.
 
 The supervisor starts a node as `python -m nodes.<name> --config FILE`. The file is YAML:
 
@@ -28,12 +28,8 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import BusFolderError, TopicTakenError
 from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard
 from paramove.bus.topics import Topic
-from paramove.bus.turns import Tick
 from paramove.documents import InputError, exit_codes, read_document
-
-__all__ = ["Bus", "BusSettings", "Heard", "NodeConfig", "NodeFile", "Tick", "main", "publish_each", "read_node_file"]
 
 _log = logging.getLogger(__name__)
 
@@ -86,8 +82,8 @@ def publish_each(bus: Bus, said: Sequence[Topic], messages: Sequence[Iterable[An
 
 def main(
     run: Callable[[Bus, Config], None],
-    hears: Sequence[Topic],
-    says: Sequence[Topic],
+    subscribes: Sequence[Topic],
+    publishes: Sequence[Topic],
     config_type: type[Config],
 ) -> None:
     """Runs a node and exits the process.
@@ -108,7 +104,7 @@ def main(
         sys.exit(exit_codes.CONFIGURATION)
     log_to_stderr(file.node)
     try:
-        bus = Bus(file.node, file.bus, hears, says, file.run_folder)
+        bus = Bus(file.node, file.bus, subscribes, publishes, file.run_folder)
     except (TopicTakenError, BusFolderError) as error:
         _log.error("%s", error)
         sys.exit(exit_codes.TEMPORARY)

@@ -1,6 +1,6 @@
 """A bus that hands out what was recorded or made up, and keeps what the node says. For replay tests of nodes.
 
-bus = RecordedBus([Heard(topics.CAMERA_IMAGE, image, 0, 0, 1), Tick(1, 66_666_667)])
+bus = RecordedBus([Received(topics.CAMERA_IMAGE, image, 0, 0, 1), Tick(1, 66_666_667)])
 run(bus, Config())
 assert [said.message for said in bus.said_on(topics.OBJECTS_TRACKED)] == [...]
 """
@@ -14,13 +14,13 @@ from typing import Any
 
 from paramove.bus.settings import BusSettings
 from paramove.bus.soundness import unsound
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.topics import Topic
 from paramove.bus.turns import TICK_PERIOD_NS, Tick
 
 
 @dataclass(frozen=True)
-class Said:
+class Published:
     """One message that the node said."""
 
     topic: Topic
@@ -29,7 +29,7 @@ class Said:
     published_ns: int
 
 
-def with_ticks(messages: Iterable[Heard], period_ns: int = TICK_PERIOD_NS) -> Iterator[Heard | Tick]:
+def with_ticks(messages: Iterable[Received], period_ns: int = TICK_PERIOD_NS) -> Iterator[Received | Tick]:
     """Messages in the order of publish time, and a tick at the end of every period up to the last message.
 
     Args:
@@ -65,7 +65,7 @@ class RecordedBus:
 
     def __init__(
         self,
-        recorded: Iterable[Heard | Tick] = (),
+        recorded: Iterable[Received | Tick] = (),
         node: str = "node",
         run_folder: Path | None = None,
         protected: bool = True,
@@ -73,7 +73,7 @@ class RecordedBus:
         self.node = node
         self.run_folder = run_folder or Path()
         self.settings = BusSettings(folder=self.run_folder, clock="simulated")
-        self.said: list[Said] = []
+        self.said: list[Published] = []
         self.states: list[tuple[str, str]] = []
         self.refused: list[tuple[str, str]] = []
         self.now_ns = 0
@@ -87,23 +87,23 @@ class RecordedBus:
             raise TypeError(f"topic {topic.name} carries {topic.type_name}, not {type(message).__name__}")
         kept = topic.type()
         kept.CopyFrom(message)
-        self.said.append(Said(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
+        self.said.append(Published(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
 
-    def said_on(self, topic: Topic) -> list[Said]:
+    def said_on(self, topic: Topic) -> list[Published]:
         """What the node said on one topic."""
         return [said for said in self.said if said.topic.name == topic.name]
 
-    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Heard | Tick]:
+    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
         """As `Bus.events`; ends with the recording. Messages of other topics stay for a later loop."""
         return self._events({topic.name for topic in wanted}, tick)
 
-    def latest(self, *wanted: Topic) -> Iterator[Heard]:
+    def latest(self, *wanted: Topic) -> Iterator[Received]:
         """As `Bus.latest`; the messages between two ticks are one turn, without ticks each message is its own."""
         names = {topic.name for topic in wanted}
-        turn: dict[str, Heard] = {}
+        turn: dict[str, Received] = {}
         has_ticks = any(isinstance(event, Tick) for event in self._waiting)
         for event in self._events(names, tick=True):
-            if isinstance(event, Heard):
+            if isinstance(event, Received):
                 turn.pop(event.topic.name, None)
                 turn[event.topic.name] = event
                 if has_ticks:
@@ -146,7 +146,7 @@ class RecordedBus:
         """Ends every loop over events."""
         self.stopped = True
 
-    def hands_out(self, heard: Heard) -> bool:
+    def hands_out(self, heard: Received) -> bool:
         """Whether the node gets a message."""
         found = unsound(heard.message) if self._protected else ""
         if found:
@@ -157,16 +157,16 @@ class RecordedBus:
         if self.states[-1:] != [(state, sentence)]:  # as a bus does
             self.states.append((state, sentence))
 
-    def _events(self, names: set[str], tick: bool) -> Iterator[Heard | Tick]:
+    def _events(self, names: set[str], tick: bool) -> Iterator[Received | Tick]:
         index = 0
         while not self.stopped and index < len(self._waiting):
             event = self._waiting[index]
-            if isinstance(event, Heard) and names and event.topic.name not in names:
+            if isinstance(event, Received) and names and event.topic.name not in names:
                 index += 1
                 continue
             del self._waiting[index]
-            if isinstance(event, Heard) and not self.hands_out(event):
+            if isinstance(event, Received) and not self.hands_out(event):
                 continue
             self.now_ns = event.now_ns if isinstance(event, Tick) else event.published_ns
-            if tick or isinstance(event, Heard):
+            if tick or isinstance(event, Received):
                 yield event

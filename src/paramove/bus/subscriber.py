@@ -32,7 +32,7 @@ DEAF_AFTER_S = 0.3
 
 
 @dataclass(frozen=True)
-class Heard:
+class Received:
     """One message.
 
     Attributes:
@@ -81,7 +81,7 @@ class Subscriber:
         """Whether the speaker has answered: nothing said from now on is missed without being counted."""
         return self.counter.epoch is not None
 
-    def receive(self, ready: bool = False) -> Heard | None:
+    def receive(self, ready: bool = False) -> Received | None:
         """Next new message, or None if none is waiting.
 
         Repeated and refused ones are counted and passed over. After many of them it also returns None.
@@ -103,7 +103,9 @@ class Subscriber:
                 self.counter.messages -= 1
                 self._refuse(error)
                 continue
-            return Heard(self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload)
+            return Received(
+                self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload
+            )
         return None
 
     def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:

@@ -17,7 +17,7 @@ from typing import Protocol
 
 from paramove.bus import topics
 from paramove.bus.exchange import Exchange
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 
 TICK_PERIOD_NS = 1_000_000_000 // 15
 """One camera period."""
@@ -41,7 +41,7 @@ class Tick:
 class Turn:
     """Messages, and the tick after them if there is one."""
 
-    messages: list[Heard]
+    messages: list[Received]
     tick: Tick | None = None
 
 

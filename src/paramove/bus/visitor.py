@@ -38,14 +38,14 @@ class BusVisitor:
     ) -> None:
         self._opened.close()
 
-    def says(self, topic: Topic) -> Publisher:
+    def publisher(self, topic: Topic) -> Publisher:
         """The one speaker of a topic. Raises TopicTakenError and BusFolderError."""
         publisher = Publisher(self._context, self._folder, topic, self._name)
         self._owned.callback(publisher.ownership.release)
         self._sockets.callback(publisher.close)
         return publisher
 
-    def hears(self, topic: Topic) -> Subscriber:
+    def subscriber(self, topic: Topic) -> Subscriber:
         """A listener to a topic."""
         subscriber = Subscriber(self._context, self._folder, topic)
         self._sockets.callback(subscriber.close)

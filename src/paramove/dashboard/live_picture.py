@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from pydantic import BaseModel, ConfigDict
 
-from paramove.bus import Heard, topics
+from paramove.bus import Received, topics
 from paramove.dashboard.beliefs import Beliefs
 from paramove.dashboard.node_table import NodeTable
 from paramove.dashboard.robot_shape import RobotShape
@@ -83,7 +83,7 @@ class LivePicture:
             topics.RELOCATION_STATUS.name: beliefs.on_goal_status,
         }
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, heard: Received) -> None:
         """Take in one message of any topic that the page knows."""
         if heard.topic.name in self._hear:
             self._hear[heard.topic.name](heard.message, heard.captured_ns * 1e-9)

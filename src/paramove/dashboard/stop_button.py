@@ -6,7 +6,7 @@ import enum
 from collections.abc import Callable
 from typing import Any
 
-from paramove.bus import Heard, topics
+from paramove.bus import Received, topics
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.safety import PERSON_STOP
 
@@ -51,7 +51,7 @@ class StopButton:
             request.captured.FromNanoseconds(self._asked_ns)
             self._say(request)
 
-    def hear(self, heard: Heard) -> None:
+    def hear(self, heard: Received) -> None:
         """Of all messages the gate's: whether it has heard the stop, and whether the arm rests.
 
         That it was this page that asked does not matter: it may have been restarted in between.

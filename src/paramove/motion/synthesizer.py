@@ -34,7 +34,7 @@ _ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, Traj
 
 
 @dataclass(frozen=True)
-class SynthesizerSays:
+class SynthesizerOutput:
     """What one tick gives."""
 
     trajectories: tuple[JointTrajectory, ...]
@@ -162,7 +162,7 @@ class Synthesizer:
         else:
             self._say_phase(running)
 
-    def tick(self, now_ns: int) -> SynthesizerSays:
+    def tick(self, now_ns: int) -> SynthesizerOutput:
         """Once per turn: what is to be said."""
         self._now_ns = now_ns
         if self._waiting is not None and self._running is None and self._hand.find_out(now_ns):
@@ -174,9 +174,9 @@ class Synthesizer:
             running.message.captured.FromNanoseconds(now_ns)
             self._trajectories.append(running.message)
             running.sent_ns = now_ns
-        says = SynthesizerSays(tuple(self._trajectories), tuple(self._statuses))
+        output = SynthesizerOutput(tuple(self._trajectories), tuple(self._statuses))
         self._trajectories, self._statuses = [], []
-        return says
+        return output
 
     def _on_status_of_others(self, status: TrajectoryStatus) -> None:
         """A motion that an earlier process began, or one that was given up here, moves the arm."""

@@ -35,16 +35,16 @@ def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | N
         BusFolderError: The folder cannot be used.
     """
     with BusVisitor(folder, "arm_by_word") as bus:
-        says, gate = bus.says(topics.OPERATOR_ARM), bus.hears(topics.ARM_SAFETY)
+        publisher, gate = bus.publisher(topics.OPERATOR_ARM), bus.subscriber(topics.ARM_SAFETY)
         before = _until(gate, patience_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
-        say_now(says, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
+        say_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
 
         def is_answer(state: SafetyState) -> bool:
             return obeyed(state, armed) or (armed and _faults(state) not in ([], _faults(before)))
 
-        return _until(gate, patience_s, is_answer, says.serve) or before
+        return _until(gate, patience_s, is_answer, publisher.serve) or before
 
 
 def obeyed(state: SafetyState, armed: bool) -> bool:

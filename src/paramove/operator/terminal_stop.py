@@ -37,10 +37,10 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
         publishers = []
         for topic in topics.STOPS:
             with contextlib.suppress(TopicTakenError):
-                publishers.append(bus.says(topic))
+                publishers.append(bus.publisher(topic))
         if not publishers:
             raise TopicTakenError(f"other programs say {' and '.join(topic.name for topic in topics.STOPS)} already")
-        gate = bus.hears(topics.ARM_SAFETY)
+        gate = bus.subscriber(topics.ARM_SAFETY)
         while time.monotonic() < end_s:
             for publisher in publishers:
                 publisher.publish(request, time.monotonic_ns(), time.monotonic_ns())  # a driver heeds what is new

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from paramove.bus import Bus, Heard
+from paramove.bus import Bus, Received
 from paramove.recording.parts import next_part
 from paramove.recording.writer import RecordingWriter
 
@@ -77,7 +77,7 @@ class Recorder:
         """Name of the file that was begun last; empty if the disk was full from the beginning."""
         return self._part_name
 
-    def keep(self, heard: Heard, message: Any = None) -> None:
+    def keep(self, heard: Received, message: Any = None) -> None:
         """Records a message. Never waits for a disk, but in lockstep.
 
         Args:

@@ -90,6 +90,6 @@ def speakers(launch_file: Path, workspace: Path) -> dict[str, str]:
         except (InterfaceError, KeyError):
             continue
         remaps = settings.get("remaps", {})
-        found |= {remaps.get(topic.name, topic.name): node for topic in interface.says}
+        found |= {remaps.get(topic.name, topic.name): node for topic in interface.publishes}
         found[topics.status(node).name] = node
     return found

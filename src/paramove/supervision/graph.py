@@ -77,7 +77,7 @@ def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
     heard: dict[str, list[str]] = {}
     table: dict[str, Topic] = {}
     for name, interface in interfaces.items():
-        for there, side in ((said, interface.says), (heard, interface.hears)):
+        for there, side in ((said, interface.publishes), (heard, interface.subscribes)):
             for topic in side:
                 there.setdefault(on_bus(launch, name, topic), []).append(name)
                 table[on_bus(launch, name, topic)] = topic
@@ -141,16 +141,16 @@ def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -
     end: list[str] = []
     while left:
         inside = [(a, b) for a, b in to if a in left and b in left]
-        says = {node: sum(a == node for a, _ in inside) for node in left}
-        hears = {node: sum(b == node for _, b in inside) for node in left}
-        sink = next((node for node in left if says[node] == 0), None)
-        source = next((node for node in left if hears[node] == 0), None)
+        publishes = {node: sum(a == node for a, _ in inside) for node in left}
+        subscribes = {node: sum(b == node for _, b in inside) for node in left}
+        sink = next((node for node in left if publishes[node] == 0), None)
+        source = next((node for node in left if subscribes[node] == 0), None)
         if sink is not None:
             end.insert(0, sink)
         elif source is not None:
             begin.append(source)
         else:
-            begin.append(max(left, key=lambda node: says[node] - hears[node]))
+            begin.append(max(left, key=lambda node: publishes[node] - subscribes[node]))
         left.remove(end[0] if sink is not None else begin[-1])
     return [*begin, *end, *(node for node in nodes if node in collectors)]
 

@@ -1,4 +1,4 @@
-"""What a node hears, says and takes, read from its source without running it."""
+"""What a node subscribes to, publishes and takes, read from its source without running it."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ import importlib.util
 import json
 import subprocess
 import sys
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 from paramove.bus import Topic, topics
 
+OLD_NAMES = {"SUBSCRIBES": "HEARS", "PUBLISHES": "SAYS"}
+"""What nodes of the release before call theirs."""
+
 
 class InterfaceError(ValueError):
-    """A node's module is missing or its HEARS or SAYS cannot be read."""
+    """A node's module is missing or its SUBSCRIBES or PUBLISHES cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -24,16 +28,16 @@ class Interface:
 
     Attributes:
         path: Source file of the module.
-        hears: Topics that it subscribes to.
-        says: Topics that it publishes, without its status.
+        subscribes: Topics that it subscribes to.
+        publishes: Topics that it publishes, without its status.
         parameters: Names of its parameters; None where they cannot be read from the source.
         has_config: Whether it has a `Config` that can be asked about parameters.
         needs_parameters: Whether some parameter may have no default value.
     """
 
     path: Path
-    hears: tuple[Topic, ...]
-    says: tuple[Topic, ...]
+    subscribes: tuple[Topic, ...]
+    publishes: tuple[Topic, ...]
     parameters: tuple[str, ...] | None
     has_config: bool = False
     needs_parameters: bool = False
@@ -66,8 +70,8 @@ def _installed(module: str) -> Path | None:
 def read_interface(module: str, workspace: Path) -> Interface:
     """Interface of a node's module.
 
-    HEARS and SAYS are read from the source as long as they are written as `topics.NAME`, tuples and sums of these;
-    otherwise the module is imported once in a process of its own, because nodes import heavy libraries.
+    SUBSCRIBES and PUBLISHES are read from the source as long as they are written as `topics.NAME`, tuples and sums of
+    these; otherwise the module is imported once in a process of its own, because nodes import heavy libraries.
 
     Raises InterfaceError.
     """
@@ -79,10 +83,10 @@ def read_interface(module: str, workspace: Path) -> Interface:
     config = _config(tree)
     about = (_parameters(config), config is not None, config is not None and _needs_parameters(config))
     try:
-        return Interface(path, _constant(tree, "HEARS", path), _constant(tree, "SAYS", path), *about)
+        return Interface(path, _constant(tree, "SUBSCRIBES", path), _constant(tree, "PUBLISHES", path), *about)
     except _NotPlainError:
-        hears, says = _imported(module, workspace, path.stat().st_mtime_ns)
-        return Interface(path, hears, says, *about)
+        subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns)
+        return Interface(path, subscribes, publishes, *about)
 
 
 class _NotPlainError(Exception):
@@ -96,8 +100,12 @@ def _constant(tree: ast.Module, name: str, path: Path) -> tuple[Topic, ...]:
             assigned[statement.targets[0].id] = statement.value
         elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name) and statement.value:
             assigned[statement.target.id] = statement.value
+    old = OLD_NAMES[name]
+    if name not in assigned and old in assigned:
+        warnings.warn(f"{path}: {old} is called {name} now; the next release reads that only", stacklevel=2)
+        name = old
     if name not in assigned:
-        raise InterfaceError(f"{path}: a node says what it hears and says, but {name} is missing")
+        raise InterfaceError(f"{path}: a node says what it subscribes to and publishes, but {name} is missing")
     return _topics(assigned[name], assigned, path)
 
 
@@ -156,14 +164,14 @@ def _needs_parameters(config: ast.ClassDef) -> bool:
 
 
 _ASK = (
-    "import importlib, json, sys; module = importlib.import_module(sys.argv[1]);"
-    "sys.stdout.write('\\n' + json.dumps([[t.name for t in topics] for topics in (module.HEARS, module.SAYS)]))"
+    "import importlib, json, sys; node = importlib.import_module(sys.argv[1]);"
+    "sys.stdout.write('\\n' + json.dumps([[t.name for t in topics] for topics in (node.SUBSCRIBES, node.PUBLISHES)]))"
 )
 
 
 @functools.cache
 def _imported(module: str, workspace: Path, changed_ns: int) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
-    """HEARS and SAYS of a module, imported in another process; again only when its file has changed."""
+    """SUBSCRIBES and PUBLISHES of a module, imported in another process; again only when its file has changed."""
     try:
         answer = subprocess.run(
             [sys.executable, "-c", _ASK, module], cwd=workspace, capture_output=True, text=True, timeout=60, check=False
@@ -173,5 +181,5 @@ def _imported(module: str, workspace: Path, changed_ns: int) -> tuple[tuple[Topi
     if answer.returncode != 0:
         last = answer.stderr.strip().splitlines()[-1:] or ["no message"]
         raise InterfaceError(f"'{module}' cannot be imported: {last[0]}")
-    hears, says = json.loads(answer.stdout.splitlines()[-1])
-    return tuple(map(topics.by_name, hears)), tuple(map(topics.by_name, says))
+    subscribes, publishes = json.loads(answer.stdout.splitlines()[-1])
+    return tuple(map(topics.by_name, subscribes)), tuple(map(topics.by_name, publishes))

@@ -22,9 +22,9 @@ from paramove.supervision.domain import Domain
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch, start_waves
 from paramove.supervision.launch_schema import LaunchFile
-from paramove.supervision.listener import Listener
 from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
 from paramove.supervision.run_folder import RunFolder
+from paramove.supervision.status_subscriber import StatusSubscriber
 from paramove.supervision.supervised_node import ENDED, STOP_S, State, SupervisedNode
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -103,7 +103,7 @@ class Supervisor:
 
         An interrupted run is not judged: `after_run` is left out.
         """
-        listener = Listener(self._listener_folder, self.nodes, self._hear, self._view.story)
+        listener = StatusSubscriber(self._listener_folder, self.nodes, self._hear, self._view.story)
         control = ControlServer(self._listener_folder, self._by_hand)
         with (
             EventLog(self._folder.events) as self._events,
@@ -142,7 +142,7 @@ class Supervisor:
         )
         self._view.changed(node)
 
-    def _supervise(self, listener: Listener) -> Outcome:
+    def _supervise(self, listener: StatusSubscriber) -> Outcome:
         """Runs until something ends the run; the reason is the outcome."""
         limit_s = time.monotonic() + (self._file.time_limit_s or float("inf"))
         while True:
@@ -160,7 +160,7 @@ class Supervisor:
             if node.state is State.WAITING and all(self.nodes[other].is_up for other in node.settings.after):
                 node.start(time.monotonic())
 
-    def _turn(self, listener: Listener) -> list[tuple[SupervisedNode, int]]:
+    def _turn(self, listener: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
         """Waits up to `TURN_S` for an end, a stop (SIGSTOP) or a signal, and listens.
 
         Returns the nodes that have just ended, with exit codes.
@@ -216,7 +216,7 @@ class Supervisor:
         waiting = [node for node in self.nodes.values() if node.state is State.WAITING]
         return [node.name for node in waiting if given_up.intersection(node.settings.after)]
 
-    def _stop_all(self, listener: Listener) -> None:
+    def _stop_all(self, listener: StatusSubscriber) -> None:
         self._ending = True
         end_s = time.monotonic() + STOP_ALL_S
         for node in self.nodes.values():

@@ -56,7 +56,7 @@ def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Itera
 
 def clock_speaker(interfaces: Mapping[str, Interface]) -> str | None:
     """Node that says the clock; None where there is none."""
-    return next((name for name, interface in interfaces.items() if CLOCK in interface.says), None)
+    return next((name for name, interface in interfaces.items() if CLOCK in interface.publishes), None)
 
 
 def on_bus(launch: Launch, node: str, topic: Topic) -> str:
@@ -66,9 +66,9 @@ def on_bus(launch: Launch, node: str, topic: Topic) -> str:
 
 def unsaid(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
     """Each node with a topic that it hears and that no node says; status topics come from every node."""
-    said = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.says}
+    said = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
     for name, interface in interfaces.items():
-        for topic in interface.hears:
+        for topic in interface.subscribes:
             heard = on_bus(launch, name, topic)
             if heard not in said and not heard.startswith("status/"):
                 yield name, topic
@@ -85,7 +85,7 @@ def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[Docu
 def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     speakers: dict[str, str] = {}
     for name, interface in interfaces.items():
-        for topic in interface.says:
+        for topic in interface.publishes:
             said = on_bus(launch, name, topic)
             other = speakers.setdefault(said, name)
             if other != name:
@@ -97,7 +97,7 @@ def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[D
 
 def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     for name, interface in interfaces.items():
-        for topic in (*interface.hears, *interface.says):
+        for topic in (*interface.subscribes, *interface.publishes):
             if topic.truth and not launch.file.nodes[name].truth:
                 yield launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
     for name, topic in unsaid(launch, interfaces):
@@ -114,12 +114,14 @@ def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterat
     """Topics that `remaps` and `optional_topics` name and that are not there, or are of another kind."""
     for name, interface in interfaces.items():
         node = launch.file.nodes[name]
-        hears = {topic.name for topic in interface.hears}
+        subscribes = {topic.name for topic in interface.subscribes}
         for index, optional in enumerate(node.optional_topics):
-            if optional != "*" and optional not in hears:
+            if optional != "*" and optional not in subscribes:
                 path = ("nodes", name, "optional_topics", str(index))
-                yield launch.error(path, f"'{name}' does not hear {optional!r}; {nearest(optional, hears)}")
-        used = {topic.name: topic for topic in (*interface.hears, *interface.says)}
+                yield launch.error(
+                    path, f"'{name}' does not subscribe to {optional!r}; {nearest(optional, subscribes)}"
+                )
+        used = {topic.name: topic for topic in (*interface.subscribes, *interface.publishes)}
         for topic, target in node.remaps.items():
             path = ("nodes", name, "remaps", topic)
             if topic not in used:

@@ -28,9 +28,9 @@ from paramove.operator.jogging import Jogging
 from paramove.safety.gate_io import PERSON_STOP
 from tests.supervision.test_unread_terminal import stopped_terminal
 
-HEARS = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
+SUBSCRIBES = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
 STOPPED = SafetyFault(code=PERSON_STOP, sentence="stopped by a person")
-SAYS = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
+PUBLISHES = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ class Arm:
 
     def run(self):
         self._say_state(SafetyState.STATE_DISARMED)
-        for event in self._bus.events(*HEARS, tick=True):
+        for event in self._bus.events(*SUBSCRIBES, tick=True):
             self._bus.publish(
                 topics.ARM_JOINT_STATES,
                 JointStates(joints=[JointState(name=name, position=angle) for name, angle in self.angles.items()]),
@@ -105,7 +105,7 @@ def running(folder, keys):
     made, ready = [], threading.Event()
 
     def drive():
-        with Bus("driver", BusSettings(folder=folder), HEARS, SAYS) as bus:
+        with Bus("driver", BusSettings(folder=folder), SUBSCRIBES, PUBLISHES) as bus:
             made.extend((bus, Arm(bus, keys)))
             ready.set()
             made[1].run()

@@ -53,7 +53,7 @@ class Person:
             self.arms()
         return self.safety.state == SafetyState.STATE_ARMED
 
-    def says(self, name: str, joints, points) -> None:
+    def publish(self, name: str, joints, points) -> None:
         """A trajectory of pairs of time, s, and angles, rad."""
         message = JointTrajectory(id=name, joints=list(joints))
         for time_s, angles in points:

@@ -9,7 +9,7 @@ import pytest
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.robots.hoap3.firmware import Firmware
-from paramove.robots.streaming.driver import DriverSays
+from paramove.robots.streaming.driver import DriverOutput
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.hoap3.test_firmware import MODEL, QPOS, QVEL
 from tests.robots.streaming.fake_robot import FakeRobot, Rig
@@ -80,14 +80,14 @@ class SlowRig(Rig):
         self.ticks_late = ticks_late
         self._on_the_way: list[StreamBatch | None] = []
 
-    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverSays | None:
-        says = super().tick(lose=True, driver_runs=driver_runs)
-        self._on_the_way.append(says.stream if says is not None and driver_runs and not lose else None)
+    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverOutput | None:
+        output = super().tick(lose=True, driver_runs=driver_runs)
+        self._on_the_way.append(output.stream if output is not None and driver_runs and not lose else None)
         if len(self._on_the_way) > self.ticks_late:
             batch = self._on_the_way.pop(0)
             if batch is not None:
                 self.robot.reader.offer(batch)
-        return says
+        return output
 
 
 @pytest.mark.parametrize(("late", "arrives"), [(0, True), (1, True), (5, False)])

@@ -7,7 +7,7 @@ import numpy as np
 from paramove.msgs.hoap3_wire_pb2 import Hoap3State, StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint, TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest
-from paramove.robots.streaming.driver import ArmDriver, DriverSays
+from paramove.robots.streaming.driver import ArmDriver, DriverOutput
 from paramove.robots.streaming.stream import StreamReader
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
@@ -41,20 +41,20 @@ class Rig:
         self.driver = ArmDriver(HOAP3, no_program=lambda: no_program)
         self.now_ns = 1_000_000_000
         self.statuses: list[TrajectoryStatus] = []
-        self.says: DriverSays | None = None
+        self.output: DriverOutput | None = None
 
-    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverSays | None:
+    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverOutput | None:
         self.now_ns += TICK_NS
         batch: StreamBatch | None = None
         if driver_runs:
             self.driver.on_robot_state(self.robot.state(self.now_ns), self.now_ns)
-            self.says = self.driver.tick(self.now_ns)
-            self.statuses += self.says.statuses
-            batch = self.says.stream
+            self.output = self.driver.tick(self.now_ns)
+            self.statuses += self.output.statuses
+            batch = self.output.stream
         if batch is not None and not lose:
             self.robot.reader.offer(batch)
         self.robot.play()
-        return self.says
+        return self.output
 
     def arm(self, armed: bool = True, by_person: bool = True) -> None:
         request = ArmRequest(source="test", armed=armed, by_person=by_person)

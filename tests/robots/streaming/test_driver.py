@@ -28,11 +28,11 @@ def expect_within_limits(rig: Rig) -> None:
 
 def test_disarmed_at_the_start_and_sends_nothing() -> None:
     rig = Rig()
-    says = rig.tick()
-    assert says is not None
-    assert says.stream is None
-    assert says.safety.state == SafetyState.STATE_DISARMED
-    assert [joint.name for joint in says.joint_states.joints] == list(HOAP3.joint_names)
+    output = rig.tick()
+    assert output is not None
+    assert output.stream is None
+    assert output.safety.state == SafetyState.STATE_DISARMED
+    assert [joint.name for joint in output.joint_states.joints] == list(HOAP3.joint_names)
     rig.send("early", GOAL)
     rig.tick()
     assert rig.statuses[-1].state == REFUSED
@@ -200,9 +200,9 @@ def test_trajectories_that_cannot_be_played_are_refused(change: dict, reason: st
     rig.tick()
     assert rig.statuses[-1].state == REFUSED
     assert reason in rig.statuses[-1].reason
-    assert rig.says is not None
-    assert rig.says.stream is None
-    assert rig.says.safety.refused_trajectories == 1
+    assert rig.output is not None
+    assert rig.output.stream is None
+    assert rig.output.safety.refused_trajectories == 1
 
 
 def test_old_trajectories_are_refused() -> None:
@@ -230,9 +230,9 @@ def test_a_silent_robot_disconnects_the_driver() -> None:
     rig = armed()
     for _ in range(10):
         rig.now_ns += 66_666_667
-        says = rig.driver.tick(rig.now_ns)
-    assert says.safety.state == SafetyState.STATE_DISCONNECTED
-    assert says.safety.faults[0].code == "robot_silent"
+        output = rig.driver.tick(rig.now_ns)
+    assert output.safety.state == SafetyState.STATE_DISCONNECTED
+    assert output.safety.faults[0].code == "robot_silent"
     rig.tick()
     assert rig.driver.state is State.DISARMED
 

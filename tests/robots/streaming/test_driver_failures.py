@@ -76,8 +76,8 @@ def test_a_restarted_driver_is_not_armed_while_the_robot_still_moves() -> None:
     rig.tick()
     rig.arm()
     assert rig.driver.state is State.DISARMED
-    assert rig.says is not None
-    assert [fault.code for fault in rig.says.safety.faults] == ["arming_moving"]
+    assert rig.output is not None
+    assert [fault.code for fault in rig.output.safety.faults] == ["arming_moving"]
     expect_within_limits(rig)
 
 
@@ -91,10 +91,10 @@ def test_stopped_for_a_second_in_motion_it_holds_and_drops_what_waited() -> None
     for _ in range(8):
         rig.tick()
     assert rig.driver.state is State.HOLD
-    assert rig.says is not None
-    assert "stood still for 1.0" in rig.says.safety.faults[0].sentence
-    assert rig.says.safety.faults[0].code == "driver_stalled"
-    assert "arm again" in rig.says.safety.faults[0].sentence
+    assert rig.output is not None
+    assert "stood still for 1.0" in rig.output.safety.faults[0].sentence
+    assert rig.output.safety.faults[0].code == "driver_stalled"
+    assert "arm again" in rig.output.safety.faults[0].sentence
     said = {status.trajectory_id: status for status in rig.statuses}
     assert (said["queued"].state, said["queued"].code) == (REFUSED, "stale")
     assert said["one"].state == STOPPED
@@ -126,8 +126,8 @@ def test_an_arm_word_that_waited_too_long_does_not_arm() -> None:
     rig.driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), said_ns)
     rig.tick()
     assert rig.driver.state is State.DISARMED
-    assert rig.says is not None
-    assert [fault.code for fault in rig.says.safety.faults] == ["arming_stale"]
+    assert rig.output is not None
+    assert [fault.code for fault in rig.output.safety.faults] == ["arming_stale"]
     rig.arm()
     assert rig.driver.state is State.ARMED
 
@@ -194,9 +194,9 @@ def test_empty_and_impossible_trajectories_are_refused_and_never_read_as_zero(
     rig = armed()
     rig.driver.on_trajectory(message, rig.now_ns)
     for _ in range(5):
-        says = rig.tick()
-        assert says is not None
-        assert says.stream is None
+        output = rig.tick()
+        assert output is not None
+        assert output.stream is None
     assert (rig.statuses[-1].state, rig.statuses[-1].code) == (REFUSED, code)
     assert "allowed" in rig.statuses[-1].reason
     np.testing.assert_array_equal(rig.robot.reader.target, HOAP3.units.to_counts(HOAP3.base_pose))
@@ -217,6 +217,6 @@ def test_a_robot_that_says_nothing_of_its_joints_is_not_taken_to_be_at_zero() ->
     rig = Rig()
     driver = ArmDriver(HOAP3)
     driver.on_robot_state(Hoap3State(), rig.now_ns)
-    says = driver.tick(rig.now_ns)
-    assert says.joint_states is None
-    assert says.safety.state == SafetyState.STATE_DISCONNECTED
+    output = driver.tick(rig.now_ns)
+    assert output.joint_states is None
+    assert output.safety.state == SafetyState.STATE_DISCONNECTED

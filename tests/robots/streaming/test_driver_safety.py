@@ -27,8 +27,8 @@ def in_motion() -> Rig:
 
 
 def codes(rig: Rig) -> list[str]:
-    assert rig.says is not None
-    return [fault.code for fault in rig.says.safety.faults]
+    assert rig.output is not None
+    return [fault.code for fault in rig.output.safety.faults]
 
 
 def test_every_state_of_the_gate_has_its_word_on_the_bus() -> None:
@@ -40,11 +40,11 @@ def test_the_emergency_stop_stops_in_motion_and_is_left_only_by_release_and_a_ne
     rig = in_motion()
     rig.driver.on_emergency(True)
     rig.driver.on_emergency(False)  # a flicker within one period is a press
-    says = rig.tick()
-    assert says is not None
-    assert says.safety.state == SafetyState.STATE_ESTOP
-    assert says.stream is not None
-    assert says.stream.stop_ramp_frames * says.stream.joint_count * 2 == len(says.stream.frames)
+    output = rig.tick()
+    assert output is not None
+    assert output.safety.state == SafetyState.STATE_ESTOP
+    assert output.stream is not None
+    assert output.stream.stop_ramp_frames * output.stream.joint_count * 2 == len(output.stream.frames)
     assert rig.statuses[-1].state == TrajectoryStatus.STATE_STOPPED
     assert "the emergency stop is pressed" in rig.statuses[-1].reason
     for _ in range(20):
@@ -114,11 +114,11 @@ def test_rows_of_another_period_are_driven_by_the_same_driver(period_us: int) ->
             driver.on_arm_request(ArmRequest(source="test", armed=True, by_person=True), now)
         if tick == 3:
             driver.on_trajectory(trajectory("one", GOAL, duration_s=1.0), now)
-        says = driver.tick(now)
-        statuses += says.statuses
-        if says.stream is not None:
-            assert says.stream.period_us == period_us
-            assert reader.offer(says.stream), reader.refusal
+        output = driver.tick(now)
+        statuses += output.statuses
+        if output.stream is not None:
+            assert output.stream.period_us == period_us
+            assert reader.offer(output.stream), reader.refusal
         played += [reader.play() for _ in range(40_000 // period_us)]
     assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED, statuses[-1].reason
     assert reader.refused_batches == 0
@@ -132,8 +132,8 @@ def silent(rig: Rig) -> list[str]:
     """What the driver says of a robot that it does not hear for a second."""
     for _ in range(15):
         rig.now_ns += TICK_NS
-        rig.says = rig.driver.tick(rig.now_ns)
-        rig.statuses += rig.says.statuses
+        rig.output = rig.driver.tick(rig.now_ns)
+        rig.statuses += rig.output.statuses
         rig.robot.play()
     assert rig.driver.state is State.DISCONNECTED
     return codes(rig)

@@ -9,7 +9,7 @@ import pytest
 
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
-from paramove.robots.streaming.driver import DriverSays
+from paramove.robots.streaming.driver import DriverOutput
 from paramove.safety.gate_io import State
 from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import TICK_NS, Rig
@@ -49,18 +49,18 @@ class LinkedRig(Rig):
         super().__init__()
         self.to_robot, self.to_driver = Link(to_robot), Link(to_driver)
 
-    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverSays | None:
+    def tick(self, *, lose: bool = False, driver_runs: bool = True) -> DriverOutput | None:
         self.now_ns += TICK_NS
         for captured_ns, state in self.to_driver.carry((self.now_ns, self.robot.state(self.now_ns)), self.now_ns):
             self.driver.on_robot_state(state, captured_ns)
-        self.says = self.driver.tick(self.now_ns)
-        self.statuses += self.says.statuses
-        said: StreamBatch | None = self.says.stream
+        self.output = self.driver.tick(self.now_ns)
+        self.statuses += self.output.statuses
+        said: StreamBatch | None = self.output.stream
         for batch in self.to_robot.carry(said, self.now_ns):
             if batch is not None:
                 self.robot.reader.offer(batch)
         self.robot.play()
-        return self.says
+        return self.output
 
 
 @pytest.mark.parametrize(
@@ -91,9 +91,9 @@ def test_half_a_second_without_the_link_is_a_stop_that_only_a_new_arm_word_ends(
         link.closes(rig.now_ns + TICK_NS + GAP_NS)
     faults = []
     for _ in range(24):
-        says = rig.tick()
-        assert says is not None
-        faults += [(fault.code, fault.sentence) for fault in says.safety.faults]
+        output = rig.tick()
+        assert output is not None
+        faults += [(fault.code, fault.sentence) for fault in output.safety.faults]
     assert rig.robot.reader.at_rest
     assert faults[0][0] == code
     assert faults[0][1].startswith(sentence)

@@ -12,7 +12,7 @@ from typing import Any
 from nodes import arm_driver, operator
 from paramove.bus import topics
 from paramove.bus.settings import BusSettings
-from paramove.bus.subscriber import Heard
+from paramove.bus.subscriber import Received
 from paramove.bus.topics import Topic
 from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
@@ -44,7 +44,7 @@ class RobotBus:
         assert sentence
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
-        assert topic in arm_driver.SAYS
+        assert topic in arm_driver.PUBLISHES
         assert isinstance(message, topic.type)
         self.said.append((topic, message))
         if topic is topics.WIRE_HOAP3_STREAM:
@@ -53,8 +53,8 @@ class RobotBus:
             word.by_person = self.by_person
             self.pending.append((topics.OPERATOR_ARM_AT_START, word))
 
-    def events(self, *wanted: Topic, tick: bool) -> Iterator[Heard | Tick]:
-        assert wanted == arm_driver.HEARS
+    def events(self, *wanted: Topic, tick: bool) -> Iterator[Received | Tick]:
+        assert wanted == arm_driver.SUBSCRIBES
         assert tick
         for number in range(1, 61):
             self.now_ns = number * TICK_NS
@@ -63,7 +63,7 @@ class RobotBus:
             self.pending.append((topics.WIRE_HOAP3_STATE, self.robot.state(self.now_ns)))
             heard, self.pending = self.pending, []
             for topic, message in heard:
-                yield Heard(topic, message, self.now_ns, self.now_ns, number)
+                yield Received(topic, message, self.now_ns, self.now_ns, number)
             yield Tick(number, self.now_ns)
             self.robot.play()
 
@@ -107,4 +107,4 @@ def test_with_a_real_robot_the_operator_refuses_to_start(tmp_path: Path) -> None
     )
     assert done.returncode == 78, done.stderr
     assert "a person must" in done.stderr
-    assert operator.SAYS == (topics.OPERATOR_ARM_AT_START,)
+    assert operator.PUBLISHES == (topics.OPERATOR_ARM_AT_START,)

@@ -16,8 +16,8 @@ SENTENCE = "stopped from the page by a person"
 
 
 def faults(rig: Rig) -> list[tuple[str, str]]:
-    assert rig.says is not None
-    return [(fault.code, fault.sentence) for fault in rig.says.safety.faults]
+    assert rig.output is not None
+    return [(fault.code, fault.sentence) for fault in rig.output.safety.faults]
 
 
 def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None:
@@ -26,11 +26,13 @@ def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None
     for _ in range(8):
         rig.tick()
     rig.driver.on_stop(PRESSED, rig.now_ns)
-    says = rig.tick()
-    assert says is not None
-    assert says.safety.state == SafetyState.STATE_STOPPING
-    assert says.stream is not None
-    assert says.stream.stop_ramp_frames * says.stream.joint_count * 2 == len(says.stream.frames)  # nothing but the ramp
+    output = rig.tick()
+    assert output is not None
+    assert output.safety.state == SafetyState.STATE_STOPPING
+    assert output.stream is not None
+    assert output.stream.stop_ramp_frames * output.stream.joint_count * 2 == len(
+        output.stream.frames
+    )  # nothing but the ramp
     for _ in range(20):
         rig.tick()
     assert rig.driver.state is State.HOLD

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from studies.__main__ import app
 from studies.real_images import experiment, report, scores
-from studies.real_images.replay import Said
+from studies.real_images.replay import ReplayedEstimate
 from studies.real_images.seated_person import camera
 from tests.studies.real_images.made_up import true_poses, write_recording
 
@@ -46,7 +46,9 @@ def test_the_verdict_is_the_exit_code(data, tmp_path, monkeypatch, off_m, exit_c
     poses[:, [2, 5, 8]] += off_m
 
     def replayed(folder, **options):
-        return [Said(number, pose, pose[:2][None], 0.5, pose[:2], False) for number, pose in enumerate(poses)]
+        return [
+            ReplayedEstimate(number, pose, pose[:2][None], 0.5, pose[:2], False) for number, pose in enumerate(poses)
+        ]
 
     monkeypatch.setattr(experiment, "replayed", replayed)
     for module in (scores, report):

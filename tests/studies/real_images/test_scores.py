@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramove.documents.input_error import InputError
-from studies.real_images.replay import Said
+from studies.real_images.replay import ReplayedEstimate
 from studies.real_images.scores import (
     GOAL_PX,
     Distances,
@@ -31,7 +31,7 @@ def test_distances_are_those_in_the_image(tmp_path):
     camera = write_lens(tmp_path)
     pose = resting_pose(camera)
     reference = np.tile(camera.project(middle_of_hand(pose))[0], (3, 1)) + np.array([[0, 0], [3, 4], [0, 7]])
-    said = [Said(frame, pose, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in (0, 1, 2)]
+    said = [ReplayedEstimate(frame, pose, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in (0, 1, 2)]
     np.testing.assert_allclose(distances(said, reference, camera).middle, [0.0, 5.0, 7.0], rtol=0.0, atol=1e-9)
 
 
@@ -64,7 +64,7 @@ def test_the_goal_is_met_in_both_ranges_with_every_seed(medians, met):
 
 def test_frames_without_a_reference_are_refused(tmp_path):
     camera = write_lens(tmp_path)
-    said = [Said(2, resting_pose(camera), np.empty((0, 2)), 0.0, np.zeros(2), False)]
+    said = [ReplayedEstimate(2, resting_pose(camera), np.empty((0, 2)), 0.0, np.zeros(2), False)]
     with pytest.raises(InputError, match="2 frames have a reference"):
         distances(said, np.zeros((2, 2)), camera)
 

@@ -17,8 +17,8 @@ from paramove.bus.publisher import Publisher
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.rule_pb2 import Speech
 
-HEARS = ()
-SAYS = (topics.SPEECH,)
+SUBSCRIBES = ()
+PUBLISHES = (topics.SPEECH,)
 
 STUBBORN_CHILD = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); signal.pause()"
 

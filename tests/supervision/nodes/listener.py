@@ -3,8 +3,8 @@
 from paramove.bus import topics
 from paramove.bus.node import NodeConfig
 
-HEARS = (topics.SPEECH,)
-SAYS = ()
+SUBSCRIBES = (topics.SPEECH,)
+PUBLISHES = ()
 
 
 class Config(NodeConfig):

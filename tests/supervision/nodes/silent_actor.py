@@ -2,10 +2,10 @@
 
 import runpy
 
-from paramove.bus import topics  # noqa: F401 (HEARS and SAYS would name topics from here)
+from paramove.bus import topics  # noqa: F401 (SUBSCRIBES and PUBLISHES would name topics from here)
 
-HEARS = ()
-SAYS = ()
+SUBSCRIBES = ()
+PUBLISHES = ()
 
 if __name__ == "__main__":
     runpy.run_module("nodes.actor", run_name="__main__")

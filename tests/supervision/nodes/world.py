@@ -4,8 +4,8 @@ import runpy
 
 from paramove.bus import topics
 
-HEARS = ()
-SAYS = (topics.CLOCK, topics.TRUTH_STATE)
+SUBSCRIBES = ()
+PUBLISHES = (topics.CLOCK, topics.TRUTH_STATE)
 
 if __name__ == "__main__":
     runpy.run_module("nodes.actor", run_name="__main__")

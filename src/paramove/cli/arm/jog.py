@@ -81,9 +81,9 @@ class _Link:
         topics = self._topics
         with contextlib.ExitStack() as unfinished:
             unfinished.push(self._bus)
-            self._says = self._bus.says(topics.ARM_TRAJECTORY)
+            self._trajectories = self._bus.publisher(topics.ARM_TRAJECTORY)
             heard = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
-            self._hears: list[Subscriber] = [self._bus.hears(topic) for topic in heard]
+            self._subscribers: list[Subscriber] = [self._bus.subscriber(topic) for topic in heard]
             unfinished.pop_all()
         return self
 
@@ -95,10 +95,10 @@ class _Link:
     def wait_for_arm(self) -> None:
         """Ends the command if no driver says where the joints are, or none listens."""
         end_s = time.monotonic() + PATIENCE_S
-        while not (self.jogging.angles and self._says.subscriptions and self._arming.state):
+        while not (self.jogging.angles and self._trajectories.subscriptions and self._arming.state):
             if time.monotonic() > end_s:
                 raise ended(f"no arm is heard within {PATIENCE_S:g} s: is its driver running?", exit_codes.UNAVAILABLE)
-            self._hears[0].socket.poll(int(1e3 * PERIOD_S))
+            self._subscribers[0].socket.poll(int(1e3 * PERIOD_S))
             self.exchange()
 
     def press(self, key: str) -> None:
@@ -111,7 +111,7 @@ class _Link:
         elif key in ("+", "-"):
             message = self.jogging.step(1 if key == "+" else -1, time.monotonic_ns())
             if message is not None:
-                say_now(self._says, message)
+                say_now(self._trajectories, message)
         elif key == "a":
             self._arming.press(time.monotonic())
             self._told = ""  # what keeps it from being armed is told again
@@ -123,10 +123,10 @@ class _Link:
 
     def exchange(self) -> None:
         """Hears what has come in, and says the word to arm when it is time."""
-        for publisher in (self._says, self._arms):
+        for publisher in (self._trajectories, self._arms):
             if publisher is not None:
                 publisher.serve()
-        states, statuses, safety = self._hears
+        states, statuses, safety = self._subscribers
         for subscriber, hear in ((states, self.jogging.hear_states), (statuses, self.jogging.hear_status)):
             subscriber.revive()
             while (heard := subscriber.receive()) is not None:
@@ -177,7 +177,7 @@ class _Link:
         from paramove.operator import TERMINAL
 
         try:
-            self._arms = self._arms or self._bus.says(self._topics.OPERATOR_ARM)
+            self._arms = self._arms or self._bus.publisher(self._topics.OPERATOR_ARM)
         except TopicTakenError as error:
             self._arming.refuse(f"{error}, and only one program may arm an arm")
             return

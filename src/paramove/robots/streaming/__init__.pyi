@@ -1,4 +1,4 @@
 from .driver import ArmDriver as ArmDriver
-from .driver import DriverSays as DriverSays
+from .driver import DriverOutput as DriverOutput
 from .stream import StreamReader as StreamReader
 from .stream import StreamWriter as StreamWriter

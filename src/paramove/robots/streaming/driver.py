@@ -59,7 +59,7 @@ TICKS_PER_PROGRESS = 5
 
 
 @dataclass(frozen=True)
-class DriverSays:
+class DriverOutput:
     """Messages that a tick gives; `stream` and `joint_states` are None where there is nothing new."""
 
     stream: StreamBatch | None
@@ -186,7 +186,7 @@ class ArmDriver:
         """
         self._asked.append((message, captured_ns))
 
-    def tick(self, now_ns: int) -> DriverSays:
+    def tick(self, now_ns: int) -> DriverOutput:
         """One camera period: what to send to the robot and what to say of it."""
         if not self._ticks:
             self._begin_at(now_ns)
@@ -216,7 +216,7 @@ class ArmDriver:
         statuses, self._statuses = tuple(self._statuses), []
         joint_states = self._report.joint_states() if self._report and self._reported else None
         self._reported = False
-        return DriverSays(stream, joint_states, statuses, self._safety_state(now_ns))
+        return DriverOutput(stream, joint_states, statuses, self._safety_state(now_ns))
 
     def _judge_stops(self) -> None:
         """A stop from before this driver began is no reason for how it stands: what it stopped was another's."""

@@ -45,7 +45,7 @@ class PersonAtEmulator(Person):
         self.emulator, self.port = emulator, port
 
     def sends(self, target, duration_s: float = 1.0, name: str = "a") -> None:
-        self.says(name, ROBOT.joint_names, [(0.0, ROBOT.units.to_radians(self.goals())), (duration_s, target)])
+        self.publish(name, ROBOT.joint_names, [(0.0, ROBOT.units.to_radians(self.goals())), (duration_s, target)])
 
     def moves(self) -> None:
         """Sends a long movement and returns while it is under way."""
@@ -104,7 +104,7 @@ def test_an_arm_with_a_joint_at_its_stop_a_little_beyond_its_range_moves(person)
         person.emulator.bus.servos[2].turned(float(round(beyond)))
     person.hears_until(lambda: person.angles and person.angles[-1][2] > ROBOT.upper[2])  # believed after a while
     person.arms_and_waits()
-    person.says("a", ROBOT.joint_names[:1], [(0.0, [0.0]), (1.0, [0.2])])
+    person.publish("a", ROBOT.joint_names[:1], [(0.0, [0.0]), (1.0, [0.2])])
     person.is_told("SUCCEEDED")
     assert person.goals()[2] == round(beyond)
 

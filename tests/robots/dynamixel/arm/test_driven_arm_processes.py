@@ -76,7 +76,7 @@ def moves(person: Person) -> None:
     person.hears_until(lambda: len(person.angles) > begun)
     here = np.array(person.angles[-1])
     there = np.where(np.arange(len(here)) == 0, -np.sign(here[0] or 1.0) * 1.2, here)
-    person.says(f"{time.monotonic_ns()}", ROBOT.joint_names, [(0.0, here), (15.0, there)])
+    person.publish(f"{time.monotonic_ns()}", ROBOT.joint_names, [(0.0, here), (15.0, there)])
     person.hears_until(lambda: abs(person.angles[-1][0] - here[0]) > 0.05)
 
 
@@ -130,7 +130,7 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
     assert memory(emulator, "Torque Enable") == [1] * 5
     with driven(emulator.port) as person:
         person.waits_for("DISARMED")
-        person.says("of before", ROBOT.joint_names, [(0.0, ROBOT.base_pose), (1.0, ROBOT.base_pose)])
+        person.publish("of before", ROBOT.joint_names, [(0.0, ROBOT.base_pose), (1.0, ROBOT.base_pose)])
         assert person.is_told("REFUSED").code == "not_armed"
         assert memory(emulator, "Present Position") == rested
         person.arms_and_waits()

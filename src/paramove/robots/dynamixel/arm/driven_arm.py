@@ -116,14 +116,14 @@ class DrivenArm:
         """What is to be said since the last time: topic, message, and when what it tells of was so, ns."""
         with contextlib.suppress(BlockingIOError):
             os.read(self.readable, 4096)
-        says, now_ns = self._loop.take(), time.monotonic_ns()
-        states = [one.joint_states for one in says if one.joint_states is not None]
+        output, now_ns = self._loop.take(), time.monotonic_ns()
+        states = [one.joint_states for one in output if one.joint_states is not None]
         yield from ((topics.ARM_JOINT_STATES_FAST, one, one.timestamp.ToNanoseconds()) for one in states)
-        yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in says for status in one.statuses)
+        yield from ((topics.ARM_TRAJECTORY_STATUS, status, now_ns) for one in output for status in one.statuses)
         due = now_ns - self._safety_ns >= SLOW_NS
-        if says and (due or self._driver.state is not self._state):
+        if output and (due or self._driver.state is not self._state):
             self._state, self._safety_ns = self._driver.state, now_ns
-            yield topics.ARM_SAFETY, says[-1].safety, now_ns
+            yield topics.ARM_SAFETY, output[-1].safety, now_ns
         if states and now_ns - self._slow_ns >= SLOW_NS:
             self._slow_ns = now_ns
             yield topics.ARM_JOINT_STATES, states[-1], states[-1].timestamp.ToNanoseconds()

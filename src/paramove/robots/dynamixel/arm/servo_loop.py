@@ -25,7 +25,7 @@ from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
-from paramove.robots.streaming import ArmDriver, DriverSays, StreamReader
+from paramove.robots.streaming import ArmDriver, DriverOutput, StreamReader
 from paramove.safety import Fault, State
 
 SLOW_SHARE = 0.5
@@ -124,7 +124,7 @@ class ServoLoop:
         self._said = said
         self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.patience)
         self._reader: StreamReader | None = None
-        self._says: list[DriverSays] = []
+        self._output: list[DriverOutput] = []
         self._step = 0
         self._begun_s, self._silent_s = time.monotonic(), 0.0
         self._urgent = self._ended = self._normal_end = False
@@ -151,11 +151,11 @@ class ServoLoop:
         self._thread.join()
         self._port.close()
 
-    def take(self) -> list[DriverSays]:
+    def take(self) -> list[DriverOutput]:
         """What the driver said since the last time."""
         with self.lock:
-            says, self._says = self._says, []
-        return says
+            output, self._output = self._output, []
+        return output
 
     def tick(self) -> None:
         """The driver's next word at once: a stop does not wait for the next period."""
@@ -251,10 +251,10 @@ class ServoLoop:
 
     def _tick(self, now_ns: int) -> None:
         self._urgent = False
-        says = self.driver.tick(now_ns)
-        if says.stream is not None and self._reader is not None:
-            self._reader.offer(says.stream)
-        self._says.append(says)
+        output = self.driver.tick(now_ns)
+        if output.stream is not None and self._reader is not None:
+            self._reader.offer(output.stream)
+        self._output.append(output)
 
     def _open(self) -> None:
         """Raises InputError also if what is driven as emulated is so no more."""
@@ -301,7 +301,7 @@ class ServoLoop:
                 sentence = "it took too long"
                 break
             self._stopped_period()
-            heard = [one for says in self.take() for one in says.statuses if one.trajectory_id == name]
+            heard = [one for output in self.take() for one in output.statuses if one.trajectory_id == name]
             if heard and heard[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
                 return True
             if heard and heard[-1].code == "busy":  # the movement before has not settled yet

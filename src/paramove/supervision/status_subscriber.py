@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from paramove.bus import BusSettings, Exchange, Heard, topics
+from paramove.bus import BusSettings, Exchange, Received, topics
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 
-class Listener:
+class StatusSubscriber:
     """Subscribes to the status of every node and to the story of the run. Never waits.
 
     Args:
@@ -44,7 +44,7 @@ class Listener:
         """Closes all sockets."""
         self._exchange.close()
 
-    def _handle(self, heard: Heard) -> None:
+    def _handle(self, heard: Received) -> None:
         if heard.topic.type is NodeStatus:
             self._on_status(heard.message)
         elif heard.topic is topics.SPEECH:
