@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from paramove.documents import Floats
 from paramove.safety import (
-    ArmWord,
+    ArmingRequest,
     Fault,
     Inputs,
     Measured,
@@ -207,7 +207,7 @@ class Episode:
         if random() < (0.02 if self.core.state is State.ARMED else 0.4):
             armed = self.core.state is not State.ARMED or random() < 0.5
             age = int(self.random.choice([0, 0, 0, 100, 2000, -5000])) * MS
-            word = ArmWord(self.now - age, "a person" if random() < 0.95 else "", armed, by_person=True)
+            word = ArmingRequest(self.now - age, "a person" if random() < 0.95 else "", armed, by_person=True)
         stop = Fault("test", "", "stop") if random() < 0.005 else None
         checks = (Fault("voltage", "", "low"),) if random() < 0.05 else ()
         measured = self.measured()

@@ -10,7 +10,7 @@ from paramove.applications.relocator import Relocator
 from paramove.applications.relocator_options import RelocatorOptions
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus

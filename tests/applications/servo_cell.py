@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from paramove.applications.reach_task import ReachStep, ReachTask
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.msgs.rule_pb2 import Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState

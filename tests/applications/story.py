@@ -11,7 +11,7 @@ from paramove.applications.stage import RuleLearnerOptions
 from paramove.applications.table import Surface
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech

@@ -14,7 +14,7 @@ from pathlib import Path
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import Speech
 

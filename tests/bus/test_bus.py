@@ -13,7 +13,7 @@ import pytest
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings, default_folder
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.msgs.rule_pb2 import Rules

@@ -19,7 +19,7 @@ from paramove.bus.envelope import Reason
 from paramove.bus.publisher import Publisher
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Subscriber
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.tracked_objects_pb2 import TrackedObjects
 from tests.bus.conftest import RawPublisher, Wait

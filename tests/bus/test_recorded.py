@@ -7,7 +7,7 @@ import pytest
 from paramove.bus import topics
 from paramove.bus.recorded import Published, RecordedBus, with_ticks
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import Rules, Speech
 

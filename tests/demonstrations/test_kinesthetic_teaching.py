@@ -14,7 +14,7 @@ from paramove.motion.reaching_file import load_reaching_model
 from paramove.motion.servo_arm_reaching import ServoArmReaching
 from paramove.motion.timing import minimum_jerk
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import model_named
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
@@ -47,15 +47,15 @@ def way(target):
 class Hands:
     """Lead an emulated arm; its clock is counted."""
 
-    def __init__(self, emulator, limp):
-        self.emulator, self.limp, self.now_ns = emulator, limp, 0
+    def __init__(self, emulator, torque_off):
+        self.emulator, self.torque_off, self.now_ns = emulator, torque_off, 0
 
     def lead(self, teacher, rows):
         for row in rows:
             with self.emulator.lock:
                 for servo, count in zip(self.emulator.bus.servos, ROBOT.units.to_counts(row), strict=True):
                     servo.turned(float(count))
-            while (measured := self.limp.measured()) is None:
+            while (measured := self.torque_off.measured()) is None:
                 select.select([], [], [], 0.005)  # nobody turns a joint in no time: it is believed after a while
             _, angles = measured
             self.now_ns += PERIOD_NS
@@ -77,9 +77,9 @@ def hands(tmp_path_factory):
         for motor, number in zip(ROBOT.motors, ROBOT.servo_ids, strict=True)
     ]
     with DynamixelEmulator(servos, link) as emulator, ServoPort(str(link), rate, latency_s=0.1) as port:
-        limp = LimpArm(ServoChain(port), ROBOT)
-        limp.release()
-        yield Hands(emulator, limp)
+        torque_off = TorqueOffArm(ServoChain(port), ROBOT)
+        torque_off.release()
+        yield Hands(emulator, torque_off)
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.motion.clear_plans import ClearPlans
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.synthesizer import Synthesizer

@@ -7,8 +7,8 @@ from typing import Any
 
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
+from paramove.bus.ticks import Tick
 from paramove.bus.topics import Topic
-from paramove.bus.turns import Tick
 
 PERIOD_NS = 66_666_667
 

@@ -7,7 +7,7 @@ from nodes import arm_driver
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 from tests.motion.reaching import ROBOT_FOLDER

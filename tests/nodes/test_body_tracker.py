@@ -9,7 +9,7 @@ from nodes import body_tracker
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.cameras.calibrated import write_cameras
 from paramove.cameras.frames import Frame, encode
 from paramove.documents.input_error import InputError

@@ -12,7 +12,7 @@ from nodes import camera
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.cameras.frames import FrameError, decode
 from paramove.documents.input_error import InputError
 from tests.nodes.recorded_bus import PERIOD_NS, bus_that_heard, bus_with_ticks

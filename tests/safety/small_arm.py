@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.safety_steps import EPOCH, MECHANICAL, MS, NAMES, limits_at
 from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import ArmWord, Clearance, Inputs, Measured, Proposal, SafetySettings, State, Targets
+from paramove.safety.gate_io import ArmingRequest, Clearance, Inputs, Measured, Proposal, SafetySettings, State, Targets
 from paramove.safety.stopping import straight_move
 
 LIMITS = limits_at(0.01)
@@ -54,7 +54,7 @@ class SmallArm:
         return targets, state, tuple(fault.code for fault in faults)
 
     def arm(self, **said: object) -> tuple[Targets | None, State, tuple[str, ...]]:
-        return self.step(word=ArmWord(self.now + 10 * MS, "a person", True, by_person=True), **said)
+        return self.step(word=ArmingRequest(self.now + 10 * MS, "a person", True, by_person=True), **said)
 
     def follow(self, path: np.ndarray, steps: int) -> None:
         """Propose `path` as a driver does, as long as the gate stays armed."""

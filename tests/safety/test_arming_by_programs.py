@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.safety_steps import MS
-from paramove.safety.gate_io import ArmWord, Fault, Inputs, State
+from paramove.safety.gate_io import ArmingRequest, Fault, Inputs, State
 from tests.safety.small_arm import SmallArm
 
 STOP = Fault("person_stop", "", "stopped from the page by a person")
@@ -14,13 +14,13 @@ STOP = Fault("person_stop", "", "stopped from the page by a person")
 def asks(arm: SmallArm, no_program: str | None = "", **said: object) -> tuple[State, tuple[str, ...]]:
     """A program's request; None: the driver has verified nothing."""
     said |= {} if no_program is None else {"no_program": no_program}
-    return arm.step(word=ArmWord(arm.now + 10 * MS, "operator", True), **said)[1:]
+    return arm.step(word=ArmingRequest(arm.now + 10 * MS, "operator", True), **said)[1:]
 
 
 def test_where_the_robot_is_emulated_it_arms_once() -> None:
     arm = SmallArm()
     assert asks(arm) == (State.ARMED, ())
-    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False))  # whoever disarms
+    arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False))  # whoever disarms
     assert arm.core.state is State.DISARMED
     assert asks(arm) == (State.DISARMED, ("arming_program",))
     assert arm.arm()[1:] == (State.ARMED, ())
@@ -46,7 +46,7 @@ def test_a_refusal_alone_keeps_no_program_from_asking_again() -> None:
 
 def stopped(arm: SmallArm) -> None:
     arm.step(stop=STOP)
-    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False))
+    arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False))
 
 
 def stopped_while_the_robot_was_silent(arm: SmallArm) -> None:
@@ -57,7 +57,7 @@ def stopped_and_asked_in_one_step(arm: SmallArm) -> None:
     asks(arm, stop=STOP)
     for _ in range(60):
         arm.step()
-    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False))
+    arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False))
 
 
 def pressed_and_released(arm: SmallArm) -> None:
@@ -74,7 +74,7 @@ def silent(arm: SmallArm) -> None:
 def time_went_back(arm: SmallArm) -> None:
     arm.step()
     arm.step(ms=-10)
-    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False))
+    arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule
 
 from benchmarks.safety_steps import EPOCH, MECHANICAL, MS, Checker
 from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import ArmWord, Fault, Proposal, SafetySettings, State, Targets
+from paramove.safety.gate_io import ArmingRequest, Fault, Proposal, SafetySettings, State, Targets
 from paramove.safety.stopping import straight_move
 from tests.safety.small_arm import HOME, LIMITS, SmallArm
 
@@ -25,8 +25,8 @@ class ArmingMachine(RuleBasedStateMachine):
         super().__init__()
         self.arm = SmallArm(SETTINGS)
         self.judge = Checker(LIMITS, HOME)
-        self.words: list[ArmWord] = []
-        self.delivered: list[ArmWord] = []
+        self.words: list[ArmingRequest] = []
+        self.delivered: list[ArmingRequest] = []
         self.checks: tuple[Fault, ...] = ()
         self.checks_ms = 0
         self.plan: tuple[int, np.ndarray] | None = None
@@ -49,11 +49,11 @@ class ArmingMachine(RuleBasedStateMachine):
     )
     def somebody_arms(self, age_ms: int, source: str, checks_ms: int, by_person: bool, emulated: bool) -> None:
         self.checks_ms, self.emulated = checks_ms, emulated
-        self.publish(ArmWord(self.arm.now + (10 - age_ms) * MS, source, True, by_person))
+        self.publish(ArmingRequest(self.arm.now + (10 - age_ms) * MS, source, True, by_person))
 
     @rule()
     def somebody_disarms(self) -> None:
-        self.publish(ArmWord(self.arm.now + 10 * MS, "a person", False, by_person=True))
+        self.publish(ArmingRequest(self.arm.now + 10 * MS, "a person", False, by_person=True))
 
     @rule(goal=st.sampled_from(range(len(GOALS))), steps=st.integers(0, 25))
     def all_is_well_and_the_arm_moves(self, goal: int, steps: int) -> None:
@@ -61,7 +61,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.pressed, self.source_speaks, self.checks = False, True, ()
         for _ in range(12):
             self.step(ms=50)
-        self.publish(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
+        self.publish(ArmingRequest(self.arm.now + 10 * MS, "a person", True, by_person=True))
         assert self.arm.core.state is State.ARMED
         self.a_movement_is_asked_for(goal)
         for _ in range(steps):
@@ -70,7 +70,7 @@ class ArmingMachine(RuleBasedStateMachine):
     @rule(by_button=st.booleans(), steps=st.integers(1, 40))
     def a_word_is_said_before_a_stop_and_heard_after_it(self, by_button: bool, steps: int) -> None:
         self.pressed, self.source_speaks, self.checks = False, True, ()
-        self.words.append(ArmWord(self.arm.now + 10 * MS, "a person", True, by_person=True))
+        self.words.append(ArmingRequest(self.arm.now + 10 * MS, "a person", True, by_person=True))
         self.step()
         if by_button:
             self.the_emergency_stop_is_pressed_or_released(True)
@@ -132,7 +132,7 @@ class ArmingMachine(RuleBasedStateMachine):
         self.source_heard_ns = self.only_later_ns = self.arm.now
         self.step()
 
-    def publish(self, word: ArmWord) -> None:
+    def publish(self, word: ArmingRequest) -> None:
         self.words.append(word)
         self.step(word=word)
 
@@ -142,7 +142,7 @@ class ArmingMachine(RuleBasedStateMachine):
         start, path = self.plan
         return self.arm.proposal(path, start) if self.arm.played - start < len(path) - 3 else None
 
-    def step(self, word: ArmWord | None = None, ms: int = 10, **said: object) -> None:
+    def step(self, word: ArmingRequest | None = None, ms: int = 10, **said: object) -> None:
         arm, before, rested = self.arm, self.arm.core.state, self.arm.at_rest
         emergency = self.pressed if self.source_speaks else None
         if self.source_speaks:
@@ -168,7 +168,7 @@ class ArmingMachine(RuleBasedStateMachine):
         if pressed or "stop" in said:
             self.only_later_ns = arm.now
 
-    def expect_a_person_now(self, word: ArmWord | None, before: State, rested: bool) -> None:
+    def expect_a_person_now(self, word: ArmingRequest | None, before: State, rested: bool) -> None:
         assert before in (State.DISARMED, State.HOLD, State.DISCONNECTED)  # connected in this very step
         assert word is not None
         assert word.armed
@@ -180,7 +180,7 @@ class ArmingMachine(RuleBasedStateMachine):
         assert rested
         assert self.arm.core.faults == ()
 
-    def of_time(self, word: ArmWord) -> set[str]:
+    def of_time(self, word: ArmingRequest) -> set[str]:
         """What its time alone makes wrong with a word."""
         age_ms = (self.arm.now - word.captured_ns) // MS
         if age_ms < 0:
@@ -188,7 +188,7 @@ class ArmingMachine(RuleBasedStateMachine):
         stale, slow = age_ms - self.checks_ms > 1000, min(age_ms, self.checks_ms) > 3000
         return {name for name, wrong in (("arming_stale", stale), ("arming_slow", slow)) if wrong}
 
-    def expect_reasons(self, word: ArmWord, before: State, faults: tuple[str, ...]) -> None:
+    def expect_reasons(self, word: ArmingRequest, before: State, faults: tuple[str, ...]) -> None:
         """Whoever may not arm is told every check that fails."""
         newer = any(one.captured_ns >= word.captured_ns for one in self.delivered)
         if before not in (State.DISARMED, State.HOLD) or newer or self.arm.core.state is State.DISCONNECTED:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.safety.core import SafetyCore
-from paramove.safety.gate_io import ArmWord, Fault, Inputs, Measured, Proposal, State
+from paramove.safety.gate_io import ArmingRequest, Fault, Inputs, Measured, Proposal, State
 from tests.robots.hoap3.movements import HOAP3, swing
 
 LIMITS = HOAP3.motion_limits
@@ -28,8 +28,8 @@ def measured(now_ns: int, *, at_rest: bool = True, next_index: int = 0, row: int
     return Measured(now_ns, PATH[row], PATH[row], at_rest, next_index)
 
 
-def word(at_ns: int, *, armed: bool = True, source: str = "a person") -> ArmWord:
-    return ArmWord(at_ns, source, armed, by_person=True)
+def word(at_ns: int, *, armed: bool = True, source: str = "a person") -> ArmingRequest:
+    return ArmingRequest(at_ns, source, armed, by_person=True)
 
 
 def proposal(now_ns: int, first: int = 0, rows: int = 300, ahead: int = 400) -> Proposal:
@@ -65,15 +65,15 @@ def test_armed_rows_pass_unchanged_and_end_in_a_stop_ramp() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arm_word", "robot", "code"),
+    ("arming_request", "robot", "code"),
     [
         (word(START_NS + MS, source=""), {}, "arming_source"),
         (word(START_NS + MS), {"at_rest": False}, "arming_moving"),
     ],
 )
-def test_arming_is_refused_with_the_failing_checks(arm_word: ArmWord, robot: dict, code: str) -> None:
+def test_arming_is_refused_with_the_failing_checks(arming_request: ArmingRequest, robot: dict, code: str) -> None:
     core, now = gate(), START_NS + 2 * MS
-    _, state, faults = core.step(now, Inputs(measured(now, **robot), arm_word))
+    _, state, faults = core.step(now, Inputs(measured(now, **robot), arming_request))
     assert state is State.DISARMED
     assert [fault.code for fault in faults] == [code]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.safety_steps import MS
-from paramove.safety.gate_io import ArmWord, Fault, SafetySettings, State
+from paramove.safety.gate_io import ArmingRequest, Fault, SafetySettings, State
 from paramove.safety.stopping import stop_ramp, straight_move
 from tests.safety.small_arm import HOME, LIMITS, PATH, SmallArm
 
@@ -28,7 +28,7 @@ def test_all_failing_checks_are_told_together_and_nobody_is_armed() -> None:
     arm = SmallArm()
     away = np.array([0.0, 2.1, np.nan])
     robot = replace(arm.measured(), captured_ns=arm.now + 10 * MS, at_rest=False, commanded=np.array([0, -2.1, 0]))
-    word = ArmWord(arm.now + 10 * MS, "", True, by_person=True)
+    word = ArmingRequest(arm.now + 10 * MS, "", True, by_person=True)
     _, state, faults = arm.step(measured=robot, word=word, arming_faults=(VOLTAGE, MODEL))
     assert state is State.DISARMED
     assert faults == ("voltage", "model", "arming_source", "arming_moving", "arming_pose_outside")
@@ -67,7 +67,7 @@ def test_a_word_to_arm_may_be_a_second_old(age_ms: int, faults: tuple[str, ...])
     arm = SmallArm()
     for _ in range(4):
         arm.step(ms=300)
-    assert arm.step(word=ArmWord(arm.now + (10 - age_ms) * MS, "a person", True, by_person=True))[2] == faults
+    assert arm.step(word=ArmingRequest(arm.now + (10 - age_ms) * MS, "a person", True, by_person=True))[2] == faults
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_what_the_checks_take_does_not_make_a_word_old(age_ms: int, checks_ms: i
     arm = SmallArm()
     arm.step(ms=5000)
     now = arm.now + 10 * MS
-    word = ArmWord(now - age_ms * MS, "a person", True, by_person=True)
+    word = ArmingRequest(now - age_ms * MS, "a person", True, by_person=True)
     assert arm.step(word=word, checks_began_ns=now - checks_ms * MS)[2] == told
     assert (arm.core.state is State.ARMED) == (told == ())
     if "arming_slow" in told:
@@ -101,7 +101,7 @@ def test_an_arm_that_is_moved_by_hand_while_held_is_disarmed_at_once() -> None:
     assert arm.step(stop=VOLTAGE)[1] is State.HOLD
     moved = replace(arm.measured(), captured_ns=arm.now + 10 * MS, at_rest=False)
     assert (
-        arm.step(measured=moved, word=ArmWord(arm.now + 10 * MS, "a person", False, by_person=True))[1]
+        arm.step(measured=moved, word=ArmingRequest(arm.now + 10 * MS, "a person", False, by_person=True))[1]
         is State.DISARMED
     )
 
@@ -148,7 +148,7 @@ def test_the_same_proposal_again_is_counted_once() -> None:
 def test_arm_words_that_come_too_often_do_not_arm_but_those_that_disarm_are_heard() -> None:
     arm = SmallArm(SafetySettings(words_per_s=20.0))
     for k in range(6):
-        assert arm.step(word=ArmWord(arm.now + 10 * MS, "a person", k % 2 == 0, by_person=True))[1] is (
+        assert arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", k % 2 == 0, by_person=True))[1] is (
             State.ARMED if k % 2 == 0 else State.DISARMED
         )
     assert arm.arm()[1:] == (State.DISARMED, ("arming_rate",))
@@ -156,7 +156,7 @@ def test_arm_words_that_come_too_often_do_not_arm_but_those_that_disarm_are_hear
     arm.step(ms=300)
     assert arm.arm()[1] is State.ARMED
     for _ in range(10):
-        state = arm.step(ms=1, word=ArmWord(arm.now + MS, "a person", False, by_person=True))[1]
+        state = arm.step(ms=1, word=ArmingRequest(arm.now + MS, "a person", False, by_person=True))[1]
     assert state is State.DISARMED
 
 
@@ -314,10 +314,10 @@ def test_the_stop_after_the_rows_is_looked_at_too() -> None:
 
 def test_a_word_from_the_future_neither_arms_nor_silences_later_ones() -> None:
     arm = SmallArm()
-    assert arm.step(word=ArmWord(arm.now + 1011 * MS, "a person", True, by_person=True))[2] == ("arming_stale",)
+    assert arm.step(word=ArmingRequest(arm.now + 1011 * MS, "a person", True, by_person=True))[2] == ("arming_stale",)
     assert arm.arm()[1] is State.ARMED
-    arm.step(word=ArmWord(arm.now + 10**15, "a person", True, by_person=True))
-    assert arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False, by_person=True))[1] is State.DISARMED
+    arm.step(word=ArmingRequest(arm.now + 10**15, "a person", True, by_person=True))
+    assert arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False, by_person=True))[1] is State.DISARMED
 
 
 @pytest.mark.parametrize("while_stopping", [True, False])
@@ -327,7 +327,7 @@ def test_disarmed_in_motion_it_stops_first_and_is_not_held(while_stopping: bool)
     if while_stopping:
         assert arm.step(stop=VOLTAGE, proposal=arm.proposal)[1] is State.STOPPING
     targets, state, _ = arm.step(
-        word=ArmWord(arm.now + 10 * MS, "a person", False, by_person=True), proposal=arm.proposal
+        word=ArmingRequest(arm.now + 10 * MS, "a person", False, by_person=True), proposal=arm.proposal
     )
     assert state is State.STOPPING
     assert (targets is None) is while_stopping
@@ -376,7 +376,7 @@ def test_rows_whose_stop_would_leave_the_range_are_refused_in_time() -> None:
 def disarmed_in_motion() -> SmallArm:
     arm = SmallArm()
     arm.in_motion()
-    arm.step(word=ArmWord(arm.now + 10 * MS, "a person", False, by_person=True), proposal=arm.proposal)
+    arm.step(word=ArmingRequest(arm.now + 10 * MS, "a person", False, by_person=True), proposal=arm.proposal)
     assert arm.core.state is State.STOPPING
     return arm
 
@@ -410,7 +410,7 @@ def test_a_silent_robot_is_not_disarmed_by_a_word() -> None:
     arm = SmallArm()
     arm.arm()
     robot = arm.measured()
-    word = ArmWord(arm.now + 600 * MS, "a person", False, by_person=True)
+    word = ArmingRequest(arm.now + 600 * MS, "a person", False, by_person=True)
     assert arm.step(ms=600, measured=robot, word=word)[1] is State.DISCONNECTED
 
 
@@ -418,7 +418,7 @@ def test_what_the_faults_of_arming_say() -> None:
     arm = SmallArm()
     robot = replace(arm.measured(), captured_ns=arm.now + 2000 * MS, at_rest=False)
     lost = replace(robot, positions=np.array([0.0, np.nan, 0.0]), commanded=np.array([0.0, -2.1, 0.0]))
-    arm.step(ms=2000, measured=lost, word=ArmWord(arm.now + 500 * MS, "", True, by_person=True))
+    arm.step(ms=2000, measured=lost, word=ArmingRequest(arm.now + 500 * MS, "", True, by_person=True))
     told = [(fault.code, fault.joint, fault.sentence) for fault in arm.core.faults]
     outside = "joint elbow is commanded at -120.32 deg, allowed -114.59 to 114.59 deg; move it inside by hand"
     assert told == [

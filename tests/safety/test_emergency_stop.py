@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.safety_steps import MS
-from paramove.safety.gate_io import ArmWord, Fault, SafetySettings, State
+from paramove.safety.gate_io import ArmingRequest, Fault, SafetySettings, State
 from tests.safety.small_arm import LIMITS, SmallArm
 
 STOP = Fault("overload", "elbow", "too hot")
@@ -56,7 +56,7 @@ def test_its_release_disarms_and_moves_nothing(state: State) -> None:
     pose = arm.stream[-1]
     targets, now_state, _ = arm.step(emergency=False, proposal=arm.proposal)
     assert (targets, now_state) == (None, State.DISARMED)
-    word = ArmWord(said_while_pressed, "a person", True, by_person=True)
+    word = ArmingRequest(said_while_pressed, "a person", True, by_person=True)
     assert arm.step(emergency=False, word=word)[1] is State.DISARMED
     for _ in range(20):
         assert arm.step(proposal=arm.proposal)[0] is None

@@ -6,7 +6,7 @@ import pytest
 
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
-from paramove.bus.turns import Tick
+from paramove.bus.ticks import Tick
 from paramove.documents.input_error import InputError
 from sim import dynamixel_emulator
 

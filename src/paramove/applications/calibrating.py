@@ -6,7 +6,7 @@ and its own targets give the homography.
 
 from __future__ import annotations
 
-from paramove.applications.stage import Mind, Place, Stage, cm
+from paramove.applications.stage import ApplicationState, Place, Stage, cm
 from paramove.applications.table import Sighting
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus
@@ -22,16 +22,16 @@ class Calibrating(Stage):
 
     stage = ApplicationStage.STAGE_CALIBRATE
 
-    def __init__(self, mind: Mind) -> None:
-        super().__init__(mind)
+    def __init__(self, app: ApplicationState) -> None:
+        super().__init__(app)
         self._held: str = ""
         self._seen: list[tuple[Place, Sighting]] = []
         self._missed = 0
 
     def enter(self) -> None:
         """Bring the arm to its base pose."""
-        self.mind.tell("I do not know yet how the camera sees the table. I will place an object at four corners.")
-        self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+        self.app.tell("I do not know yet how the camera sees the table. I will place an object at four corners.")
+        self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
         self.go("resting")
 
     def on_gesture(self, gesture: Gesture) -> None:
@@ -53,71 +53,71 @@ class Calibrating(Stage):
 
     @property
     def _corner(self) -> Place:
-        return self.mind.options.corners[len(self._seen)]
+        return self.app.options.corners[len(self._seen)]
 
     def _resting(self) -> None:
-        if self.mind.errand.outcome is not None:
+        if self.app.goal_client.outcome is not None:
             self._offer()
 
     def _offer(self) -> None:
-        x, y, z = self.mind.options.offer
-        self.mind.errand.start(RelocationGoal.KIND_OFFER_HAND, self.mind.now_s, source=Position(x=x, y=y, z=z))
+        x, y, z = self.app.options.offer
+        self.app.goal_client.start(RelocationGoal.KIND_OFFER_HAND, self.app.now_s, source=Position(x=x, y=y, z=z))
         self.go("offering")
 
     def _offering(self) -> None:
-        outcome = self.mind.errand.outcome
-        if self.mind.errand.succeeded:
+        outcome = self.app.goal_client.outcome
+        if self.app.goal_client.succeeded:
             self._ask()
         elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
             self._ask_for_help(f"I cannot hold my hand out: {outcome.reason}")
         elif outcome is not None:
-            self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+            self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
             self.go("resting")
 
     def _ask_for_help(self, sentence: str) -> None:
         """The same goal would be refused again: only a person can change that."""
-        self.mind.tell(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
+        self.app.tell(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
         self.go("helped")
 
     def _helped(self) -> None:
-        if self.for_s > self.mind.options.patience_s:
-            self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+        if self.for_s > self.app.options.patience_s:
+            self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
             self.go("resting")
 
     def _ask(self) -> None:
-        self.mind.tell("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
+        self.app.tell("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
         self.go("asking")
 
     def _asking(self) -> None:
-        since = self.mind.now_s - self.for_s
+        since = self.app.now_s - self.for_s
         held_still = [
             name
-            for name, seen in self.mind.table.objects.items()
-            if seen.at_rest and seen.time_s > since and self.mind.now_s - seen.time_s >= HELD_STILL_S
+            for name, seen in self.app.table.objects.items()
+            if seen.at_rest and seen.time_s > since and self.app.now_s - seen.time_s >= HELD_STILL_S
         ]
         if held_still:
-            self._held = max(held_still, key=lambda name: self.mind.table.objects[name].time_s)
-            self.mind.errand.start(RelocationGoal.KIND_TAKE, self.mind.now_s, self._held)
+            self._held = max(held_still, key=lambda name: self.app.table.objects[name].time_s)
+            self.app.goal_client.start(RelocationGoal.KIND_TAKE, self.app.now_s, self._held)
             self.go("taking")
-        elif self.for_s > self.mind.options.patience_s:
+        elif self.for_s > self.app.options.patience_s:
             self._ask()
 
     def _taking(self) -> None:
-        if self.mind.errand.succeeded:
-            self.mind.tell(f"I have {self._held}. Please let go.", Speech.REQUEST_LET_GO)
+        if self.app.goal_client.succeeded:
+            self.app.tell(f"I have {self._held}. Please let go.", Speech.REQUEST_LET_GO)
             self.go("letting_go")
-        elif self.mind.errand.outcome is not None:
+        elif self.app.goal_client.outcome is not None:
             self._ask()
 
     def _letting_go(self) -> None:
-        if (self.mind.table.hand_away_for(self.mind.now_s) > HAND_AWAY_S and self.for_s > 1.0) or self.for_s > 6.0:
-            target = self.mind.goals.position(self._corner)
-            self.mind.errand.start(RelocationGoal.KIND_PLACE_HELD, self.mind.now_s, self._held, target=target)
+        if (self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S and self.for_s > 1.0) or self.for_s > 6.0:
+            target = self.app.goals.position(self._corner)
+            self.app.goal_client.start(RelocationGoal.KIND_PLACE_HELD, self.app.now_s, self._held, target=target)
             self.go("placing")
 
     def _placing(self) -> None:
-        outcome = self.mind.errand.outcome
-        if self.mind.errand.succeeded:
+        outcome = self.app.goal_client.outcome
+        if self.app.goal_client.succeeded:
             self.go("looking")
         elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
             self._ask_for_help(f"I cannot put {self._held} at {cm(self._corner)}: {outcome.reason}")
@@ -126,29 +126,29 @@ class Calibrating(Stage):
 
     def _start_again(self, reason: str) -> None:
         self._missed += 1
-        self.mind.tell(f"That did not work: {reason}.")
-        self.mind.errand.start(RelocationGoal.KIND_REST, self.mind.now_s)
+        self.app.tell(f"That did not work: {reason}.")
+        self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
         self.go("resting")
 
     def _looking(self) -> ApplicationStage.Stage | None:
         """The arm has left: wait for a clear view of the object."""
-        seen = self.mind.table.objects.get(self._held)
-        if self.for_s < self.mind.options.settle_s:
+        seen = self.app.table.objects.get(self._held)
+        if self.for_s < self.app.options.settle_s:
             return None
-        if seen is not None and seen.at_rest and seen.time_s > self.mind.errand.started_s:
+        if seen is not None and seen.at_rest and seen.time_s > self.app.goal_client.started_s:
             self._seen.append((self._corner, seen))
             return self._next_corner()
-        if self.for_s > 2 * self.mind.options.settle_s:
+        if self.for_s > 2 * self.app.options.settle_s:
             self._start_again(f"I do not see {self._held} at {cm(self._corner)}")
         return None
 
     def _next_corner(self) -> ApplicationStage.Stage | None:
-        if len(self._seen) == len(self.mind.options.corners):
+        if len(self._seen) == len(self.app.options.corners):
             return self._finish()
-        source = self.mind.goals.position(self._seen[-1][0])
-        target = self.mind.goals.position(self._corner)
-        self.mind.errand.start(
-            RelocationGoal.KIND_RELOCATE, self.mind.now_s, self._held, source, target, attempt=1 + self._missed
+        source = self.app.goals.position(self._seen[-1][0])
+        target = self.app.goals.position(self._corner)
+        self.app.goal_client.start(
+            RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, source, target, attempt=1 + self._missed
         )
         self._missed = 0
         self.go("placing")
@@ -158,11 +158,11 @@ class Calibrating(Stage):
         image = [(seen.u_px, seen.v_px) for _, seen in self._seen]
         plane = [place for place, _ in self._seen]
         try:
-            homography = PlaneHomography.fit(image, plane, self.mind.options.grasp_z)
+            homography = PlaneHomography.fit(image, plane, self.app.options.grasp_z)
         except HomographyError as error:
             self._seen = []
             self._start_again(str(error))
             return None
-        self.mind.outbox.calibrations.append(homography.to_message(round(self.mind.now_s * 1e9)))
-        self.mind.tell("Now I know where I see what I can reach.")
+        self.app.outgoing.calibrations.append(homography.to_message(round(self.app.now_s * 1e9)))
+        self.app.tell("Now I know where I see what I can reach.")
         return ApplicationStage.STAGE_LEARN

@@ -16,7 +16,7 @@ _LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, Reloca
 
 
 @dataclass
-class Outbox:
+class OutgoingMessages:
     """Messages to be said at the end of this tick."""
 
     goals: list[RelocationGoal] = field(default_factory=list)
@@ -38,7 +38,7 @@ class Goals:
         return Position(x=place[0], y=place[1], z=self.grasp_z + above)
 
 
-class Errand:
+class GoalClient:
     """One goal after the other, each sent again until it is acknowledged, and asked for when it is silent too long.
 
     Whoever does the goals may have been restarted and know nothing of it: it then says so, and the goal has failed.
@@ -91,7 +91,7 @@ class Errand:
         if self._goal is not None and status.goal_id == self._goal.id:
             self._status, self._heard_s = status, self._now_s
 
-    def step(self, now_s: float, outbox: Outbox) -> None:
+    def step(self, now_s: float, outgoing: OutgoingMessages) -> None:
         """Send the goal, again if nobody acknowledged it; ask for it or give it up if nothing is heard of it."""
         self._now_s = now_s
         if self._goal is None or self.outcome is not None:
@@ -104,7 +104,7 @@ class Errand:
             self._goal.asked_again = acknowledged
             sent = RelocationGoal()
             sent.CopyFrom(self._goal)
-            outbox.goals.append(sent)
+            outgoing.goals.append(sent)
             self._sent_s = now_s
 
     @property

@@ -6,7 +6,7 @@ object disappears."
 
 from __future__ import annotations
 
-from paramove.applications.stage import Mind, Place, Stage, cm
+from paramove.applications.stage import ApplicationState, Place, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 
@@ -19,8 +19,8 @@ class Learning(Stage):
 
     stage = ApplicationStage.STAGE_LEARN
 
-    def __init__(self, mind: Mind) -> None:
-        super().__init__(mind)
+    def __init__(self, app: ApplicationState) -> None:
+        super().__init__(app)
         self._moved: set[str] = set()
         self._going_in: dict[str, tuple[Place, float]] = {}
         self._seen: dict[str, tuple[float, int]] = {}
@@ -28,13 +28,13 @@ class Learning(Stage):
 
     def enter(self) -> None:
         """Ask for the rules."""
-        self.mind.tell("Please show me into which opening each object belongs.", Speech.REQUEST_SHOW_RULES)
+        self.app.tell("Please show me into which opening each object belongs.", Speech.REQUEST_SHOW_RULES)
         self.go("watching")
-        self._last_event_s = self.mind.now_s
+        self._last_event_s = self.app.now_s
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Follow each object from its first movement to its disappearance."""
-        self._last_event_s = self.mind.now_s
+        self._last_event_s = self.app.now_s
         name, place = gesture.object, (gesture.x, gesture.y)
         if gesture.kind == Gesture.KIND_MOVED:
             self._moved.add(name)
@@ -42,52 +42,52 @@ class Learning(Stage):
         elif gesture.kind in (Gesture.KIND_APPEARED, Gesture.KIND_RESTED):
             self._going_in.pop(name, None)
             self._moved.discard(name)
-            if name in self.mind.rules:
-                del self.mind.rules[name]  # it is back: what was seen was not its opening, or it is shown again
+            if name in self.app.rules:
+                del self.app.rules[name]  # it is back: what was seen was not its opening, or it is shown again
                 self._say_rules()
         elif gesture.kind == Gesture.KIND_VANISHED and name in self._moved and gesture.located:
             self._moved.discard(name)
-            if self.mind.options.surface.contains(place, BORDER):
+            if self.app.options.surface.contains(place, BORDER):
                 self._going_in[name] = (place, gesture.captured.ToNanoseconds() * 1e-9)
 
     def step(self) -> ApplicationStage.Stage | None:
         """One tick."""
         for name, (place, seen_s) in list(self._going_in.items()):
-            if self.mind.now_s - seen_s >= GONE_FOR_GOOD_S and not self.mind.table.hand_in_view:
+            if self.app.now_s - seen_s >= GONE_FOR_GOOD_S and not self.app.table.hand_in_view:
                 del self._going_in[name]
                 self._believe(name, place, seen_s)
-        missing = [name for name in self.mind.options.objects if name not in self.mind.rules]
+        missing = [name for name in self.app.options.objects if name not in self.app.rules]
         if not missing:
-            self.mind.tell("I know all the rules now.")
+            self.app.tell("I know all the rules now.")
             return ApplicationStage.STAGE_APPLY
-        quiet_s = self.mind.now_s - max(self._last_event_s, self.mind.now_s - self.for_s)
-        if quiet_s > self.mind.options.patience_s:
+        quiet_s = self.app.now_s - max(self._last_event_s, self.app.now_s - self.for_s)
+        if quiet_s > self.app.options.patience_s:
             self._ask_again(missing[0])
         return None
 
     def _believe(self, name: str, place: Place, seen_s: float) -> None:
         count = self._seen.get(name, (0.0, 0))[1] + 1
         self._seen[name] = (seen_s, count)
-        self.mind.rules[name] = place
-        self.mind.tell(self._sentence(name))
+        self.app.rules[name] = place
+        self.app.tell(self._sentence(name))
         self._say_rules()
 
     def _sentence(self, name: str) -> str:
-        place, (seen_s, _) = self.mind.rules[name], self._seen[name]
+        place, (seen_s, _) = self.app.rules[name], self._seen[name]
         return f"{name} belongs to the opening at {cm(place)}, seen going in at {seen_s:.1f} s"
 
     def _say_rules(self) -> None:
-        message = Rules(frame=self.mind.options.frame)
-        message.captured.FromNanoseconds(round(self.mind.now_s * 1e9))
-        for name in sorted(self.mind.rules):
-            place, (seen_s, count) = self.mind.rules[name], self._seen[name]
+        message = Rules(frame=self.app.options.frame)
+        message.captured.FromNanoseconds(round(self.app.now_s * 1e9))
+        for name in sorted(self.app.rules):
+            place, (seen_s, count) = self.app.rules[name], self._seen[name]
             rule = Rule(object=name, x=place[0], y=place[1], observations=count, sentence=self._sentence(name))
             rule.seen.FromNanoseconds(round(seen_s * 1e9))
             message.rules.append(rule)
-        self.mind.outbox.rules.append(message)
+        self.app.outgoing.rules.append(message)
 
     def _ask_again(self, name: str) -> None:
-        self.mind.tell(
+        self.app.tell(
             f"I did not see where {name} belongs. Please show me again.", Speech.REQUEST_SHOW_RULE_AGAIN, name
         )
         self.go("watching")

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 
 from paramove.applications.arm_watch import ArmWatch
-from paramove.applications.conversation import Errand, Goals, Outbox
+from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
 from paramove.applications.relocator_options import RelocatorOptions
 from paramove.applications.stage import Place, cm
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
@@ -44,10 +44,10 @@ class Relocator:
     def __init__(self, options: RelocatorOptions, run_name: str) -> None:
         self._options = options
         self._goals = Goals(options.frame, options.grasp_z)
-        self._errand = Errand(self._goals, run_name)
+        self._goal_client = GoalClient(self._goals, run_name)
         self._watch = ArmWatch(options.arm_patience_s)
         self._sight = ArmSight(options.frame)
-        self._outbox = Outbox()
+        self._outgoing = OutgoingMessages()
         self._now_s = 0.0
         self._since_s = 0.0
         self._quiet_since_s = 0.0
@@ -97,7 +97,7 @@ class Relocator:
 
     def on_goal_status(self, status: RelocationStatus) -> None:
         """The arm says how a goal fares."""
-        self._errand.on_status(status)
+        self._goal_client.on_status(status)
 
     def on_safety(self, state: SafetyState) -> None:
         """The safety gate says how it stands."""
@@ -106,28 +106,28 @@ class Relocator:
         if armed and self._watch.lost:
             self._tell(f"I cannot go on: {self._watch.sentence}.")
 
-    def tick(self, now_s: float) -> Outbox:
+    def tick(self, now_s: float) -> OutgoingMessages:
         """One turn: what is to be said."""
         self._now_s = now_s
         if not self.state:
             self._rest()
         elif not self.finished and not self._watch.lost:
             self._steps[self.state]()
-        self._errand.step(now_s, self._outbox)
+        self._goal_client.step(now_s, self._outgoing)
         self._say_stage()
-        outbox, self._outbox = self._outbox, Outbox()
-        return outbox
+        outgoing, self._outgoing = self._outgoing, OutgoingMessages()
+        return outgoing
 
     # States
 
     def _rest(self) -> None:
         """Bring the arm to its base pose, wherever it is."""
-        self._errand.start(RelocationGoal.KIND_REST, self._now_s)
+        self._goal_client.start(RelocationGoal.KIND_REST, self._now_s)
         self._go("resting")
 
     def _resting(self) -> None:
-        outcome = self._errand.outcome
-        if self._errand.succeeded:
+        outcome = self._goal_client.outcome
+        if self._goal_client.succeeded:
             self._fetch() if self._offset is not None else self._ask_to_align()
         elif outcome is not None:
             self._ask_for_help(f"I cannot bring my arm to rest: {outcome.reason}")
@@ -139,8 +139,8 @@ class Relocator:
         self._go("fetching")
 
     def _fetching(self) -> None:
-        outcome = self._errand.outcome
-        if self._errand.succeeded:
+        outcome = self._goal_client.outcome
+        if self._goal_client.succeeded:
             self._missed, self._holding = 0, True
             self._ask()
         elif outcome is not None:
@@ -233,8 +233,8 @@ class Relocator:
             self._go("letting_hand_leave")
 
     def _placing(self) -> None:
-        outcome = self._errand.outcome
-        if self._errand.succeeded:
+        outcome = self._goal_client.outcome
+        if self._goal_client.succeeded:
             self._object_at, self._holding = self._target, False
             self.placed.append(self._target)
             self._tell(f"It stands at {cm(self._target)}.")
@@ -264,7 +264,7 @@ class Relocator:
 
     def _start(self, kind: RelocationGoal.Kind, source: Position | None, target: Position, attempt: int = 1) -> None:
         o = self._options
-        self._errand.start(kind, self._now_s, o.object_name, source, target, o.standing, attempt)
+        self._goal_client.start(kind, self._now_s, o.object_name, source, target, o.standing, attempt)
 
     def _go(self, state: str) -> None:
         self.state, self._since_s = state, self._now_s
@@ -272,7 +272,7 @@ class Relocator:
     def _tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
         speech = Speech(request=request, object=self._options.object_name, sentence=sentence)
         speech.captured.FromNanoseconds(round(self._now_s * 1e9))
-        self._outbox.speech.append(speech)
+        self._outgoing.speech.append(speech)
         self.sentence = sentence
         _log.info("%.1f s: %s", self._now_s, sentence)
 
@@ -286,11 +286,11 @@ class Relocator:
             stage=ApplicationStage.STAGE_DONE if self.finished else ApplicationStage.STAGE_APPLY,
             step="done" if self.finished else self.state,
             sentence=self.sentence,
-            grasps=self._errand.grasps,
-            retries=self._errand.retries,
+            grasps=self._goal_client.grasps,
+            retries=self._goal_client.retries,
         )
         message.captured.FromNanoseconds(round(self._now_s * 1e9))
-        self._outbox.stages.append(message)
+        self._outgoing.stages.append(message)
 
 
 class ArmSight:

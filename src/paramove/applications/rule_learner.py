@@ -5,9 +5,9 @@ from __future__ import annotations
 from paramove.applications.applying import Applying
 from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.calibrating import Calibrating
-from paramove.applications.conversation import Errand, Goals, Outbox
+from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
 from paramove.applications.learning import Learning
-from paramove.applications.stage import Mind, RuleLearnerOptions, Stage
+from paramove.applications.stage import ApplicationState, RuleLearnerOptions, Stage
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage
@@ -26,7 +26,7 @@ class RuleLearner:
 
     def __init__(self, options: RuleLearnerOptions, run_name: str) -> None:
         goals = Goals(options.frame, options.grasp_z)
-        self._mind = Mind(options, Errand(goals, run_name), goals)
+        self._app = ApplicationState(options, GoalClient(goals, run_name), goals)
         self._watch = ArmWatch(options.arm_patience_s)
         self._stage: Stage | None = None
         self._finished = False
@@ -36,7 +36,7 @@ class RuleLearner:
     @property
     def failure(self) -> str:
         """Why the application cannot go on; empty while it can."""
-        return self._watch.sentence if self._watch.given_up(self._mind.now_s) else ""
+        return self._watch.sentence if self._watch.given_up(self._app.now_s) else ""
 
     @property
     def finished(self) -> bool:
@@ -46,45 +46,45 @@ class RuleLearner:
     @property
     def sentence(self) -> str:
         """What was said last."""
-        return self._mind.sentence
+        return self._app.sentence
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Something happened on the table."""
-        self._mind.table.on_gesture(gesture)
+        self._app.table.on_gesture(gesture)
         if self._stage is not None:
             self._stage.on_gesture(gesture)
 
     def on_goal_status(self, status: RelocationStatus) -> None:
         """The arm says how a goal fares."""
-        self._mind.errand.on_status(status)
+        self._app.goal_client.on_status(status)
 
     def on_safety(self, state: SafetyState) -> None:
         """The safety gate says how it stands."""
         armed = not self._watch.lost
-        self._watch.on_safety(state, self._mind.now_s)
+        self._watch.on_safety(state, self._app.now_s)
         if armed and self._watch.lost:
-            self._mind.tell(f"I cannot go on: {self._watch.sentence}.")
+            self._app.tell(f"I cannot go on: {self._watch.sentence}.")
 
-    def tick(self, now_s: float) -> Outbox:
+    def tick(self, now_s: float) -> OutgoingMessages:
         """One turn: what is to be said."""
-        mind = self._mind
-        mind.now_s = now_s
+        app = self._app
+        app.now_s = now_s
         if self._stage is None:
-            self._enter(Calibrating(mind))
+            self._enter(Calibrating(app))
         elif not self._finished and not self._watch.lost:
             following = self._stage.step()
             if following is not None:
                 self._follow(following)
-        mind.errand.step(now_s, mind.outbox)
+        app.goal_client.step(now_s, app.outgoing)
         self._say_stage()
-        outbox, mind.outbox = mind.outbox, Outbox()
-        return outbox
+        outgoing, app.outgoing = app.outgoing, OutgoingMessages()
+        return outgoing
 
     def _follow(self, stage: ApplicationStage.Stage) -> None:
         if stage == ApplicationStage.STAGE_DONE:
             self._finished = True
         else:
-            self._enter({Learning.stage: Learning, Applying.stage: Applying}[stage](self._mind))
+            self._enter({Learning.stage: Learning, Applying.stage: Applying}[stage](self._app))
 
     def _enter(self, stage: Stage) -> None:
         self._stage = stage
@@ -92,18 +92,18 @@ class RuleLearner:
 
     def _say_stage(self) -> None:
         """Once a second, and whenever it changes."""
-        mind, stage = self._mind, self._stage
+        app, stage = self._app, self._stage
         assert stage is not None
-        state = f"{stage.state} {mind.sentence} {self._finished}"
-        if state == self._said_state and mind.now_s - self._said_s < STAGE_PERIOD_S:
+        state = f"{stage.state} {app.sentence} {self._finished}"
+        if state == self._said_state and app.now_s - self._said_s < STAGE_PERIOD_S:
             return
-        self._said_state, self._said_s = state, mind.now_s
+        self._said_state, self._said_s = state, app.now_s
         message = ApplicationStage(
             stage=ApplicationStage.STAGE_DONE if self._finished else stage.stage,
             step=stage.state,
-            sentence=mind.sentence,
-            grasps=mind.errand.grasps,
-            retries=mind.errand.retries,
+            sentence=app.sentence,
+            grasps=app.goal_client.grasps,
+            retries=app.goal_client.retries,
         )
-        message.captured.FromNanoseconds(round(mind.now_s * 1e9))
-        mind.outbox.stages.append(message)
+        message.captured.FromNanoseconds(round(app.now_s * 1e9))
+        app.outgoing.stages.append(message)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import Literal
 
-from paramove.applications.conversation import Errand, Goals, Outbox
+from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
 from paramove.applications.table import Surface, Table
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
@@ -50,7 +50,7 @@ class RuleLearnerOptions:
 
 
 @dataclass
-class Mind:
+class ApplicationState:
     """What all stages see and use.
 
     Attributes:
@@ -59,10 +59,10 @@ class Mind:
     """
 
     options: RuleLearnerOptions
-    errand: Errand
+    goal_client: GoalClient
     goals: Goals
     table: Table = field(default_factory=Table)
-    outbox: Outbox = field(default_factory=Outbox)
+    outgoing: OutgoingMessages = field(default_factory=OutgoingMessages)
     now_s: float = 0.0
     rules: dict[str, Place] = field(default_factory=dict)
     done: set[str] = field(default_factory=set)
@@ -72,7 +72,7 @@ class Mind:
         """Say a sentence to the instructor, with or without a request."""
         speech = Speech(request=request, object=name, sentence=sentence)
         speech.captured.FromNanoseconds(round(self.now_s * 1e9))
-        self.outbox.speech.append(speech)
+        self.outgoing.speech.append(speech)
         self.sentence = sentence
         _log.info("%.1f s: %s", self.now_s, sentence)
 
@@ -87,8 +87,8 @@ class Stage(ABC):
 
     stage: ApplicationStage.Stage = ApplicationStage.STAGE_UNSPECIFIED
 
-    def __init__(self, mind: Mind) -> None:
-        self.mind = mind
+    def __init__(self, app: ApplicationState) -> None:
+        self.app = app
         self.state = ""
         self._since_s = 0.0
 
@@ -106,12 +106,12 @@ class Stage(ABC):
 
     def go(self, state: str) -> None:
         """Change the state."""
-        self.state, self._since_s = state, self.mind.now_s
+        self.state, self._since_s = state, self.app.now_s
 
     @property
     def for_s(self) -> float:
         """How long this state has lasted, s."""
-        return self.mind.now_s - self._since_s
+        return self.app.now_s - self._since_s
 
 
 def cm(place: Place) -> str:

@@ -29,11 +29,11 @@ from .settings import default_folder as default_folder
 from .settings import lock_of as lock_of
 from .subscriber import Received as Received
 from .subscriber import Subscriber as Subscriber
+from .ticks import TICK_PERIOD_NS as TICK_PERIOD_NS
+from .ticks import Tick as Tick
 from .topics import CLOCK as CLOCK
 from .topics import HUMAN_ARM_POSE as HUMAN_ARM_POSE
 from .topics import TOPICS as TOPICS
 from .topics import Topic as Topic
-from .turns import TICK_PERIOD_NS as TICK_PERIOD_NS
-from .turns import Tick as Tick
 from .visitor import BusVisitor as BusVisitor
 from .visitor import say_now as say_now

@@ -26,7 +26,7 @@ from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
 from paramove.bus.subscriber import Received
-from paramove.bus.turns import TICK_PERIOD_NS
+from paramove.bus.ticks import TICK_PERIOD_NS
 from paramove.msgs.clock_pb2 import Clock, TickDone
 
 _log = logging.getLogger(__name__)

@@ -13,12 +13,12 @@ from typing import Any, Literal, overload
 
 from paramove.bus import topics
 from paramove.bus.exchange import Exchange, Marks
-from paramove.bus.lockstep import LockstepTurns, read_up_to
+from paramove.bus.lockstep import LockstepTicks, read_up_to
 from paramove.bus.settings import BusSettings
 from paramove.bus.status import StatusReporter
 from paramove.bus.subscriber import Received
+from paramove.bus.ticks import ExternalClock, RealTimeTicks, SimulatedTicks, Tick, TickSource
 from paramove.bus.topics import Topic
-from paramove.bus.turns import KeptTime, RealTimeTurns, SimulatedTurns, Tick, Turns
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 _log = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class Bus:
                 self.exchange.say(topic)
             for topic in subscribes:
                 self.hear(topic)
-            self._turns = self._source_of_time(topics.CLOCK in publishes)
+            self._ticks = self._source_of_time(topics.CLOCK in publishes)
         except BaseException:
             self.exchange.close()
             raise
@@ -82,7 +82,7 @@ class Bus:
     @property
     def now_ns(self) -> int:
         """Time of the bus clock: monotonic time of the machine, or simulated time since the start of the run."""
-        return self._turns.now_ns
+        return self._ticks.now_ns
 
     @property
     def taken_up(self) -> str:
@@ -138,7 +138,7 @@ class Bus:
         if topic.name not in self.exchange.publishers:
             said = ", ".join(sorted(self.exchange.publishers))
             raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to PUBLISHES")
-        if self._turns.may_say:
+        if self._ticks.may_say:
             self.say_at_once(topic, message, captured_ns)
         else:
             self._held.append((topic, message, captured_ns))
@@ -196,8 +196,8 @@ class Bus:
     def close(self) -> None:
         """Leaves the bus. Messages said just before still arrive."""
         self.exchange.stop()
-        if isinstance(self._turns, LockstepTurns):
-            self._turns.leave()
+        if isinstance(self._ticks, LockstepTicks):
+            self._ticks.leave()
         self.exchange.close()
 
     def idle(self, seconds: float) -> None:
@@ -233,21 +233,21 @@ class Bus:
 
     def keep_time(self, now_ns: int) -> None:
         """Sets the time, on the bus that says `clock`; raises RuntimeError on others or if time ran backwards."""
-        if not isinstance(self._turns, KeptTime):
+        if not isinstance(self._ticks, ExternalClock):
             raise RuntimeError(f"{self.node} does not say {topics.CLOCK.name}, so it cannot set the time")
-        if now_ns < self._turns.now_ns:
-            raise RuntimeError(f"time would run back from {self._turns.now_ns} ns to {now_ns} ns")
-        self._turns.now_ns = now_ns
+        if now_ns < self._ticks.now_ns:
+            raise RuntimeError(f"time would run back from {self._ticks.now_ns} ns to {now_ns} ns")
+        self._ticks.now_ns = now_ns
 
     def hold(self) -> None:
         """Keeps what is said from now on until `release`, on the bus that says `clock`."""
-        assert isinstance(self._turns, KeptTime)
-        self._turns.may_say = False
+        assert isinstance(self._ticks, ExternalClock)
+        self._ticks.may_say = False
 
     def release(self) -> None:
         """Says what was kept, and everything at once from now on."""
-        if isinstance(self._turns, KeptTime):
-            self._turns.may_say = True
+        if isinstance(self._ticks, ExternalClock):
+            self._ticks.may_say = True
         held, self._held = self._held, []
         for topic, message, captured_ns in held:
             self.say_at_once(topic, message, captured_ns)
@@ -266,12 +266,12 @@ class Bus:
     ) -> None:
         self.close()
 
-    def _source_of_time(self, says_clock: bool) -> Turns:
+    def _source_of_time(self, says_clock: bool) -> TickSource:
         if says_clock:
-            return KeptTime()
+            return ExternalClock()
         if self.settings.clock == "monotonic":
-            return RealTimeTurns(self.exchange)
-        return LockstepTurns(self.exchange, self.node) if self.settings.lockstep else SimulatedTurns(self.exchange)
+            return RealTimeTicks(self.exchange)
+        return LockstepTicks(self.exchange, self.node) if self.settings.lockstep else SimulatedTicks(self.exchange)
 
     def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Received | Tick]:
         names = {topic.name for topic in wanted}
@@ -315,12 +315,12 @@ class Bus:
         """Waits for the next turn; False once the bus was stopped."""
         self.exchange.housekeeping()
         self._trim_backlog()
-        turn = self._turns.next(self._heard)
+        turn = self._ticks.next(self._heard)
         if turn is None:
             return False
         self._backlog += turn.messages
         self._tick = turn.tick
-        if self._held and self._turns.may_say:
+        if self._held and self._ticks.may_say:
             self.release()
         return True
 

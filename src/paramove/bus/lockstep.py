@@ -26,7 +26,7 @@ from paramove.bus.endpoint import socket_path
 from paramove.bus.envelope import Envelope, pack, publisher_id
 from paramove.bus.exchange import Exchange, Marks
 from paramove.bus.schemas import schema_hash
-from paramove.bus.turns import LONGEST_WAIT_S, Tick, Turn
+from paramove.bus.ticks import LONGEST_WAIT_S, LoopTick, Tick
 from paramove.msgs.clock_pb2 import Clock, TickDone, TopicMark
 
 _log = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ def read_up_to(exchange: Exchange, marks: Marks, heard: list[str]) -> None:
         exchange.wait(HEALING_PERIOD_S)
 
 
-class LockstepTurns:
+class LockstepTicks:
     """Turns of a member."""
 
     def __init__(self, exchange: Exchange, node: str) -> None:
@@ -102,7 +102,7 @@ class LockstepTurns:
         self._shaken = False
         self._tick: int | None = None
 
-    def next(self, heard: list[str]) -> Turn | None:
+    def next(self, heard: list[str]) -> LoopTick | None:
         if self._tick is not None:
             self._answer(TickDone.KIND_DONE, self._tick)
             self._tick = None
@@ -124,7 +124,7 @@ class LockstepTurns:
                 continue
             self.may_say = True
             self._tick = beat.tick
-            return Turn(self._exchange.take_up_to(marks, heard), Tick(beat.tick, beat.time_ns))
+            return LoopTick(self._exchange.take_up_to(marks, heard), Tick(beat.tick, beat.time_ns))
         return None
 
     def leave(self) -> None:

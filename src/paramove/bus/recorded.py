@@ -15,8 +15,8 @@ from typing import Any
 from paramove.bus.settings import BusSettings
 from paramove.bus.soundness import unsound
 from paramove.bus.subscriber import Received
+from paramove.bus.ticks import TICK_PERIOD_NS, Tick
 from paramove.bus.topics import Topic
-from paramove.bus.turns import TICK_PERIOD_NS, Tick
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 from .core import TOUCHED as TOUCHED
 from .core import SafetyCore as SafetyCore
 from .gate_io import PERSON_STOP as PERSON_STOP
-from .gate_io import ArmWord as ArmWord
+from .gate_io import ArmingRequest as ArmingRequest
 from .gate_io import Clearance as Clearance
 from .gate_io import Fault as Fault
 from .gate_io import Inputs as Inputs

@@ -23,7 +23,7 @@ import numpy as np
 from paramove.documents import Floats
 from paramove.safety.accepted_rows import AcceptedRows
 from paramove.safety.gate_io import (
-    ArmWord,
+    ArmingRequest,
     Clearance,
     Fault,
     Inputs,
@@ -160,7 +160,7 @@ class SafetyCore:
         self._disarm_after_stop = False
         self._accepted.clear()
 
-    def _hear(self, now_ns: int, word: ArmWord, measured: Measured, inputs: Inputs) -> Targets | None:
+    def _hear(self, now_ns: int, word: ArmingRequest, measured: Measured, inputs: Inputs) -> Targets | None:
         if word.captured_ns <= self._heard_ns:
             return None
         # One from the future must not silence those to come.
@@ -184,7 +184,7 @@ class SafetyCore:
                 self._played = max(0, measured.next_index)
         return None
 
-    def _arming_faults(self, now_ns: int, inputs: Inputs, word: ArmWord, measured: Measured) -> list[Fault]:
+    def _arming_faults(self, now_ns: int, inputs: Inputs, word: ArmingRequest, measured: Measured) -> list[Fault]:
         """Every check that fails; none means that the gate may be armed."""
         faults = []
         # A word to arm counts only while the person who said it still looks; one to disarm always counts.

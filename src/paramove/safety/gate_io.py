@@ -46,7 +46,7 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class ArmWord:
+class ArmingRequest:
     """A word from outside to arm or disarm; not `by_person`: from a program."""
 
     captured_ns: int
@@ -78,7 +78,7 @@ class Inputs:
     """
 
     measured: Measured | None = None
-    word: ArmWord | None = None
+    word: ArmingRequest | None = None
     proposal: Proposal | None = None
     stop: Fault | None = None
     arming_faults: tuple[Fault, ...] = ()

@@ -13,7 +13,7 @@ from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationSet
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     ArmCalibration,
     CalibratedBus,
@@ -56,9 +56,9 @@ class Desk:
     def teach(self, steps, *words, name="set"):
         read, write = os.pipe()
         os.write(write, b"\n")
-        steps, look = iter(steps), LimpArm.measured
+        steps, look = iter(steps), TorqueOffArm.measured
 
-        def measured(limp):
+        def measured(torque_off):
             step = next(steps, None)
             if isinstance(step, Interrupt):
                 raise KeyboardInterrupt
@@ -71,12 +71,12 @@ class Desk:
                 os.write(write, step.encode())
             else:
                 self._lead(step)
-            return look(limp)
+            return look(torque_off)
 
         with self._patch.context() as patch, os.fdopen(read) as source:
             patch.setattr(arm_teach, "TerminalPerson", lambda: TerminalPerson(source))
             patch.setattr(arm_teach, "PERIOD_S", 0.002)
-            patch.setattr(LimpArm, "measured", measured)
+            patch.setattr(TorqueOffArm, "measured", measured)
             places = ["--by-id", self.folder / "by-id", "--data", self.folder / "data", "--robot", KOCH]
             texts = ["arm", "teach", self.folder / name, "--action", "reaching", *places, *words]
             done = CliRunner().invoke(build("arm"), [str(text) for text in texts])
@@ -157,7 +157,7 @@ def test_an_arm_that_has_to_be_calibrated_is(desk):
 
 
 def test_a_servo_that_falls_silent_ends_it_and_loses_nothing(desk, monkeypatch):
-    monkeypatch.setattr("paramove.robots.dynamixel.arm.limp_arm.GIVES_UP", 3)
+    monkeypatch.setattr("paramove.robots.dynamixel.arm.torque_off_arm.GIVES_UP", 3)
     desk.calibrate()
 
     def unplug():

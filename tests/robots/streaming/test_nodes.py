@@ -13,8 +13,8 @@ from nodes import arm_driver, operator
 from paramove.bus import topics
 from paramove.bus.settings import BusSettings
 from paramove.bus.subscriber import Received
+from paramove.bus.ticks import Tick
 from paramove.bus.topics import Topic
-from paramove.bus.turns import Tick
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.operator.arming_at_start import Operator

@@ -29,7 +29,7 @@ from paramove.supervision import QueuedOutput
 if TYPE_CHECKING:
     from paramove.demonstrations import KinestheticTeacher
     from paramove.robots import RobotDescription
-    from paramove.robots.dynamixel import LimpArm
+    from paramove.robots.dynamixel import TorqueOffArm
 
 PERIOD_S = 0.02
 KEYS = "space begins and ends a segment, d drops the last one, q ends"
@@ -59,7 +59,7 @@ def teach(
     """
     from paramove.demonstrations import KinestheticTeacher
     from paramove.robots import RobotDescription
-    from paramove.robots.dynamixel import FloatingArm, LimpArm
+    from paramove.robots.dynamixel import GravityCompensatedArm, TorqueOffArm
 
     with explained():
         description = RobotDescription.load(robot)
@@ -70,14 +70,14 @@ def teach(
     try:
         # After Ctrl-S, the servos must still get the currents that carry the arm.
         with QueuedOutput(), open_arm(by_id, serial, data, baud_rate) as arm:
-            limp = (FloatingArm if floats else LimpArm)(arm.chain, _of_this_arm(description, arm))
+            torque_off = (GravityCompensatedArm if floats else TorqueOffArm)(arm.chain, _of_this_arm(description, arm))
             person.until_done("Hold the arm, it becomes limp.", list)
             try:
-                limp.release()
+                torque_off.release()
                 person.tell(KEYS)
-                _lead(limp, teacher, person)
+                _lead(torque_off, teacher, person)
             finally:
-                for failed in limp.put_down():
+                for failed in torque_off.put_down():
                     typer.echo(printable(f"not switched off: {failed}"), err=True)
                 _tell_end(teacher, folder)
     except QuitError:
@@ -103,12 +103,12 @@ def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescriptio
     return replace(description, units=units)
 
 
-def _lead(limp: LimpArm, teacher: KinestheticTeacher, person: TerminalPerson) -> None:
+def _lead(torque_off: TorqueOffArm, teacher: KinestheticTeacher, person: TerminalPerson) -> None:
     """Until the person ends it. Raises QuitError."""
     due_s = time.monotonic()
     with person.pressing() as pressed:
         while True:
-            heard = limp.measured()
+            heard = torque_off.measured()
             if heard is not None:
                 teacher.hear(*heard)
             due_s = max(due_s + PERIOD_S, time.monotonic())

@@ -25,7 +25,7 @@ from paramove.robots.streaming.stream import StreamWriter
 from paramove.safety import (
     PERSON_STOP,
     TOUCHED,
-    ArmWord,
+    ArmingRequest,
     Clearance,
     Fault,
     Inputs,
@@ -102,7 +102,7 @@ class ArmDriver:
         self._begin_at(0)
         self._report: RobotReport | None = None
         self._reported = False
-        self._words: list[ArmWord] = []
+        self._words: list[ArmingRequest] = []
         self._asked: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
         self._person_stops: list[tuple[int, Fault]] = []
@@ -151,7 +151,7 @@ class ArmDriver:
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
         """Hear the arming request of a person or, for an emulated robot, of a program."""
-        self._words.append(ArmWord(captured_ns, message.source, message.armed, message.by_person))
+        self._words.append(ArmingRequest(captured_ns, message.source, message.armed, message.by_person))
 
     def on_stop(self, message: StopRequest, captured_ns: int) -> None:
         """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
@@ -196,7 +196,7 @@ class ArmDriver:
         self._ticks += 1
         self._judge_asked(stalled_s)
         self._judge_stops()
-        words: list[ArmWord | None] = [*self._words] or [None]
+        words: list[ArmingRequest | None] = [*self._words] or [None]
         self._words.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
         stop = self._stop or self._fault_of_stall(stalled_s) or self._fault_of_stream(now_ns)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from paramove.robots.description import RobotDescription
-from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
+from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.position_watch import NOISE, PositionWatch
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
@@ -114,7 +114,7 @@ def looks_at_faults(emulator, each: int, look) -> int:
 
 
 def test_no_joint_of_an_arm_that_is_led_has_anothers_angle(emulator, port):
-    arm = LimpArm(ServoChain(port), ROBOT)
+    arm = TorqueOffArm(ServoChain(port), ROBOT)
 
     def look():
         found = arm.measured()

@@ -10,8 +10,8 @@ from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.bus.servo_models import XL430_W250
 from paramove.robots.dynamixel.emulated.control import ControlSocket, tell
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.fault_commands import FaultCommands
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.verbs import EmulatorVerbs
 
 
 def echoed(line):
@@ -79,7 +79,7 @@ def test_what_a_killed_program_left_is_cleared_away_and_nothing_else(tmp_path):
 def test_verbs_come_through_it(tmp_path):
     with (
         DynamixelEmulator([EmulatedServo(XL430_W250, 1)]) as emulator,
-        ControlSocket(tmp_path / "control", EmulatorVerbs(emulator).do),
+        ControlSocket(tmp_path / "control", FaultCommands(emulator).do),
     ):
         assert tell(tmp_path / "control", "overload 1") == ""
         assert emulator.bus.servos[0].memory["Hardware Error Status"] == 0x20

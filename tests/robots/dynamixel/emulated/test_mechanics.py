@@ -29,14 +29,14 @@ def holding(arm, mode=3):
 
 
 def test_an_arm_without_torque_falls_and_with_torque_it_stays(tmp_path):
-    limp, held = Arm(tmp_path, XM430_W350), holding(Arm(tmp_path, XM430_W350))
-    for arm in (limp, held):
+    torque_off, held = Arm(tmp_path, XM430_W350), holding(Arm(tmp_path, XM430_W350))
+    for arm in (torque_off, held):
         arm.run(3.0)
-    assert limp.angle() == pytest.approx(-math.pi / 2, abs=0.05)
+    assert torque_off.angle() == pytest.approx(-math.pi / 2, abs=0.05)
     assert held.angle() == pytest.approx(0.0, abs=0.02)
     assert held.angle() < 0.0  # a P gain alone gives way a little
     assert held.servos[0].memory["Present Current"] > 5
-    assert limp.servos[0].memory["Present Current"] == 0
+    assert torque_off.servos[0].memory["Present Current"] == 0
 
 
 def test_a_hand_leads_a_limp_joint_against_its_weight_and_lets_it_fall(tmp_path):

@@ -127,17 +127,17 @@ class ServoArm:
         Returns:
             Why it did not work; then what had no torque before has none again.
         """
-        faults, limp, turns = [], [], []
+        faults, torque_off, turns = [], [], []
         for servo in self.servos:
             try:
                 torque = bool(self._chain.read(servo.number, self._registers["Torque Enable"]))
                 if not torque:
-                    limp.append(servo)
+                    torque_off.append(servo)
                 turns.append(servo.turns(self._hold(servo, torque)))
             except ServoError as error:
                 faults.append(Fault("servo_refused", servo.joint, f"{servo.joint} cannot hold: {error}"))
         if faults:
-            self._release(limp)
+            self._release(torque_off)
             return tuple(faults)
         self.holds, self._turns = True, turns
         for health in self.health.values():

@@ -18,9 +18,9 @@ from paramove.robots.dynamixel.bus.servo_memory import CURRENT_BASED_POSITION_MO
 from paramove.robots.dynamixel.bus.servo_models import model_named
 from paramove.robots.dynamixel.emulated.control import ControlSocket
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.fault_commands import FaultCommands
 from paramove.robots.dynamixel.emulated.mechanics import DrivenJoint, MujocoMechanics
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.verbs import EmulatorVerbs
 from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 
 
@@ -31,7 +31,7 @@ class EmulatedArm:
         robot: Its joints have servos; a motor's name is that of the servo's model.
         scene: World in which it stands, MJCF, or the name of a file beside the arm's own model.
         link: Name of the port; folders above it are made.
-        control: Where lines of `EmulatorVerbs` are taken; None: nowhere.
+        control: Where lines of `FaultCommands` are taken; None: nowhere.
         posture_deg: Of joints at the start; others begin in the base pose.
         seed: Of faults on the wire, when there are any.
         held: Whether the servos hold at the start, as a program before has left them; else the arm falls at once.
@@ -80,7 +80,7 @@ class EmulatedArm:
                     servo.hold()
             if self._control is not None:
                 names = dict(zip(self.robot.joint_names, self.robot.servo_ids, strict=True))
-                opened.enter_context(ControlSocket(self._control, EmulatorVerbs(self.emulator, names, self._joints).do))
+                opened.enter_context(ControlSocket(self._control, FaultCommands(self.emulator, names, self._joints).do))
             self._open = opened.pop_all()
         return self
 

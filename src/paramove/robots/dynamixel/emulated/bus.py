@@ -16,9 +16,9 @@ from paramove.robots.dynamixel.bus.packets import (
     encoded,
 )
 from paramove.robots.dynamixel.bus.servo_models import RAM_BEGINS
-from paramove.robots.dynamixel.emulated.judge import WireJudge
 from paramove.robots.dynamixel.emulated.loops import STEP_S
 from paramove.robots.dynamixel.emulated.mechanics import Mechanics
+from paramove.robots.dynamixel.emulated.protocol_checker import ProtocolChecker
 from paramove.robots.dynamixel.emulated.servo import Answer, EmulatedServo
 
 FOR_SEVERAL = {Instruction.SYNC_READ, Instruction.SYNC_WRITE, Instruction.BULK_READ, Instruction.BULK_WRITE}
@@ -51,7 +51,7 @@ class EmulatedBus:
         self.servos = list(servos)
         self.mechanics = mechanics
         self._chain = tuple(servos) if mechanics is not None else ()
-        self.judge = WireJudge(self.servos, servo_rules_only=servo_rules_only)
+        self.judge = ProtocolChecker(self.servos, servo_rules_only=servo_rules_only)
         self._reader = PacketReader()
         self.now_s = self._heard_s = 0.0
         self._baud_rate = 0

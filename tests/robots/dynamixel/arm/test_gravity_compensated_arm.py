@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from paramove.documents.input_error import InputError
-from paramove.robots.dynamixel.arm.floating_arm import ArmWeight, FloatingArm
-from paramove.robots.dynamixel.arm.limp_arm import LimpArm
+from paramove.robots.dynamixel.arm.gravity_compensated_arm import ArmWeight, GravityCompensatedArm
+from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from paramove.robots.dynamixel.bus.servo_memory import TRIPPED
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
@@ -56,7 +56,7 @@ def test_it_stays_where_it_is_left(tmp_path):
             assert memory["Bus Watchdog"] == 10
         assert emulated.emulator.bus.servos[ARM_JOINTS[1]].memory["Goal Current"] != 0
 
-    moved, memories = led(FloatingArm, tmp_path / "arm", look)
+    moved, memories = led(GravityCompensatedArm, tmp_path / "arm", look)
     assert moved < 0.15
     for place in ARM_JOINTS:
         assert memories[place]["Torque Enable"] == 0
@@ -65,7 +65,7 @@ def test_it_stays_where_it_is_left(tmp_path):
 
 
 def test_a_limp_one_falls(tmp_path):
-    assert led(LimpArm, tmp_path / "arm")[0] > 0.3
+    assert led(TorqueOffArm, tmp_path / "arm")[0] > 0.3
 
 
 def test_the_weight_is_the_slope_of_the_energy():
@@ -91,7 +91,7 @@ def test_servos_without_a_current_mode_are_told(tmp_path):
     with pytest.raises(
         InputError, match=r"shoulder_pan has a xl430_w250, which has no current mode: .* without --float"
     ):
-        FloatingArm(ServoChain(ServoPort("/dev/null", 1_000_000)), KOCH)
+        GravityCompensatedArm(ServoChain(ServoPort("/dev/null", 1_000_000)), KOCH)
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def floating(tmp_path):
         EmulatedArm(ROBOT, link=link, posture_deg=STRETCHED, held=True) as emulated,
         ServoPort(str(link), ROBOT.bus.baud_rate, ANSWERED_S) as port,
     ):
-        arm = FloatingArm(ServoChain(port), ROBOT)
+        arm = GravityCompensatedArm(ServoChain(port), ROBOT)
         arm.release()
         assert arm.measured() is not None
         port.latency_s = 0.05  # for the silence of a servo

@@ -26,7 +26,7 @@ ELSEWHERE = 700.0
 """Pulses by which a second servo of an id stands away from the first."""
 
 
-class EmulatorVerbs:
+class FaultCommands:
     """Does what a line says.
 
     Args:
@@ -80,10 +80,10 @@ class EmulatorVerbs:
         return joint.zero_counts + joint.counts_per_rad * angle
 
 
-def _each(change: Callable[[EmulatedServo, list[str]], None]) -> Callable[[EmulatorVerbs, list[str]], str]:
+def _each(change: Callable[[EmulatedServo, list[str]], None]) -> Callable[[FaultCommands, list[str]], str]:
     """A verb that does this to the servos that its first word names."""
 
-    def verb(verbs: EmulatorVerbs, words: list[str]) -> str:
+    def verb(verbs: FaultCommands, words: list[str]) -> str:
         for servo in verbs.servos(words[0]):
             change(servo, words[1:])
         return ""
@@ -99,7 +99,7 @@ def _free(servo: EmulatedServo, words: list[str]) -> None:
     servo.blocked, servo.hand = False, None
 
 
-def _lead(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _lead(verbs: FaultCommands, words: list[str]) -> str:
     degrees = _number(words[1])
     if abs(degrees) > FARTHEST_DEG:
         raise InputError(f"a joint is led to an angle of -{FARTHEST_DEG:g} to {FARTHEST_DEG:g} deg, found {words[1]}")
@@ -152,7 +152,7 @@ def _eeprom(servo: EmulatedServo, words: list[str]) -> None:
     servo.preset(" ".join(words[:-1]), int(value))
 
 
-def _voltage(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _voltage(verbs: FaultCommands, words: list[str]) -> str:
     volts = _number(words[0])
     if not 0.0 <= volts <= 60.0:
         raise InputError(f"a supply has 0 to 60 V, found {words[0]}")
@@ -161,18 +161,18 @@ def _voltage(verbs: EmulatorVerbs, words: list[str]) -> str:
     return ""
 
 
-def _duplicate(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _duplicate(verbs: FaultCommands, words: list[str]) -> str:
     like = verbs.servos(words[0])[0]
     model = model_named(words[1]) if len(words) > 1 else like.model
     verbs.emulator.bus.add(EmulatedServo(model, like.id, like.baud_rate, like.position + ELSEWHERE))
     return ""
 
 
-def _delay(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _delay(verbs: FaultCommands, words: list[str]) -> str:
     return _faults(verbs, [f"delay_s={1e-3 * _number(words[0])}"])
 
 
-def _faults(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _faults(verbs: FaultCommands, words: list[str]) -> str:
     """Those that are not named stay as they are; without any, none is left."""
     known = {one.name: one.type for one in fields(WireFaults)}
     values = asdict(verbs.emulator.faults) if words else {}
@@ -187,17 +187,17 @@ def _faults(verbs: EmulatorVerbs, words: list[str]) -> str:
     return ""
 
 
-def _unplug(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _unplug(verbs: FaultCommands, words: list[str]) -> str:
     verbs.emulator.unplug()
     return ""
 
 
-def _plug_in(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _plug_in(verbs: FaultCommands, words: list[str]) -> str:
     verbs.emulator.plug_in()
     return verbs.emulator.port
 
 
-def _state(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _state(verbs: FaultCommands, words: list[str]) -> str:
     """JSON: the port, each servo, and what the judge has counted."""
     shown = ("Present Position", "Goal Position", "Torque Enable", "Hardware Error Status", "Bus Watchdog")
     servos = []
@@ -212,7 +212,7 @@ def _state(verbs: EmulatorVerbs, words: list[str]) -> str:
     return json.dumps({"port": verbs.emulator.port, "servos": servos, "judge": found})
 
 
-def _findings(verbs: EmulatorVerbs, words: list[str]) -> str:
+def _findings(verbs: FaultCommands, words: list[str]) -> str:
     """JSON: what the judge found, and forgets."""
     judge = verbs.emulator.bus.judge
     told = json.dumps([asdict(finding) for finding in judge.findings])
@@ -230,7 +230,7 @@ def _number(word: str) -> float:
     return value
 
 
-VERBS: dict[str, tuple[str, Callable[[EmulatorVerbs, list[str]], str]]] = {
+VERBS: dict[str, tuple[str, Callable[[FaultCommands, list[str]], str]]] = {
     "block": ("block JOINT", _each(_block)),
     "lead": ("lead JOINT DEGREES", _lead),
     "free": ("free JOINT", _each(_free)),

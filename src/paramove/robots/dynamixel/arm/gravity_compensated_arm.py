@@ -9,8 +9,8 @@ import numpy as np
 
 from paramove.documents import Floats, InputError
 from paramove.robots import RobotDescription
-from paramove.robots.dynamixel.arm.limp_arm import LimpArm
 from paramove.robots.dynamixel.arm.servo_arm import WATCHDOG_UNIT_S
+from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoError
 from paramove.robots.dynamixel.bus.servo_memory import CURRENT_MODE
 from paramove.robots.dynamixel.bus.servo_models import model_named
@@ -39,7 +39,7 @@ class ArmWeight:
         return np.array(self._data.qfrc_bias[self._dof])
 
 
-class FloatingArm(LimpArm):
+class GravityCompensatedArm(TorqueOffArm):
     """As a limp arm, but every look at it renews the currents that carry its weight. The gripper is limp.
 
     A servo's torque is taken as proportional to its current, as from 0 to stall; friction holds what that misses.

@@ -55,7 +55,7 @@ class _Course:
     time_s: float
 
 
-class WireJudge:
+class ProtocolChecker:
     """Of all that arrives at some servos.
 
     Args:

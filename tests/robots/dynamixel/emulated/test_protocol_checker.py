@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paramove.robots.dynamixel.bus.packets import BROADCAST, Instruction, Packet, PacketReader, encoded
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.emulated.bus import EmulatedBus
-from paramove.robots.dynamixel.emulated.judge import MOST_FINDINGS, RATE_WINDOW_S, WireJudge
+from paramove.robots.dynamixel.emulated.protocol_checker import MOST_FINDINGS, RATE_WINDOW_S, ProtocolChecker
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 BAUD = 57600
@@ -22,7 +22,7 @@ def a_bus(servo_rules_only=False, **speeds):
     servos = [EmulatedServo(model, 1 + i) for i, model in enumerate(models)]
     bus = EmulatedBus(servos, servo_rules_only=servo_rules_only)
     if speeds:
-        bus.judge = WireJudge(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
+        bus.judge = ProtocolChecker(bus.servos, {int(name[1:]): speed for name, speed in speeds.items()})
     return bus
 
 
@@ -227,7 +227,7 @@ packets = st.builds(Packet, st.integers(0, 254), st.integers(0, 255), st.binary(
 @given(st.lists(packets | st.binary(max_size=12), max_size=8), st.lists(st.integers(1, 30), min_size=1, max_size=10))
 def test_every_byte_is_handed_on_once_and_sound_packets_one_at_a_time(said, sizes):
     data = b"".join(encoded(one) if isinstance(one, Packet) else one for one in said)
-    judge, out, at, turn = WireJudge([]), [], 0, 0
+    judge, out, at, turn = ProtocolChecker([]), [], 0, 0
     while at < len(data):
         out += judge.pieces(data[at : at + sizes[turn % len(sizes)]], 1.0)
         at, turn = at + sizes[turn % len(sizes)], turn + 1

@@ -14,7 +14,7 @@ GIVES_UP = 25
 """Looks in a row without an answer from a servo."""
 
 
-class LimpArm:
+class TorqueOffArm:
     """`release` its servos, then look where they are.
 
     Args:

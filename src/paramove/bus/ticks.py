@@ -38,14 +38,14 @@ class Tick:
 
 
 @dataclass
-class Turn:
+class LoopTick:
     """Messages, and the tick after them if there is one."""
 
     messages: list[Received]
     tick: Tick | None = None
 
 
-class Turns(Protocol):
+class TickSource(Protocol):
     """A source of time and turns."""
 
     @property
@@ -56,11 +56,11 @@ class Turns(Protocol):
     def may_say(self) -> bool:
         """Whether messages go out at once; otherwise the bus keeps them until the next turn."""
 
-    def next(self, heard: list[str]) -> Turn | None:
+    def next(self, heard: list[str]) -> LoopTick | None:
         """Waits for the next turn with these topics; None once the bus was stopped. Ends the turn before."""
 
 
-class RealTimeTurns:
+class RealTimeTicks:
     """Turns of the monotonic clock."""
 
     may_say = True
@@ -75,7 +75,7 @@ class RealTimeTurns:
         """Nanoseconds of the machine's monotonic clock."""
         return time.monotonic_ns()
 
-    def next(self, heard: list[str]) -> Turn | None:
+    def next(self, heard: list[str]) -> LoopTick | None:
         exchange = self._exchange
         while not exchange.stopped:
             exchange.drain(heard)
@@ -84,15 +84,15 @@ class RealTimeTurns:
             number = (now_ns - self._start_ns) // TICK_PERIOD_NS
             if number > self._number:  # ticks that were slept through are skipped
                 self._number = number
-                return Turn(messages, Tick(number, now_ns))
+                return LoopTick(messages, Tick(number, now_ns))
             if messages:
-                return Turn(messages)
+                return LoopTick(messages)
             due_ns = self._start_ns + (self._number + 1) * TICK_PERIOD_NS
             exchange.wait(max(0.0, (due_ns - now_ns) * 1e-9))
         return None
 
 
-class SimulatedTurns:
+class SimulatedTicks:
     """Turns of the topic `clock`, which is not waited for and does not wait."""
 
     may_say = True
@@ -102,7 +102,7 @@ class SimulatedTurns:
         self.now_ns = 0
         exchange.hear(topics.CLOCK)
 
-    def next(self, heard: list[str]) -> Turn | None:
+    def next(self, heard: list[str]) -> LoopTick | None:
         exchange = self._exchange
         while not exchange.stopped:
             exchange.drain([topics.CLOCK.name])  # first: what was said before a beat has then arrived, too
@@ -113,17 +113,17 @@ class SimulatedTurns:
                 self.now_ns = beat.message.time_ns
                 tick = Tick(beat.message.tick, self.now_ns)
             if messages or tick:
-                return Turn(messages, tick)
+                return LoopTick(messages, tick)
             exchange.wait(LONGEST_WAIT_S)
         return None
 
 
-class KeptTime:
+class ExternalClock:
     """The time of the process that says the clock: it has no turns, it makes them."""
 
     def __init__(self) -> None:
         self.now_ns = 0
         self.may_say = True
 
-    def next(self, heard: list[str]) -> Turn | None:
+    def next(self, heard: list[str]) -> LoopTick | None:
         raise RuntimeError("the process that says the clock hears with LockstepBarrier.advance, not with bus.events")

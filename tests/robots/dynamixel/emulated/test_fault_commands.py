@@ -9,8 +9,8 @@ from paramove.robots.dynamixel.bus.packets import ALERT, BROADCAST, Instruction,
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.emulated.body import HardwareError
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.robots.dynamixel.emulated.fault_commands import VERBS, FaultCommands
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
-from paramove.robots.dynamixel.emulated.verbs import VERBS, EmulatorVerbs
 from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 from tests.docs.markdown import ROOT, table
 
@@ -24,7 +24,7 @@ class Bench:
 
     def __init__(self, emulator):
         self.emulator, self.now_s = emulator, FAR_S
-        self.verbs = EmulatorVerbs(emulator, {"shoulder": 1, "elbow": 2})
+        self.verbs = FaultCommands(emulator, {"shoulder": 1, "elbow": 2})
         with emulator.lock:
             emulator.bus.begin(FAR_S)
 
