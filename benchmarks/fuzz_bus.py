@@ -1,4 +1,4 @@
-"""Throws damaged and made-up bytes at the envelope, at every decoder and at a subscriber; anything but a refusal fails.
+"""Throws damaged and random bytes at the envelope, at every decoder and at a subscriber; anything but a refusal fails.
 
     python benchmarks/fuzz_bus.py [--seconds 60] [--seed 0]
 

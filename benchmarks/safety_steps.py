@@ -43,7 +43,7 @@ MECHANICAL = 2.0
 
 
 def limits_at(dt_s: float) -> MotionLimits:
-    """Of a made-up arm: three joints of different speed."""
+    """Of a synthetic arm: three joints of different speed."""
     scale = np.array([1.0, 1.5, 3.0])
     return MotionLimits(
         NAMES,

@@ -1,4 +1,4 @@
-"""Random stalls of HOAP-3's feeder in made-up time: whenever the robot runs out of rows it must come to rest smoothly.
+"""Random stalls of HOAP-3's feeder in simulated time: whenever the robot runs out of rows it comes to rest smoothly.
 
     python benchmarks/stream_stalls.py [--patterns 1000000] [--seed 0]
 

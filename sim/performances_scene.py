@@ -13,9 +13,9 @@ import numpy as np
 
 from paramove.cameras import CalibratedCamera
 from paramove.documents import Floats
+from sim.body_markers import add_markers, mute
 from sim.human import Pattern, PersonLook, add_person, camera_frame
 from sim.persons.performances import Performance
-from sim.worn_markers import add_markers, mute
 
 WIDTH_PX, HEIGHT_PX = 320, 240
 MARGIN_PX = 16  # on each side, rendered beyond the image, which the lens may pull in

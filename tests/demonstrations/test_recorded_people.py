@@ -12,7 +12,7 @@ from paramove.demonstrations.recorded_people import (
     load_recordings,
     onset_of,
 )
-from tests.demonstrations.made_up_recordings import RIGHT_SHOULDER, table_places, write_pointing, write_table
+from tests.demonstrations.synthetic_recordings import RIGHT_SHOULDER, table_places, write_pointing, write_table
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from paramove.motion.reaching_file import check_reaching_model
 from paramove.motion.recorded_reaching import people_model, train_people_model
 from paramove.motion.relocation import RelocationPlanner
 from paramove.phmm import ModelFileError, PolynomialPHMM
-from tests.demonstrations.made_up_recordings import write_table
+from tests.demonstrations.synthetic_recordings import write_table
 from tests.motion.reaching import ARM, GRASP_Z, HOAP3, JOINTS, at, solver
 
 DATA = Path(os.environ.get("PARAMOVE_DATA") or Path(__file__).parents[3] / "shared" / "data")

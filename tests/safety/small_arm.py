@@ -1,4 +1,4 @@
-"""A made-up arm of three joints at 100 Hz, its gate, and what its driver says."""
+"""A synthetic arm of three joints at 100 Hz, its gate, and what its driver says."""
 
 from __future__ import annotations
 

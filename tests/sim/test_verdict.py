@@ -1,4 +1,4 @@
-"""What the judge calls a success, on made-up truth."""
+"""What the judge calls a success, on synthetic truth."""
 
 from __future__ import annotations
 

@@ -27,7 +27,6 @@ from .labelling import next_repetition as next_repetition
 from .labels import FILE_NAME as FILE_NAME
 from .labels import Segment as Segment
 from .labels import load_labels as load_labels
-from .made_up import synthetic_takes as synthetic_takes
 from .movement import AXIS_ENDINGS as AXIS_ENDINGS
 from .movement import DemonstrationError as DemonstrationError
 from .movement import Movement as Movement
@@ -75,6 +74,7 @@ from .synthetic import leaning as leaning
 from .synthetic import minimum_jerk as minimum_jerk
 from .synthetic import overreach as overreach
 from .synthetic import usual_elbow as usual_elbow
+from .synthetic_set import synthetic_takes as synthetic_takes
 from .timing import resampled as resampled
 from .writing import Label as Label
 from .writing import Take as Take

@@ -1,4 +1,4 @@
-"""Relocation by pointing is judged by the recorded truth: made-up runs of which the errors are known."""
+"""Relocation by pointing is judged by the recorded truth: synthetic runs of which the errors are known."""
 
 import json
 from dataclasses import replace
@@ -10,7 +10,7 @@ from paramove.runs import relocate_by_pointing
 from paramove.runs.recorded_run import load_run
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 from sim import small_person
-from tests.runs.made_up_relocations import GOOD, REFUSED, write_run
+from tests.runs.synthetic_relocations import GOOD, REFUSED, write_run
 
 FAR = replace(GOOD, final=(0.16, 0.013))
 

@@ -13,7 +13,7 @@ from studies.chapter6.report import typical, write_results
 from studies.chapter6.strips import certainty_colour, drawn
 from studies.chapter6.summary import summarised
 from studies.chapter6.tables import hand_table
-from tests.studies.chapter6.made_up_tracks import act, result
+from tests.studies.chapter6.synthetic_tracks import act, result
 
 DUAL = ((0.2, 0.1, 0.07), (0.0, -0.2, 0.07))
 ACTS = {

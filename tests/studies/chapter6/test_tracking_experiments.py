@@ -20,7 +20,7 @@ from studies.chapter6.experiments import ClipsMissingError, Piece, Selection, pi
 from studies.chapter6.measures import Track
 from studies.chapter6.report import write_results
 from studies.chapter6.vocabularies import ACTIONS, knowledge_of, on_far_plane
-from tests.studies.chapter6.made_up_tracks import act, true_hand
+from tests.studies.chapter6.synthetic_tracks import act, true_hand
 
 FRAMES = 12
 

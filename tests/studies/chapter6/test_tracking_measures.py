@@ -6,7 +6,7 @@ import pytest
 from studies.chapter6.goals import goals_of
 from studies.chapter6.measures import Track
 from studies.chapter6.summary import accuracy, dual, quantile, recognition, summarised
-from tests.studies.chapter6.made_up_tracks import CAMERA, act, detection, result
+from tests.studies.chapter6.synthetic_tracks import CAMERA, act, detection, result
 
 
 def off_between(first_s, last_s, by=(0.3, 0.0, 0.0)):

@@ -9,7 +9,7 @@ from paramove.documents.array_types import Floats
 from paramove.hmm import resample
 from studies.movements.method import BEGINNINGS, CLASSES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
 from studies.movements.tasks import Fold, real_tasks
-from tests.demonstrations.made_up_recordings import write_pointing, write_table
+from tests.demonstrations.synthetic_recordings import write_pointing, write_table
 
 
 class MeanPath(NotAble):

@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from studies.__main__ import app
-from tests.demonstrations.made_up_recordings import write_pointing, write_table
+from tests.demonstrations.synthetic_recordings import write_pointing, write_table
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 
 from paramove.demonstrations.recorded_people import RecordingsError
 from studies.movements.tasks import Fold, corner_targets, raster_tasks, real_tasks
-from tests.demonstrations.made_up_recordings import write_table
+from tests.demonstrations.synthetic_recordings import write_table
 
 
 def test_all_tasks_follow_from_the_folder(tasks: dict[str, list[Fold]]) -> None:

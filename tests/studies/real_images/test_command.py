@@ -9,7 +9,7 @@ from studies.__main__ import app
 from studies.real_images import experiment, report, scores
 from studies.real_images.replay import ReplayedEstimate
 from studies.real_images.seated_person import camera
-from tests.studies.real_images.made_up import true_poses, write_recording
+from tests.studies.real_images.synthetic_recording import true_poses, write_recording
 
 
 def run(*arguments):

@@ -5,7 +5,7 @@ import pytest
 
 from paramove.demonstrations.synthetic import RESTING_SHOULDER
 from studies.real_images import pointing_model, seated_person
-from tests.studies.real_images.made_up import write_lens
+from tests.studies.real_images.synthetic_recording import write_lens
 
 
 @pytest.fixture(scope="module")

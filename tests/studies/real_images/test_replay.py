@@ -17,7 +17,7 @@ from studies.real_images.experiment import (
 from studies.real_images.report import write_report
 from studies.real_images.scores import GOAL_PX, RANGES, read_reference
 from studies.real_images.seated_person import camera
-from tests.studies.real_images.made_up import write_recording
+from tests.studies.real_images.synthetic_recording import write_recording
 
 
 @pytest.fixture(scope="module")

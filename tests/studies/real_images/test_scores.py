@@ -14,7 +14,7 @@ from studies.real_images.scores import (
     read_reference,
 )
 from studies.real_images.seated_person import SIZES, resting_pose
-from tests.studies.real_images.made_up import write_lens
+from tests.studies.real_images.synthetic_recording import write_lens
 
 
 def found(middle, frames=None):

@@ -7,7 +7,7 @@ import pytest
 
 from paramove.documents.input_error import InputError
 from studies.real_images import seated_person
-from tests.studies.real_images.made_up import write_lens
+from tests.studies.real_images.synthetic_recording import write_lens
 
 
 def test_the_lens_is_stored_column_by_column(tmp_path):

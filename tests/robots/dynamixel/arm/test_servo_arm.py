@@ -237,7 +237,7 @@ def test_the_loop_does_not_wait_for_an_arm_that_is_silent(arm, emulator, port, m
         assert arm.fault_of_answers(reading).code == "joint_silent"
 
 
-def test_nothing_is_made_up_for_a_joint_that_was_never_heard(arm, emulator, port):
+def test_no_angle_is_invented_for_a_joint_that_was_never_heard(arm, emulator, port):
     change(emulator, 2, "ID", 9)
     port.latency_s = 0.03
     assert arm.measured() is None

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from paramove.observation.body_tracking import BodyTrackingSetup
+from sim.body_markers import muted
 from sim.pointing_world import PointingWorld
-from sim.worn_markers import muted
 
 MARKERS = {
     "elbow": {"hue_deg": (95.0, 155.0), "saturation": 0.5},
