@@ -45,7 +45,7 @@ from paramove.robots.dynamixel import (
     Instruction,
     LoopSettings,
     Packet,
-    Patience,
+    Timeouts,
     emulated_servos,
     encoded,
     joint_servos,
@@ -61,7 +61,7 @@ PATIENT_S = 10.0
 LOOP_S = 10.0
 READS, SDK_TIMEOUT_MS = 4800, 34.0
 """ROBOTIS's SDK waits so long for an answer: twice 16 ms and 2."""
-BUSY = Patience(silent_s=0.25, read_s=0.1)
+BUSY = Timeouts(silent_s=0.25, read_s=0.1)
 """For what does not measure silence: other programs may take the processors for a while."""
 
 
@@ -147,13 +147,13 @@ class Rig:
 
 
 @contextmanager
-def rig(description: RobotDescription, folder: Path, patience: Patience = BUSY) -> Any:
+def rig(description: RobotDescription, folder: Path, timeouts: Timeouts = BUSY) -> Any:
     """A rig at the description's baud rate; ends with the arm at rest."""
     with tempfile.TemporaryDirectory() as place:
         link = Path(place) / "usb-emulated_0001-if00-port0"
         emulation = Emulation(folder, description.bus.baud_rate, link)
         port = servo_port(description, str(link))
-        with DrivenArm(description, joint_servos(description), port, LoopSettings(patience=patience)) as arm:
+        with DrivenArm(description, joint_servos(description), port, LoopSettings(timeouts=timeouts)) as arm:
             yield Rig(arm, emulation, description)
         emulation.end()
 
@@ -202,7 +202,7 @@ def command_loss_ms(description: RobotDescription, folder: Path, trials: int) ->
 def unplugged_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """The plug is pulled; until the gate lets nothing pass any more."""
     found = []
-    with rig(description, folder, Patience()) as here:
+    with rig(description, folder, Timeouts()) as here:
         for _ in range(trials):
             here.arms()
             here.moves()
@@ -234,7 +234,7 @@ def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[
 
 def drive(description: RobotDescription, port: str) -> None:
     """What is killed: moves the arm, and says so."""
-    settings = LoopSettings(patience=BUSY)
+    settings = LoopSettings(timeouts=BUSY)
     with DrivenArm(description, joint_servos(description), servo_port(description, port), settings) as arm:
         wait(lambda: arm._loop.driver.state is State.DISARMED)
         arm.on_arm_request(ArmRequest(source="benchmark", armed=True, by_person=True), time.monotonic_ns())

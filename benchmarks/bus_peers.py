@@ -18,7 +18,7 @@ from typing import Any
 PAYLOAD_BYTES = 216
 PERIOD_NS = 1_000_000
 NAME = "bus_benchmark"
-PATIENCE_S = 5.0
+TIMEOUT_S = 5.0
 
 Go = Callable[[], None]
 
@@ -57,7 +57,7 @@ class Arrivals:
     @property
     def complete(self) -> bool:
         """Whether all have come, or none for five seconds."""
-        return self._done.is_set() or time.monotonic() - self._newest_s > PATIENCE_S
+        return self._done.is_set() or time.monotonic() - self._newest_s > TIMEOUT_S
 
     def wait(self) -> list[int]:
         self._newest_s = time.monotonic()

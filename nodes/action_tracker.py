@@ -1,11 +1,11 @@
 """Action tracker: follows a person's right arm in the images of calibrated cameras, and where it points.
 
-Hears   camera_1/image, camera_2/image,
-        camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
-Says    action/estimate                   ActionEstimate              15 Hz   table, or that of `table_place`
-        human/arm_pose                    ArmPose                     15 Hz   table
-        action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
-        action/scene                      foxglove.SceneUpdate        15 Hz   table, or that of `table_place`
+Subscribes  camera_1/image, camera_2/image,
+            camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
+Publishes   action/estimate                   ActionEstimate              15 Hz   table, or that of `table_place`
+            human/arm_pose                    ArmPose                     15 Hz   table
+            action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
+            action/scene                      foxglove.SceneUpdate        15 Hz   table, or that of `table_place`
 """
 
 from paramove.action_space import TrackingSetup, arm_pose_message, estimate_message, outline_message, scene_message

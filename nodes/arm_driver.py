@@ -1,15 +1,15 @@
 """Arm driver: plays trajectories on HOAP-3 through the safety gate, and says where its joints are.
 
-Hears   arm/trajectory         JointTrajectory        events
-        operator/arm           ArmRequest             events, latched
-        operator/arm_at_start  ArmRequest             events, latched
-        operator/stop          StopRequest            events, latched
-        operator/estop         StopRequest            events, latched
-        wire/hoap3/state       Hoap3State             15 Hz   joint units
-Says    wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
-        arm/joint_states       foxglove.JointStates   15 Hz   rad
-        arm/trajectory_status  TrajectoryStatus       events
-        arm/safety             SafetyState            15 Hz, latched
+Subscribes  arm/trajectory         JointTrajectory        events
+            operator/arm           ArmRequest             events, latched
+            operator/arm_at_start  ArmRequest             events, latched
+            operator/stop          StopRequest            events, latched
+            operator/estop         StopRequest            events, latched
+            wire/hoap3/state       Hoap3State             15 Hz   joint units
+Publishes   wire/hoap3/stream      StreamBatch            15 Hz while moving, joint units
+            arm/joint_states       foxglove.JointStates   15 Hz   rad
+            arm/trajectory_status  TrajectoryStatus       events
+            arm/safety             SafetyState            15 Hz, latched
 """
 
 from pathlib import Path

@@ -1,10 +1,10 @@
 """Body tracker: finds the marked points of a person's right arm in space, in the images of calibrated cameras.
 
-Hears   camera_1/image, camera_2/image,
-        camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
-Says    human/arm_pose                    ArmPose                     15 Hz   table
-        action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
-        action/scene                      foxglove.SceneUpdate        15 Hz   table
+Subscribes  camera_1/image, camera_2/image,
+            camera_3/image, camera_4/image    foxglove.CompressedImage    15 Hz   camera_1 … camera_4
+Publishes   human/arm_pose                    ArmPose                     15 Hz   table
+            action/outline                    foxglove.ImageAnnotations   15 Hz   camera_1
+            action/scene                      foxglove.SceneUpdate        15 Hz   table
 """
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics

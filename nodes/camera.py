@@ -1,7 +1,7 @@
 """Camera: reads frames from a camera, a file or a topic, checks them and says them compressed.
 
-Hears   camera/light   foxglove.RawImage          15 Hz   camera_optical   only with source topic:camera/light
-Says    camera/image   foxglove.CompressedImage   15 Hz   camera_optical
+Subscribes  camera/light   foxglove.RawImage          15 Hz   camera_optical   only with source topic:camera/light
+Publishes   camera/image   foxglove.CompressedImage   15 Hz   camera_optical
 """
 
 from pydantic import Field

@@ -1,7 +1,7 @@
 """Colour tracker: finds the coloured objects and the hand in each camera frame.
 
-Hears   camera/image     foxglove.CompressedImage   15 Hz   camera_optical
-Says    objects/tracked  TrackedObjects             15 Hz   image plane, pixels
+Subscribes  camera/image     foxglove.CompressedImage   15 Hz   camera_optical
+Publishes   objects/tracked  TrackedObjects             15 Hz   image plane, pixels
 """
 
 from paramove.bus import Bus, NodeConfig, main, topics

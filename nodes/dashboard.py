@@ -1,8 +1,8 @@
 """Dashboard: shows the running application on a page in the browser, on this machine only, with a stop button.
 
-Hears   camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech, relocation/goal,
-        relocation/status, arm/joint_states, arm/safety, action/outline, and the status of every node
-Says    operator/stop   StopRequest   when a person presses stop
+Subscribes  camera/image, objects/tracked, gestures, calibration/plane, rules, application/stage, speech,
+            relocation/goal, relocation/status, arm/joint_states, arm/safety, action/outline, every node's status
+Publishes   operator/stop   StopRequest   when a person presses stop
 """
 
 from pathlib import Path

@@ -1,7 +1,7 @@
 """Operator: arms the safety gate of an emulated robot once at the start. With `real: true` it refuses to start.
 
-Hears   arm/safety              SafetyState   15 Hz, latched
-Says    operator/arm_at_start   ArmRequest    until armed, latched
+Subscribes  arm/safety              SafetyState   15 Hz, latched
+Publishes   operator/arm_at_start   ArmRequest    until armed, latched
 """
 
 from pydantic import field_validator

@@ -1,10 +1,10 @@
 """Reacher: does a list of tasks with a servo arm by the learned reaching, one after the other, and ends.
 
-Hears   arm/joint_states        foxglove.JointStates    15 Hz   rad
-        arm/safety              SafetyState             15 Hz, latched
-        arm/trajectory_status   TrajectoryStatus        event
-Says    arm/trajectory          JointTrajectory         event   rad
-        speech                  Speech                  event
+Subscribes  arm/joint_states        foxglove.JointStates    15 Hz   rad
+            arm/safety              SafetyState             15 Hz, latched
+            arm/trajectory_status   TrajectoryStatus        event
+Publishes   arm/trajectory          JointTrajectory         event   rad
+            speech                  Speech                  event
 """
 
 from pathlib import Path

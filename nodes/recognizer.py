@@ -1,11 +1,11 @@
 """Recognizer: tells what happens on the table, from tracked objects, and where a tracked arm points.
 
-Hears   objects/tracked     TrackedObjects     15 Hz   image plane, pixels
-        calibration/plane   PlaneCalibration   event   right_shoulder
-        action/estimate     ActionEstimate     15 Hz   table
-        human/arm_pose      ArmPose            event   table
-Says    gestures            Gesture            event   pixels, and metres once calibrated
-        gestures/scene      SceneUpdate        15 Hz   table; the ball where arm poses point
+Subscribes  objects/tracked     TrackedObjects     15 Hz   image plane, pixels
+            calibration/plane   PlaneCalibration   event   right_shoulder
+            action/estimate     ActionEstimate     15 Hz   table
+            human/arm_pose      ArmPose            event   table
+Publishes   gestures            Gesture            event   pixels, and metres once calibrated
+            gestures/scene      SceneUpdate        15 Hz   table; the ball where arm poses point
 """
 
 from paramove.bus import Bus, NodeConfig, main, topics

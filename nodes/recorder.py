@@ -2,7 +2,7 @@
 
 When its process is started again, or the disk was full, it goes on in `recording.2.mcap`, ….
 
-Hears   every topic that the topic table marks as recorded
+Subscribes  every topic that the topic table marks as recorded
 """
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics

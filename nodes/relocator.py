@@ -1,12 +1,12 @@
 """Relocator: holds an object, puts it where a person points, fetches it again and waits for the next place.
 
-Hears   gestures             Gesture            event    right_shoulder
-        action/estimate      ActionEstimate     15 Hz    right_shoulder
-        relocation/status    RelocationStatus   event
-        arm/safety           SafetyState        15 Hz, latched
-Says    relocation/goal      RelocationGoal     event    right_shoulder
-        application/stage    ApplicationStage   1 Hz
-        speech               Speech             event
+Subscribes  gestures             Gesture            event    right_shoulder
+            action/estimate      ActionEstimate     15 Hz    right_shoulder
+            relocation/status    RelocationStatus   event
+            arm/safety           SafetyState        15 Hz, latched
+Publishes   relocation/goal      RelocationGoal     event    right_shoulder
+            application/stage    ApplicationStage   1 Hz
+            speech               Speech             event
 """
 
 from paramove.applications import Relocator, RelocatorOptions

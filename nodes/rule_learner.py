@@ -1,13 +1,13 @@
 """Rule learner: calibrates the camera with the robot's own hand, watches the rules, and applies them.
 
-Hears   gestures             Gesture            event    pixels, and metres once calibrated
-        relocation/status    RelocationStatus   event
-        arm/safety           SafetyState        15 Hz, latched
-Says    relocation/goal      RelocationGoal     event    right_shoulder
-        calibration/plane    PlaneCalibration   event    right_shoulder
-        rules                Rules              event    right_shoulder
-        application/stage    ApplicationStage   1 Hz
-        speech               Speech             event
+Subscribes  gestures             Gesture            event    pixels, and metres once calibrated
+            relocation/status    RelocationStatus   event
+            arm/safety           SafetyState        15 Hz, latched
+Publishes   relocation/goal      RelocationGoal     event    right_shoulder
+            calibration/plane    PlaneCalibration   event    right_shoulder
+            rules                Rules              event    right_shoulder
+            application/stage    ApplicationStage   1 Hz
+            speech               Speech             event
 """
 
 from paramove.applications import Pointing, RuleLearner, RuleLearnerOptions, Surface
@@ -20,13 +20,15 @@ PUBLISHES = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, top
 class Config(NodeConfig):
     """Places in the right shoulder's frame, m; the rest: see `RuleLearnerOptions`."""
 
+    old_names = (("arm_patience_s", "arming_timeout_s"),)
+
     objects: tuple[str, ...] = ("yellow", "green", "blue")
     corners: tuple[tuple[float, float], ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
     offer: tuple[float, float, float] = (0.155, -0.02, -0.05)
     grasp_z: float = -0.098
     surface_x: tuple[float, float] = (0.100, 0.240)
     surface_y: tuple[float, float] = (-0.170, 0.130)
-    arm_patience_s: float = 10.0
+    arming_timeout_s: float = 10.0
     pointing: Pointing = "nearness"
 
 

@@ -1,15 +1,15 @@
 """Servo arm driver: plays trajectories on an arm of Dynamixel servos through the safety gate, and says how it fares.
 
-Hears   arm/trajectory          JointTrajectory        events
-        operator/arm            ArmRequest             events, latched
-        operator/arm_at_start   ArmRequest             events, latched
-        operator/stop           StopRequest            events, latched
-        operator/estop          StopRequest            events, latched
-Says    arm/joint_states        foxglove.JointStates   15 Hz   rad
-        arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
-        arm/trajectory_status   TrajectoryStatus       events
-        arm/safety              SafetyState            15 Hz, latched
-        arm/motors              MotorStatus            1 Hz
+Subscribes  arm/trajectory          JointTrajectory        events
+            operator/arm            ArmRequest             events, latched
+            operator/arm_at_start   ArmRequest             events, latched
+            operator/stop           StopRequest            events, latched
+            operator/estop          StopRequest            events, latched
+Publishes   arm/joint_states        foxglove.JointStates   15 Hz   rad
+            arm/joint_states/fast   foxglove.JointStates   100 Hz  rad
+            arm/trajectory_status   TrajectoryStatus       events
+            arm/safety              SafetyState            15 Hz, latched
+            arm/motors              MotorStatus            1 Hz
 """
 
 from paramove.bus import Bus, NodeConfig, Tick, main, topics

@@ -1,10 +1,10 @@
 """Synthesizer: turns relocation goals into trajectories of the learned reaching movement.
 
-Hears   relocation/goal         RelocationGoal          event   right_shoulder
-        arm/joint_states        foxglove.JointStates    15 Hz   rad
-        arm/trajectory_status   TrajectoryStatus        event
-Says    arm/trajectory          JointTrajectory         event   rad
-        relocation/status       RelocationStatus        event
+Subscribes  relocation/goal         RelocationGoal          event   right_shoulder
+            arm/joint_states        foxglove.JointStates    15 Hz   rad
+            arm/trajectory_status   TrajectoryStatus        event
+Publishes   arm/trajectory          JointTrajectory         event   rad
+            relocation/status       RelocationStatus        event
 """
 
 from pathlib import Path

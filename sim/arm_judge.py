@@ -1,6 +1,6 @@
 """Arm judge: records how the person's arm really is, for the report after the run.
 
-Hears   truth/arm   TruthArm   15 Hz   table
+Subscribes  truth/arm   TruthArm   15 Hz   table
 
 Writes `truth.mcap` into the run folder, and goes on in `truth.2.mcap`, … when its process is started again.
 """

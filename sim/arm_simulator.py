@@ -1,16 +1,16 @@
 """Simulator with an instructor who is a whole arm: `sim.simulator`, and what two calibrated cameras see of that arm.
 
-Hears   wire/hoap3/stream   StreamBatch         events  joint units
-        speech              Speech              events
-Says    clock               Clock               15 Hz
-        camera/light        foxglove.RawImage   15 Hz   camera_optical
-        camera_1/light,
-        camera_2/light      foxglove.RawImage   15 Hz, or a part of it   camera_1, camera_2
-        wire/hoap3/state    Hoap3State          15 Hz   joint units
-        truth/layout        TruthLayout         once, latched   world; only for evaluators
-        truth/state         TruthState          15 Hz   world; only for evaluators
-        truth/arm           TruthArm            15 Hz   table; only for evaluators
-        truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
+            speech              Speech              events
+Publishes   clock               Clock               15 Hz
+            camera/light        foxglove.RawImage   15 Hz   camera_optical
+            camera_1/light,
+            camera_2/light      foxglove.RawImage   15 Hz, or a part of it   camera_1, camera_2
+            wire/hoap3/state    Hoap3State          15 Hz   joint units
+            truth/layout        TruthLayout         once, latched   world; only for evaluators
+            truth/state         TruthState          15 Hz   world; only for evaluators
+            truth/arm           TruthArm            15 Hz   table; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`, in the table frame of
 `sim.small_person`.

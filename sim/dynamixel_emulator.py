@@ -1,6 +1,6 @@
 """Dynamixel emulator: stands where the servos of an arm stand, behind a serial port, in a world that they move.
 
-Says    truth/state   TruthState   15 Hz   world; only for evaluators
+Publishes   truth/state   TruthState   15 Hz   world; only for evaluators
 """
 
 from pathlib import Path

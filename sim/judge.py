@@ -1,8 +1,8 @@
 """Judge: records the truth of a simulated run and says at its end whether the robot did what it should.
 
-Hears   truth/layout   TruthLayout         once, latched   world
-        truth/state    TruthState          15 Hz           world
-        truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
+Subscribes  truth/layout   TruthLayout         once, latched   world
+            truth/state    TruthState          15 Hz           world
+            truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
 
 Writes `truth.mcap` (the view as JPEG) and `truth.json` (the verdict, renewed every few seconds) into the run folder.
 When its process is started again it goes on in `truth.2.mcap`, ….

@@ -1,15 +1,15 @@
 """Simulator of relocation by pointing: `sim.arm_simulator` with one object, and a person who points at free places.
 
-Hears   wire/hoap3/stream   StreamBatch         events  joint units
-        speech              Speech              events
-Says    clock               Clock               15 Hz
-        camera_1/light,
-        camera_2/light      foxglove.RawImage   15 Hz   camera_1, camera_2
-        wire/hoap3/state    Hoap3State          15 Hz   joint units
-        truth/layout        TruthLayout         once, latched   world; only for evaluators
-        truth/state         TruthState          15 Hz   world; only for evaluators
-        truth/arm           TruthArm            15 Hz   table; only for evaluators
-        truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
+            speech              Speech              events
+Publishes   clock               Clock               15 Hz
+            camera_1/light,
+            camera_2/light      foxglove.RawImage   15 Hz   camera_1, camera_2
+            wire/hoap3/state    Hoap3State          15 Hz   joint units
+            truth/layout        TruthLayout         once, latched   world; only for evaluators
+            truth/state         TruthState          15 Hz   world; only for evaluators
+            truth/arm           TruthArm            15 Hz   table; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`, in the table frame of
 `sim.small_person`.

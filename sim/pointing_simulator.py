@@ -1,9 +1,9 @@
 """Pointing simulator: the light that a person at a table, who points, throws on calibrated cameras.
 
-Says    clock                             Clock               15 Hz
-        camera_1/light, camera_2/light,
-        camera_3/light, camera_4/light    foxglove.RawImage   15 Hz   camera_1 … camera_4
-        truth/arm                         TruthArm            15 Hz   table; only for evaluators
+Publishes   clock                             Clock               15 Hz
+            camera_1/light, camera_2/light,
+            camera_3/light, camera_4/light    foxglove.RawImage   15 Hz   camera_1 … camera_4
+            truth/arm                         TruthArm            15 Hz   table; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`.
 """

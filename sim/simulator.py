@@ -1,13 +1,13 @@
 """Simulator: stands where the hardware stands. It is the light on the camera's sensor and the robot's motors.
 
-Hears   wire/hoap3/stream   StreamBatch         events  joint units
-        speech              Speech              events
-Says    clock               Clock               15 Hz
-        camera/light        foxglove.RawImage   15 Hz   camera_optical
-        wire/hoap3/state    Hoap3State          15 Hz   joint units
-        truth/layout        TruthLayout         once, latched   world; only for evaluators
-        truth/state         TruthState          15 Hz   world; only for evaluators
-        truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
+            speech              Speech              events
+Publishes   clock               Clock               15 Hz
+            camera/light        foxglove.RawImage   15 Hz   camera_optical
+            wire/hoap3/state    Hoap3State          15 Hz   joint units
+            truth/layout        TruthLayout         once, latched   world; only for evaluators
+            truth/state         TruthState          15 Hz   world; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
 """
 
 from __future__ import annotations

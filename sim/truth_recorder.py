@@ -1,9 +1,9 @@
 """Truth recorder: records the truth of a simulated run, for the report after it.
 
-Hears   truth/layout   TruthLayout         once, latched   world
-        truth/state    TruthState          15 Hz           world
-        truth/arm      TruthArm            15 Hz           table
-        truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
+Subscribes  truth/layout   TruthLayout         once, latched   world
+            truth/state    TruthState          15 Hz           world
+            truth/arm      TruthArm            15 Hz           table
+            truth/view     foxglove.RawImage   15 Hz           if the simulator renders it
 
 Writes `truth.mcap` (the view as JPEG) into the run folder, and goes on in `truth.2.mcap`, … when its process is started
 again.

@@ -26,7 +26,7 @@ from studies.movements.method import Method
 from studies.movements.tasks import Fold
 from studies.movements.trial import able, measure
 
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 """How long a cluster's scheduler may take to answer."""
 
 
@@ -199,7 +199,7 @@ def _cluster(scheduler: str | None) -> Iterator[None]:
         ) from error
     joblib = importlib.import_module("joblib")
     try:
-        client = distributed.Client(scheduler, timeout=PATIENCE_S, set_as_default=True)
+        client = distributed.Client(scheduler, timeout=TIMEOUT_S, set_as_default=True)
     except (OSError, ValueError) as error:
         raise ClusterMissingError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client, joblib.parallel_config(backend="dask"):

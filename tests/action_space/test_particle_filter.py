@@ -60,11 +60,11 @@ def test_tempering_takes_impossible_particles():
     assert tempering(np.full(4, 0.25), log_likelihoods, 1.5) == 1.0
 
 
-@pytest.mark.parametrize("select_below", [0.5, 1.0])
-def test_filter_equals_the_exact_posterior(select_below):
+@pytest.mark.parametrize("resample_below", [0.5, 1.0])
+def test_filter_equals_the_exact_posterior(resample_below):
     """Theta and the carried deviation are linear and Gaussian here: the Kalman filter is exact."""
     toy = KalmanToy(seed=2)
-    filter_ = toy.particle_filter(FilterOptions(30_000, select_below, least_effective=0.0), seed=5)
+    filter_ = toy.particle_filter(FilterOptions(30_000, resample_below, least_effective=0.0), seed=5)
     for elapsed_s, seen in toy.frames(12):
         filter_.select()
         filter_.predict(elapsed_s)

@@ -421,7 +421,7 @@ def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
     learner.on_safety(
         safety(SafetyState.STATE_HOLD, "the robot ran out of rows after 7 of 9 rows and stops; arm again")
     )
-    story.run(OPTIONS.arm_patience_s - 0.5)
+    story.run(OPTIONS.arming_timeout_s - 0.5)
     assert learner.failure == ""
     assert len(story.goals) == goals, "without an arm nothing is asked of it"
     (told,) = [speech.sentence for speech in story.speech if "cannot go on" in speech.sentence]
@@ -447,7 +447,7 @@ def test_an_arm_that_is_armed_again_in_time_goes_on(state: SafetyState.State) ->
     story.learner.on_safety(safety(SafetyState.STATE_ARMED))
     story.run_to(ApplicationStage.STAGE_LEARN)
     story.learner.on_safety(safety(state, "stopped by a person"))
-    story.run(OPTIONS.arm_patience_s - 1.0)
+    story.run(OPTIONS.arming_timeout_s - 1.0)
     story.learner.on_safety(safety(SafetyState.STATE_ARMED))
     assert story.run()
     assert story.learner.failure == ""
@@ -456,7 +456,7 @@ def test_an_arm_that_is_armed_again_in_time_goes_on(state: SafetyState.State) ->
 def test_an_arm_that_was_never_armed_is_waited_for() -> None:
     story = Story()
     story.learner.on_safety(safety(SafetyState.STATE_DISARMED))
-    story.run(OPTIONS.arm_patience_s + 5.0)
+    story.run(OPTIONS.arming_timeout_s + 5.0)
     assert story.learner.failure == ""
 
 

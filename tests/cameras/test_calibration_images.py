@@ -70,7 +70,7 @@ def test_a_live_camera_says_what_to_do(pictures, monkeypatch):
 
 
 def test_waiting_ends(pictures, monkeypatch):
-    monkeypatch.setattr(calibration_images, "PATIENCE_S", 2.0)
+    monkeypatch.setattr(calibration_images, "TIMEOUT_S", 2.0)
     nothing = pictures[5]
     live = LiveImages("camera0", timed(itertools.repeat(nothing)), lambda sentence: None)
     with pytest.raises(CalibrationError, match="no new view of the board for 2 s, 0 of 15 taken: more light"):
@@ -80,7 +80,7 @@ def test_waiting_ends(pictures, monkeypatch):
 
 
 def test_a_board_in_motion_is_not_on_the_table(pictures, monkeypatch):
-    monkeypatch.setattr(calibration_images, "PATIENCE_S", 3.0)
+    monkeypatch.setattr(calibration_images, "TIMEOUT_S", 3.0)
     moving = itertools.cycle([picture for picture in pictures[:4] for _ in range(4)])
     live = LiveImages("camera0", timed(moving), lambda sentence: None)
     with pytest.raises(CalibrationError, match="was not seen lying still for 3 s"):

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
-from paramove.robots.dynamixel.arm.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
 from tests.robots.dynamixel.person import Person
 
-SETTINGS = LoopSettings(torque_off=True, patience=Patience(silent_s=1.0, watchdog_s=2.0, read_s=1.0))
+SETTINGS = LoopSettings(torque_off=True, timeouts=Timeouts(silent_s=1.0, watchdog_s=2.0, read_s=1.0))
 A_LITTLE = np.deg2rad(3.0)
 
 
 @pytest.fixture
 def arm(robot, port):
     with port:
-        yield ServoArm(joint_servos(robot), ServoChain(port), 1e-6 * robot.stream.period_us, SETTINGS.patience)
+        yield ServoArm(joint_servos(robot), ServoChain(port), 1e-6 * robot.stream.period_us, SETTINGS.timeouts)
 
 
 def test_every_servo_of_the_description_answers_as_the_model_that_it_is(robot, port):

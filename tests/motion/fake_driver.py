@@ -219,12 +219,12 @@ class Cell:
     def _heard(self, topic: topics.Topic, message: Any) -> None:
         self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
-    def do(self, wanted: RelocationGoal, patience: int = 1200) -> RelocationStatus:
+    def do(self, wanted: RelocationGoal, timeout_ticks: int = 1200) -> RelocationStatus:
         """Sends the goal and ticks until its last status, which is returned."""
         self._heard(topics.RELOCATION_GOAL, wanted)
         self.synthesizer.on_goal(wanted)
         last = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
-        for _ in range(patience):
+        for _ in range(timeout_ticks):
             self.tick()
             ended = [status for status in self.statuses if status.goal_id == wanted.id and status.state in last]
             if ended:

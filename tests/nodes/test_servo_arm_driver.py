@@ -28,7 +28,7 @@ from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 FOLDER = Path("robot_description/open_manipulator_x")
 ROBOT = RobotDescription.load(FOLDER)
 PATIENT_S = 120.0
-PATIENCE = {"silent_s": 2.0, "watchdog_s": 2.54, "read_s": 0.4}
+TIMEOUTS = {"silent_s": 2.0, "watchdog_s": 2.54, "read_s": 0.4}
 SUBSCRIBES = (topics.ARM_SAFETY, topics.ARM_TRAJECTORY_STATUS, topics.ARM_JOINT_STATES_FAST)
 MOVE = """
 import sys
@@ -102,7 +102,7 @@ def run():
     with tempfile.TemporaryDirectory(prefix="arm-") as name, contextlib.ExitStack() as opened:
         folder, link = Path(name), Path(name) / "usb-emulated_0001-if00-port0"
         emulator = opened.enter_context(DynamixelEmulator(emulated_servos(ROBOT), link))
-        config = servo_arm_driver.Config(robot=FOLDER, port=link, patience=PATIENCE)
+        config = servo_arm_driver.Config(robot=FOLDER, port=link, timeouts=TIMEOUTS)
         made: list[Bus] = []
 
         def drive() -> None:

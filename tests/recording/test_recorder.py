@@ -23,7 +23,7 @@ from paramove.recording.parts import PartedRecording
 from paramove.recording.reader import read
 from paramove.recording.recorder import Recorder
 from tests.recording.small_disk import fill, small_disk
-from tests.supervision.conftest import PATIENCE_S, until
+from tests.supervision.conftest import TIMEOUT_S, until
 
 ROOT = Path(__file__).parents[2]
 
@@ -67,7 +67,7 @@ def test_a_disk_that_is_slow_delays_neither_the_node_nor_the_file(tmp_path, monk
 
     def slow(descriptor: int) -> None:
         begins.set()
-        assert goes_on.wait(PATIENCE_S)
+        assert goes_on.wait(TIMEOUT_S)
         real(descriptor)
 
     monkeypatch.setattr(os, "fsync", slow)

@@ -19,16 +19,16 @@ from paramove.supervision.launch_file import load
 from paramove.supervision.view import LineView
 
 NODES = Path(__file__).parent / "nodes"
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 
 
 def until(condition, what):
-    """Looks again and again until `condition()` is true; fails with `what` when patience ends."""
-    end_s = time.monotonic() + PATIENCE_S
+    """Looks again and again until `condition()` is true; fails with `what` after a timeout."""
+    end_s = time.monotonic() + TIMEOUT_S
     pause = threading.Event()
     while not condition():
         if time.monotonic() > end_s:
-            pytest.fail(f"not within {PATIENCE_S:g} s: {what}")
+            pytest.fail(f"not within {TIMEOUT_S:g} s: {what}")
         pause.wait(0.02)
 
 

@@ -21,9 +21,9 @@ COMMANDS = [
 SETUP, SCAN, CALIBRATE, VERIFY, EMULATED, REAL, ENABLE, STOP = COMMANDS
 EEPROM_END = 64
 OVERLAY = YAML(typ="safe").load(Path("launch/overlays/dynamixel_arm/emulated.yaml"))
-PATIENCE = "".join(
-    f" --set arm_driver.patience.{name}={value}"
-    for name, value in OVERLAY["nodes"]["arm_driver"]["parameters"]["emulated"]["patience"].items()
+TIMEOUTS = "".join(
+    f" --set arm_driver.timeouts.{name}={value}"
+    for name, value in OVERLAY["nodes"]["arm_driver"]["parameters"]["emulated"]["timeouts"].items()
 )
 """What is emulated shares the processors with other tests, and may be late."""
 
@@ -45,7 +45,7 @@ def test_new_servos_become_an_arm_that_reaches_when_armed_and_stops_when_told(tm
         assert "no differences" in typed(VERIFY, environment)
     (calibration,) = (tmp_path / "data" / "calibration").iterdir()
     launch = REAL.replace("/dev/serial/by-id/NAME", str(link)).replace("=FILE", f"={calibration}")
-    launch += f"{PATIENCE} --runs {tmp_path / 'runs'}"
+    launch += f"{TIMEOUTS} --runs {tmp_path / 'runs'}"
     assert str(link) in launch
     assert str(calibration) in launch
 

@@ -19,7 +19,7 @@ class FilterOptions:
 
     Attributes:
         n_particles: 400 in the thesis.
-        select_below: particles are selected when their effective number is below this share of them; otherwise they
+        resample_below: particles are selected when their effective number is below this share of them; otherwise they
             keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
         least_effective: if a likelihood leaves fewer effective particles than this share, it is flattened until it
             leaves so many: with several views it is sharper than 400 particles are dense. 0 never flattens.
@@ -28,7 +28,7 @@ class FilterOptions:
     """
 
     n_particles: int = 400
-    select_below: float = 0.5
+    resample_below: float = 0.5
     least_effective: float = 0.1
     evidence_rate_hz: float = 20.0
 
@@ -36,10 +36,10 @@ class FilterOptions:
         """Raises InputError for numbers that are none of these."""
         if self.n_particles < 2:
             raise InputError(f"n_particles is at least 2, found {self.n_particles}")
-        if not (0.0 <= self.select_below <= 1.0 and 0.0 <= self.least_effective < 1.0):
+        if not (0.0 <= self.resample_below <= 1.0 and 0.0 <= self.least_effective < 1.0):
             raise InputError(
-                "select_below lies between 0 and 1 and least_effective below 1, found "
-                f"{self.select_below}, {self.least_effective}"
+                "resample_below lies between 0 and 1 and least_effective below 1, found "
+                f"{self.resample_below}, {self.least_effective}"
             )
         if not self.evidence_rate_hz > 0.0:
             raise InputError(f"evidence_rate_hz is positive, found {self.evidence_rate_hz}")
@@ -47,7 +47,7 @@ class FilterOptions:
     @classmethod
     def thesis(cls) -> FilterOptions:
         """Selection in every frame, likelihoods as they are."""
-        return cls(select_below=1.0, least_effective=0.0, evidence_rate_hz=float("inf"))
+        return cls(resample_below=1.0, least_effective=0.0, evidence_rate_hz=float("inf"))
 
     def independence(self, elapsed_s: float) -> float:
         """Exponent of the likelihood of a frame that comes so long after the one before; 1 for the first."""
@@ -83,7 +83,7 @@ class ParticleFilter:
     def select(self) -> None:
         """Draws particles by their weights, where few of them carry the weight."""
         weights = self.particles.weights
-        if effective_number(weights) < self.options.select_below * len(weights) * (1.0 + 1e-9):
+        if effective_number(weights) < self.options.resample_below * len(weights) * (1.0 + 1e-9):
             self.particles = self.particles.taken(systematic_selection(weights, self.rng))
 
     def predict(self, elapsed_s: float) -> None:

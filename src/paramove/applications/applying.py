@@ -67,7 +67,7 @@ class Applying(Stage):
         self.go("waiting")
 
     def _waiting(self) -> None:
-        if self.for_s > self.app.options.patience_s:
+        if self.for_s > self.app.options.ask_again_s:
             self._ask()
 
     def _pointed_at(self, name: str) -> None:
@@ -183,7 +183,7 @@ class Applying(Stage):
         if came and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
             self._stuck.clear()
             self._ask()
-        elif self.for_s > self.app.options.patience_s:
+        elif self.for_s > self.app.options.ask_again_s:
             self._ask_for_help(f"I still need help with {self._object}.")
 
     def _put_away(self) -> ApplicationStage.Stage | None:

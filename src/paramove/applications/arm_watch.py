@@ -11,11 +11,11 @@ class ArmWatch:
     """Follows the safety gate's state. Before the arm was armed for the first time nothing is amiss.
 
     Args:
-        patience_s: How long a person may take to arm again.
+        timeout_s: How long a person may take to arm again.
     """
 
-    def __init__(self, patience_s: float) -> None:
-        self._patience_s = patience_s
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
         self._was_armed = False
         self._lost_s: float | None = None
         self._state = SafetyState.STATE_UNSPECIFIED
@@ -46,5 +46,5 @@ class ArmWatch:
         return f"the arm is no longer armed ({state}){why}; only a person arms it again"
 
     def given_up(self, now_s: float) -> bool:
-        """Whether nobody has armed it within the patience."""
-        return self._lost_s is not None and now_s - self._lost_s >= self._patience_s
+        """Whether nobody has armed it in time."""
+        return self._lost_s is not None and now_s - self._lost_s >= self._timeout_s

@@ -80,7 +80,7 @@ class Calibrating(Stage):
         self.go("helped")
 
     def _helped(self) -> None:
-        if self.for_s > self.app.options.patience_s:
+        if self.for_s > self.app.options.ask_again_s:
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
             self.go("resting")
 
@@ -99,7 +99,7 @@ class Calibrating(Stage):
             self._held = max(held_still, key=lambda name: self.app.table.objects[name].time_s)
             self.app.goal_client.start(RelocationGoal.KIND_TAKE, self.app.now_s, self._held)
             self.go("taking")
-        elif self.for_s > self.app.options.patience_s:
+        elif self.for_s > self.app.options.ask_again_s:
             self._ask()
 
     def _taking(self) -> None:

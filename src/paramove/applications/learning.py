@@ -61,7 +61,7 @@ class Learning(Stage):
             self.app.tell("I know all the rules now.")
             return ApplicationStage.STAGE_APPLY
         quiet_s = self.app.now_s - max(self._last_event_s, self.app.now_s - self.for_s)
-        if quiet_s > self.app.options.patience_s:
+        if quiet_s > self.app.options.ask_again_s:
             self._ask_again(missing[0])
         return None
 

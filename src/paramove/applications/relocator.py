@@ -32,7 +32,7 @@ class Relocator:
     letting_hand_leave, placing, helped (waiting for help).
 
     Args:
-        options: Places and patience.
+        options: Places and timeouts.
         run_name: Begins the goals' ids; a new one for every process, as the same id is done only once.
 
     Attributes:
@@ -45,7 +45,7 @@ class Relocator:
         self._options = options
         self._goals = Goals(options.frame, options.grasp_z)
         self._goal_client = GoalClient(self._goals, run_name)
-        self._watch = ArmWatch(options.arm_patience_s)
+        self._watch = ArmWatch(options.arming_timeout_s)
         self._sight = ArmSight(options.frame)
         self._outgoing = OutgoingMessages()
         self._now_s = 0.0
@@ -171,7 +171,7 @@ class Relocator:
             if unseen not in self._told:
                 self._told.add(unseen)
                 self._tell(f"I do not see where you point: {unseen}. I wait.")
-        elif self._now_s - self._quiet_since_s > self._options.patience_s:
+        elif self._now_s - self._quiet_since_s > self._options.ask_again_s:
             ask("I have not seen you point. ")
 
     def _pointed_at(self, gesture: Gesture) -> None:
@@ -228,7 +228,7 @@ class Relocator:
         elif away_s >= self._options.hand_away_s:
             self._start(RelocationGoal.KIND_PLACE_HELD, None, self._goals.position(self._target))
             self._go("placing")
-        elif self._now_s - self._since_s > self._options.patience_s:
+        elif self._now_s - self._since_s > self._options.ask_again_s:
             self._tell(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
             self._go("letting_hand_leave")
 
@@ -257,7 +257,7 @@ class Relocator:
         self._go("helped")
 
     def _helped(self) -> None:
-        if self._now_s - self._since_s > self._options.patience_s:
+        if self._now_s - self._since_s > self._options.ask_again_s:
             self._rest()
 
     # What is said

@@ -1,16 +1,17 @@
-"""Places and patience of relocation by pointing, as parameters of its process."""
+"""Places and timeouts of relocation by pointing, as parameters of its process."""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from paramove.applications.stage import Place
 from paramove.applications.table import Surface
+from paramove.documents import OldNames
 
 Range = tuple[float, float]
 
 
-class RelocatorOptions(BaseModel):
+class RelocatorOptions(OldNames):
     """Places in the right shoulder's frame, m; times in s.
 
     Attributes:
@@ -29,12 +30,17 @@ class RelocatorOptions(BaseModel):
         hand_away: The person's hand has left when it is so far from the place pointed at.
         hand_away_s: And has been for so long.
         attempts: How often in a row an object is tried to be fetched before the person is asked.
-        patience_s: A request is repeated after so long.
-        arm_patience_s: The application ends when the arm is not armed again for so long.
+        ask_again_s: A request is repeated after so long.
+        arming_timeout_s: The application ends when the arm is not armed again for so long.
         frame: Of all places.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    old_names = (
+        ("patience_s", "ask_again_s"),
+        ("arm_patience_s", "arming_timeout_s"),
+    )
 
     object_name: str = "yellow"
     start: Place = (0.165, -0.02)
@@ -51,8 +57,8 @@ class RelocatorOptions(BaseModel):
     hand_away: float = Field(0.08, gt=0)
     hand_away_s: float = Field(0.3, ge=0)
     attempts: int = Field(3, ge=1)
-    patience_s: float = Field(25.0, gt=0)
-    arm_patience_s: float = Field(10.0, gt=0)
+    ask_again_s: float = Field(25.0, gt=0)
+    arming_timeout_s: float = Field(10.0, gt=0)
     frame: str = "right_shoulder"
 
     @property

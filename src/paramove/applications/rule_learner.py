@@ -20,14 +20,14 @@ class RuleLearner:
     """Hear messages with the `on_…` methods, then call `tick`.
 
     Args:
-        options: Places and patience.
+        options: Places and timeouts.
         run_name: Begins the goals' ids; a new one for every process, as the same id is done only once.
     """
 
     def __init__(self, options: RuleLearnerOptions, run_name: str) -> None:
         goals = Goals(options.frame, options.grasp_z)
         self._app = ApplicationState(options, GoalClient(goals, run_name), goals)
-        self._watch = ArmWatch(options.arm_patience_s)
+        self._watch = ArmWatch(options.arming_timeout_s)
         self._stage: Stage | None = None
         self._finished = False
         self._said_s = float("-inf")

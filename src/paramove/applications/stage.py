@@ -20,7 +20,7 @@ Pointing = Literal["nearness", "action_space"]
 
 @dataclass(frozen=True)
 class RuleLearnerOptions:
-    """The application's places and patience; shoulder frame, m, s.
+    """The application's places and timeouts; shoulder frame, m, s.
 
     Attributes:
         objects: Names (colours) of the objects.
@@ -32,8 +32,8 @@ class RuleLearnerOptions:
             points at, by tracking in "action_space".
         attempts: How often an object is tried before the instructor is asked.
         settle_s: The view of an object is trusted so long after the arm has left.
-        patience_s: A request to the instructor is repeated after so long without an answer.
-        arm_patience_s: The application ends when the arm is not armed again for so long.
+        ask_again_s: A request to the instructor is repeated after so long without an answer.
+        arming_timeout_s: The application ends when the arm is not armed again for so long.
     """
 
     objects: tuple[str, ...]
@@ -45,8 +45,8 @@ class RuleLearnerOptions:
     pointing: Pointing = "nearness"
     attempts: int = 3
     settle_s: float = 2.6
-    patience_s: float = 25.0
-    arm_patience_s: float = 10.0
+    ask_again_s: float = 25.0
+    arming_timeout_s: float = 10.0
 
 
 @dataclass

@@ -29,7 +29,7 @@ from paramove.bus.endpoint import BusFolderError, TopicTakenError
 from paramove.bus.log_format import log_to_stderr
 from paramove.bus.settings import BusSettings
 from paramove.bus.topics import Topic
-from paramove.documents import InputError, exit_codes, read_document
+from paramove.documents import InputError, OldNames, exit_codes, read_document
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ LAST_WORD_S = 1.0
 """A node that has failed waits so long at most for somebody to hear why."""
 
 
-class NodeConfig(BaseModel):
+class NodeConfig(OldNames):
     """Parameters of a node; each node derives its own. Unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

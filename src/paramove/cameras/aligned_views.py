@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from paramove.documents import Image
 
-PATIENCE_PERIODS = 3.0
+TIMEOUT_PERIODS = 3.0
 """A camera that is silent for so many of its periods is gone: nobody waits for it any longer."""
 
 
@@ -30,7 +30,7 @@ class AlignedViews:
     """Collects images and gives sets of them.
 
     A set is complete when each camera has an image within half a period of the newest. A camera that has been silent
-    for `PATIENCE_PERIODS` is not waited for; from its next image on it is part of the sets again.
+    for `TIMEOUT_PERIODS` is not waited for; from its next image on it is part of the sets again.
 
     Args:
         names: Of the cameras.
@@ -76,7 +76,7 @@ class AlignedViews:
     def _is_gone(self, place: int, now_ns: int) -> bool:
         heard_ns = self._heard_ns[place]
         since_ns = self._started_ns if heard_ns is None else heard_ns
-        return since_ns is not None and now_ns - since_ns > PATIENCE_PERIODS * self._period_ns
+        return since_ns is not None and now_ns - since_ns > TIMEOUT_PERIODS * self._period_ns
 
     def _said(self, moment_ns: int) -> Iterator[Views]:
         """The images within half a period of the moment; newer ones wait on, older ones are forgotten."""

@@ -31,7 +31,7 @@ MOST_VIEWS = 40
 TABLE_S = 1.0
 """For so long, at the end of a video or before a live camera, the board lies still on the table."""
 TABLE_LOOKS = 5
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 """For so long a live camera is watched without a new view."""
 
 
@@ -143,9 +143,9 @@ class LiveImages:
                 self._say(f"{self.name}: view {len(collector.views)} of {GOOD_VIEWS}")
             if len(collector.views) == GOOD_VIEWS:
                 break
-            if time_s - newest_s > PATIENCE_S:
+            if time_s - newest_s > TIMEOUT_S:
                 raise CalibrationError(
-                    f"{self.name}: no new view of the board for {PATIENCE_S:g} s, {len(collector.views)} of "
+                    f"{self.name}: no new view of the board for {TIMEOUT_S:g} s, {len(collector.views)} of "
                     f"{GOOD_VIEWS} taken: more light, the board nearer, tilted, and held still for a second"
                 )
         return Found(tuple(collector.views), looked_at)
@@ -161,9 +161,9 @@ class LiveImages:
             lying = [*lying, view] if still and view is not None else []
             if len(lying) > TABLE_LOOKS:
                 return Found(tuple(lying), looked_at)
-            if time_s - start_s > PATIENCE_S:
+            if time_s - start_s > TIMEOUT_S:
                 break
-        raise CalibrationError(f"{self.name}: the board on the table was not seen lying still for {PATIENCE_S:g} s")
+        raise CalibrationError(f"{self.name}: the board on the table was not seen lying still for {TIMEOUT_S:g} s")
 
     def _looks(self) -> Iterator[tuple[float, BoardView | None]]:
         last_s = -np.inf

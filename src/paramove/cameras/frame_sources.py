@@ -19,7 +19,7 @@ from paramove.documents import Image, InputError, opened_video
 _log = logging.getLogger(__name__)
 
 SOURCES = "topic:camera/light, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
-PATIENCE_NS = 1_000_000_000
+TIMEOUT_NS = 1_000_000_000
 """A source that is silent for longer has a fault."""
 
 
@@ -67,7 +67,7 @@ class TopicFrames:
         """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
         if light is None:
             self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
-            if now_ns - self._newest_ns > PATIENCE_NS:
+            if now_ns - self._newest_ns > TIMEOUT_NS:
                 raise FrameError(
                     "no image on camera/light for more than 1 s: see what says it (the simulator)", "silent"
                 )
@@ -130,8 +130,8 @@ class DeviceFrames:
     """Frames of a V4L2 device, read by a thread that keeps only the newest, so that an old frame never waits.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
-    #14044): silence is noticed here after `patience_ns` of the caller's clock, repetition by `FrameChecks`. Every
-    `patience_ns` the device is opened again.
+    #14044): silence is noticed here after `timeout_ns` of the caller's clock, repetition by `FrameChecks`. Every
+    `timeout_ns` the device is opened again.
 
     Args:
         path: /dev/v4l/by-id/... (stays the same when plugged in elsewhere), /dev/videoN, or N.
@@ -147,7 +147,7 @@ class DeviceFrames:
         width_px: int,
         height_px: int,
         rate_hz: float = 15.0,
-        patience_ns: int = PATIENCE_NS,
+        timeout_ns: int = TIMEOUT_NS,
         open_capture: Callable[[str], Capture] | None = None,
     ) -> None:
         self._path = f"/dev/video{path}" if path.isdigit() else path
@@ -157,7 +157,7 @@ class DeviceFrames:
             cv2.CAP_PROP_FPS: rate_hz,
             cv2.CAP_PROP_BUFFERSIZE: 1.0,
         }
-        self._patience_ns = patience_ns
+        self._timeout_ns = timeout_ns
         self._open_capture = open_capture or _open_v4l2
         self._newest_ns: int | None = None
         self._index = 0
@@ -169,7 +169,7 @@ class DeviceFrames:
         image = self._reader.take()
         if image is None:
             silent_ns = now_ns - self._newest_ns
-            if silent_ns < self._patience_ns:
+            if silent_ns < self._timeout_ns:
                 return None
             self._reopen(now_ns)
             raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")

@@ -21,7 +21,7 @@ app = typer.Typer(name="calibrate", no_args_is_help=True, help="Print the calibr
 LENGTH = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(mm|cm|m)\s*")
 PER_M = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
 LIVE_SIZE = "1280x720"
-LIVE_PATIENCE_NS = 10_000_000_000
+LIVE_TIMEOUT_NS = 10_000_000_000
 """A camera that is switched on may take seconds to its first frame."""
 
 
@@ -232,7 +232,7 @@ def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Im
     """Frames of a camera without end, with the time since the first, s."""
     from paramove.cameras import DeviceFrames, FrameError
 
-    frames = DeviceFrames(device, *size, patience_ns=LIVE_PATIENCE_NS)
+    frames = DeviceFrames(device, *size, timeout_ns=LIVE_TIMEOUT_NS)
     try:
         while True:
             now_ns = time.monotonic_ns()

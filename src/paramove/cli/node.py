@@ -86,7 +86,7 @@ def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
 
 
 def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> dict[str, Any] | None:
-    """The node's row once the action has come to its end or the patience to its; None if the run has ended."""
+    """The node's row once the action has come to its end or the timeout is over; None if the run has ended."""
     ends = ("stopped", "given up") if action == "stop" else ("ready", "degraded", "failed", "given up", "restarting")
     end_s = time.monotonic() + wait_s
     pause = threading.Event()

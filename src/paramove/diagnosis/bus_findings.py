@@ -51,7 +51,7 @@ def servos_findings(machine: Machine) -> Iterator[Finding]:
 def bus_findings(
     port: Path,
     baud_rates: Sequence[int] = USUAL_BAUD_RATES,
-    patience_s: float = 0.1,
+    timeout_s: float = 0.1,
     ids: Sequence[int] = ALL_IDS,
 ) -> list[Finding]:
     """Asks the servos on a port, and judges what they tell.
@@ -59,11 +59,11 @@ def bus_findings(
     Args:
         port: For example a link in /dev/serial/by-id.
         baud_rates: At which is asked, bit/s.
-        patience_s: For the beginning of an answer, beyond the time of its bytes.
+        timeout_s: For the beginning of an answer, beyond the time of its bytes.
         ids: That are asked one by one where servos answer and something disturbs them.
     """
     try:
-        with ServoPort(str(port), baud_rates[0], patience_s) as opened:
+        with ServoPort(str(port), baud_rates[0], timeout_s) as opened:
             scan = scan_bus(ServoChain(opened), baud_rates, ids)
     except (InputError, PortLostError) as error:
         return [Finding("bus", Level.PROBLEM, str(error), facts={"port": str(port)})]

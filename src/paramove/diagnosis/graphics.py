@@ -14,7 +14,7 @@ from paramove.diagnosis.finding import Finding, Level, Machine, as_root
 PACKAGES = {"egl": "libegl1 libgl1", "osmesa": "libosmesa6"}
 """Debian's."""
 INSTALL = "apt-get install -y --no-install-recommends"
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 DRAW = """
 import sys
 from importlib import import_module
@@ -57,9 +57,9 @@ def failure_to_draw(backend: str, script: str = DRAW) -> str:
     variables = dict(os.environ) if backend == graphics_backend() else {**os.environ, "MUJOCO_GL": backend}
     command = [sys.executable, "-c", script, backend]
     try:
-        done = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        done = subprocess.run(command, env=variables, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     except subprocess.TimeoutExpired:
-        return f"nothing was drawn within {PATIENCE_S:g} s"
+        return f"nothing was drawn within {TIMEOUT_S:g} s"
     if done.returncode < 0:
         return f"its libraries crash ({signal.Signals(-done.returncode).name})"
     said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]

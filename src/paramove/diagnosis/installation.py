@@ -19,7 +19,7 @@ from paramove.diagnosis.finding import Finding, Fix, Level, Machine
 OURS = "paramove"
 OPENCV = "opencv-contrib-python-headless"
 IMPORT_CV2 = "import cv2; print(cv2.__version__)"
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 def installation_findings(_: Machine) -> Iterator[Finding]:
@@ -95,10 +95,10 @@ def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) 
         return _mended_by_pip("opencv", sentence, [("uninstall", "-y", *owners), again])
     try:
         done = subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+            [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired:
-        return _mended_by_pip("opencv", f"cv2 is not imported within {PATIENCE_S:g} s", [again])
+        return _mended_by_pip("opencv", f"cv2 is not imported within {TIMEOUT_S:g} s", [again])
     if done.returncode != 0:
         said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         return _mended_by_pip("opencv", f"cv2 of {' '.join(owners) or 'no package'} is broken: {said[0]}", [again])

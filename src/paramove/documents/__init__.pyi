@@ -15,6 +15,7 @@ from .files import size_of as size_of
 from .files import unreadable as unreadable
 from .input_error import InputError as InputError
 from .key_findings import findings as findings
+from .old_names import OldNames as OldNames
 from .pictures import JPEG as JPEG
 from .pictures import decoded as decoded
 from .pictures import opened_video as opened_video

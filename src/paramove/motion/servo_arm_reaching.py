@@ -169,7 +169,7 @@ class ServoArmReaching:
             refusal = refusal or fault
             if rows is not None and (best is None or len(rows) < len(best)):
                 best = rows
-            if best is not None and self._period * len(best) <= self.options.patience:
+            if best is not None and self._period * len(best) <= self.options.longest_duration:
                 break
         if best is None:
             raise OutOfReachError(f"no way leads to {metres(point)} from {metres(self._hand(motion.end))}: {refusal}")
@@ -318,7 +318,7 @@ class ServoReachingOptions:
     lift: float = 0.05  # learned movements end and begin so far above an object
     speed: float = 0.06  # of straight lines, at most
     way_duration: float = 1.6  # of a learned movement, at least
-    patience: float = (
+    longest_duration: float = (
         6.0  # s; where a learned movement takes longer, because the joints turn far, a milder one is tried
     )
     gripper_duration: float = 0.8

@@ -25,7 +25,7 @@ class MotionThresholds:
         rest_s: ... for this long.
         vanish_s: A moving object not seen for this long is gone.
         hidden_s: A resting object not seen for this long is gone; longer, as it is rather hidden by the arm.
-        patience_s: Waiting for a hand that covers the object to leave never takes longer.
+        timeout_s: Waiting for a hand that covers the object to leave never takes longer.
         clear_share: From this visible share on an object is seen in full.
         part_share: Below this share it is not seen to rest: it is sunk for a good part, or hidden.
         remnant_share: Below this share a moving object counts as not seen: its top may stay visible in an opening.
@@ -38,7 +38,7 @@ class MotionThresholds:
     rest_s: float = 0.5
     vanish_s: float = 0.5
     hidden_s: float = 2.0
-    patience_s: float = 5.0
+    timeout_s: float = 5.0
     clear_share: float = 0.9
     part_share: float = 0.6
     remnant_share: float = 0.35
@@ -93,7 +93,7 @@ class ObjectMotion:
         """
         if sample is not None:
             self._history.append(sample)
-        while self._history and self._history[0].time_s < now_s - self.HISTORY_S - self._limits.patience_s:
+        while self._history and self._history[0].time_s < now_s - self.HISTORY_S - self._limits.timeout_s:
             self._history.popleft()
         remnant = sample is not None and self.share(sample) < self._limits.remnant_share
         if sample is not None and not remnant:
@@ -114,7 +114,7 @@ class ObjectMotion:
             return []
         silent_s = now_s - self._well_seen_s
         needed_s = self._limits.vanish_s if self.state is State.MOVING else self._limits.hidden_s
-        if silent_s < needed_s or (hand_near and silent_s < self._limits.patience_s):
+        if silent_s < needed_s or (hand_near and silent_s < self._limits.timeout_s):
             return []
         return [self._vanish()]
 
@@ -189,7 +189,7 @@ class ObjectMotion:
 
     def _come_to_rest(self, place: Sample, still_s: float, hand_near: bool) -> list[Happening]:
         share = self.share(place)
-        waited = still_s >= (self._limits.patience_s if hand_near else self._limits.clear_view_s)
+        waited = still_s >= (self._limits.timeout_s if hand_near else self._limits.clear_view_s)
         if share < self._limits.clear_share and not waited:
             return []
         if share < self._limits.part_share:

@@ -16,7 +16,7 @@ TERMINAL = "terminal"
 """Source of the word."""
 
 
-def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | None:
+def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | None:
     """Say a word to arm or disarm, once, and hear what the gate makes of it.
 
     The word is said once: said again, it could arm an arm that a fault has just stopped.
@@ -24,7 +24,7 @@ def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | N
     Args:
         folder: Of the run's bus.
         armed: Whether to arm.
-        patience_s: To wait for the gate, and again for its answer.
+        timeout_s: To wait for the gate, and again for its answer.
 
     Returns:
         The gate's newest state: armed or not as was asked for, or with the faults for which it refuses; that from
@@ -36,7 +36,7 @@ def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | N
     """
     with BusVisitor(folder, "arm_by_word") as bus:
         publisher, gate = bus.publisher(topics.OPERATOR_ARM), bus.subscriber(topics.ARM_SAFETY)
-        before = _until(gate, patience_s, lambda state: True)
+        before = _until(gate, timeout_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
         say_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
@@ -44,7 +44,7 @@ def arm_by_word(folder: Path, armed: bool, patience_s: float) -> SafetyState | N
         def is_answer(state: SafetyState) -> bool:
             return obeyed(state, armed) or (armed and _faults(state) not in ([], _faults(before)))
 
-        return _until(gate, patience_s, is_answer, publisher.serve) or before
+        return _until(gate, timeout_s, is_answer, publisher.serve) or before
 
 
 def obeyed(state: SafetyState, armed: bool) -> bool:
@@ -59,12 +59,12 @@ def _faults(state: SafetyState) -> list[str]:
 
 def _until(
     gate: Subscriber,
-    patience_s: float,
+    timeout_s: float,
     is_it: Callable[[SafetyState], bool],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> SafetyState | None:
     """The first state for which `is_it`, else the newest that is heard; None if none is."""
-    end_s = time.monotonic() + patience_s
+    end_s = time.monotonic() + timeout_s
     newest: SafetyState | None = None
     while time.monotonic() < end_s:
         meanwhile()

@@ -15,13 +15,13 @@ from paramove.safety import PERSON_STOP
 SAID_EVERY_S = 0.02
 
 
-def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None:
-    """Say a stop on all topics of stops that are free, until the gate has latched it or patience is at its end.
+def stop_arm(folder: Path, source: str, timeout_s: float) -> SafetyState | None:
+    """Say a stop on all topics of stops that are free, until the gate has latched it or the timeout is at its end.
 
     Args:
         folder: Of the run's bus.
         source: Where the person pressed, for the sentence that the gate latches.
-        patience_s: To wait for the gate's answer.
+        timeout_s: To wait for the gate's answer.
 
     Returns:
         The gate's answer, None if there was none.
@@ -30,7 +30,7 @@ def stop_arm(folder: Path, source: str, patience_s: float) -> SafetyState | None
         TopicTakenError: Others say all topics of stops, such as the live page and another terminal.
         BusFolderError: The folder cannot be used.
     """
-    end_s = time.monotonic() + patience_s
+    end_s = time.monotonic() + timeout_s
     request = StopRequest(source=source)
     request.captured.FromNanoseconds(time.monotonic_ns())
     with BusVisitor(folder, "estop") as bus:

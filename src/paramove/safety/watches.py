@@ -42,10 +42,10 @@ class EmergencyWatch:
 class FollowingWatch:
     """Whether joints are where they are commanded. `allowed` [J], rad; None: not watched."""
 
-    def __init__(self, names: tuple[str, ...], allowed: Floats | None, patience_ms: float) -> None:
+    def __init__(self, names: tuple[str, ...], allowed: Floats | None, timeout_ms: float) -> None:
         self._names = names
         self._allowed = allowed
-        self._patience_ns = round(patience_ms * 1e6)
+        self._timeout_ns = round(timeout_ms * 1e6)
         self._since_ns = np.full(len(names), -1, dtype=np.int64)
 
     def away(self, measured: Measured) -> NDArray[np.bool_]:
@@ -58,14 +58,14 @@ class FollowingWatch:
         """Hear a report; the joint that has been too far away for too long, if any."""
         away = self.away(measured)
         self._since_ns = np.where(away, np.where(self._since_ns < 0, measured.captured_ns, self._since_ns), -1)
-        late = away & (measured.captured_ns - self._since_ns >= self._patience_ns)
+        late = away & (measured.captured_ns - self._since_ns >= self._timeout_ns)
         if self._allowed is None or not late.any():
             return None
         joint = int(np.argmax(late))
         error = np.rad2deg(abs(measured.positions[joint] - measured.commanded[joint]))
         sentence = (
             f"joint {self._names[joint]} is {error:.2f} deg from where it is commanded for "
-            f"{self._patience_ns * 1e-6:.0f} ms, allowed {np.rad2deg(self._allowed[joint]):.2f} deg; "
+            f"{self._timeout_ns * 1e-6:.0f} ms, allowed {np.rad2deg(self._allowed[joint]):.2f} deg; "
             "see what holds it, then arm again"
         )
         return Fault("following", self._names[joint], sentence)

@@ -20,7 +20,7 @@ from paramove.bus import socket_path
 
 NAME = "control"
 LONGEST_REQUEST = 4096
-PATIENCE_S = 2.0
+TIMEOUT_S = 2.0
 """A client that has not finished its request by then is hung up on."""
 
 Answer = dict[str, Any]
@@ -86,7 +86,7 @@ class ControlServer:
                 client.sendall(json.dumps(self._answer_to(bytes(line))).encode() + b"\n")
             return bool(newline) or not chunk or len(received) > LONGEST_REQUEST
         except BlockingIOError:
-            return time.monotonic() > since_s + PATIENCE_S
+            return time.monotonic() > since_s + TIMEOUT_S
         except OSError:
             return True
 

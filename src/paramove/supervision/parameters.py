@@ -21,7 +21,7 @@ from paramove.documents import DocumentError, nearest
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
 
 
@@ -64,12 +64,12 @@ def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Path) -> tuple[
             cwd=workspace,
             capture_output=True,
             text=True,
-            timeout=PATIENCE_S,
+            timeout=TIMEOUT_S,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
         said = error.stdout.decode() if error.stdout else ""
-        return [json.loads(line) for line in said.splitlines()], f"it took more than {PATIENCE_S:g} s"
+        return [json.loads(line) for line in said.splitlines()], f"it took more than {TIMEOUT_S:g} s"
     last = answer.stderr.strip().splitlines()[-1:] or [f"the process ended with exit code {answer.returncode}"]
     return [json.loads(line) for line in answer.stdout.splitlines()], last[0]
 

@@ -221,7 +221,7 @@ def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
     fault = SafetyFault(code=PERSON_STOP, sentence="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
-    monkeypatch.setattr("paramove.operator.terminal_stop.stop_arm", lambda folder, source, patience_s: state)
+    monkeypatch.setattr("paramove.operator.terminal_stop.stop_arm", lambda folder, source, timeout_s: state)
     done = CliRunner().invoke(build("arm"), ["arm", "estop"])
     assert done.exit_code == code
     assert ("hold, stopped from the terminal" in done.stdout) == (code == 0)

@@ -31,7 +31,7 @@ def words(tmp_path, monkeypatch):
     (tmp_path / "paramove" / "default").mkdir(parents=True)
     told = {"answer": "armed", "words": []}
 
-    def arm_by_word(folder, armed, patience_s):
+    def arm_by_word(folder, armed, timeout_s):
         told["words"].append(armed)
         if told["answer"] == "taken":
             raise TopicTakenError("operator says operator/arm already")

@@ -180,7 +180,7 @@ def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
 
 
 def test_without_an_arm_it_says_so(folder, monkeypatch):
-    monkeypatch.setattr("paramove.cli.arm.jog.PATIENCE_S", 0.2)
+    monkeypatch.setattr("paramove.cli.arm.jog.TIMEOUT_S", 0.2)
     read, write = os.pipe()
     with os.fdopen(read) as source:
         monkeypatch.setattr("paramove.cli.arm.jog.TerminalPerson", lambda: TerminalPerson(source))

@@ -82,7 +82,7 @@ def test_a_cluster_finds_the_same(tasks: dict[str, list[Fold]], tmp_path: Path) 
 
 
 def test_nobody_answers(tasks: dict[str, list[Fold]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(sweep, "TIMEOUT_S", 1.0)
     jobs = jobs_of([ROW], {"table/across": tasks["table/across"]})
     with pytest.raises(ClusterMissingError, match=r"127\.0\.0\.1:9"):
         run_jobs(jobs, tmp_path, scheduler="127.0.0.1:9")

@@ -14,7 +14,7 @@ from paramove.documents import exit_codes
 if TYPE_CHECKING:
     from paramove.msgs.safety_state_pb2 import SafetyState
 
-PATIENCE_S = 5.0
+TIMEOUT_S = 5.0
 QUESTION = "Is everybody out of the arm's reach, and the switch of the motors' power in yours?"
 
 
@@ -60,7 +60,7 @@ def _answer(armed: bool, domain: str | None) -> SafetyState:
     if not folder.is_dir():
         raise ended(f"nothing is running in {folder}", exit_codes.UNAVAILABLE)
     try:
-        state = arm_by_word(folder, armed, PATIENCE_S)
+        state = arm_by_word(folder, armed, TIMEOUT_S)
     except TopicTakenError as error:
         remedy = "stop that one first; `paramove arm estop` stops the arm in any case"
         raise ended(f"{error}: only one program may arm an arm; {remedy}", exit_codes.TEMPORARY) from error
@@ -68,7 +68,7 @@ def _answer(armed: bool, domain: str | None) -> SafetyState:
         raise ended(str(error), exit_codes.UNAVAILABLE) from error
     if state is None:
         raise ended(
-            f"no safety gate is heard within {PATIENCE_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
+            f"no safety gate is heard within {TIMEOUT_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
         )
     return state
 

@@ -8,7 +8,7 @@ from paramove.cli.arm.options import ended
 from paramove.cli.bus_options import DomainOption
 from paramove.documents import exit_codes
 
-PATIENCE_S = 1.0
+TIMEOUT_S = 1.0
 REAL_ONE = "use the switch of the motors' power: that one is the real emergency stop"
 
 
@@ -28,11 +28,11 @@ def estop(domain: DomainOption = None) -> None:
     if not folder.is_dir():
         raise ended(f"nothing is running in {folder}; {REAL_ONE}", exit_codes.UNAVAILABLE)
     try:
-        answer = stop_arm(folder, "terminal", PATIENCE_S)
+        answer = stop_arm(folder, "terminal", TIMEOUT_S)
     except (TopicTakenError, BusFolderError) as error:
         raise ended(f"{error}; {REAL_ONE}", exit_codes.UNAVAILABLE) from error
     if answer is None:
-        raise ended(f"no safety gate has answered within {PATIENCE_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
+        raise ended(f"no safety gate has answered within {TIMEOUT_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
     state = SafetyState.State.Name(answer.state).removeprefix("STATE_").lower()
     sentence = next(fault.sentence for fault in answer.faults if fault.code == PERSON_STOP)
     typer.echo(f"the safety gate has heard it: {state}, {sentence}")

@@ -22,7 +22,7 @@ from paramove.supervision import QueuedOutput
 if TYPE_CHECKING:
     from paramove.bus import Publisher, Subscriber
 
-PERIOD_S, PATIENCE_S, STOP_S = 0.02, 3.0, 1.0
+PERIOD_S, TIMEOUT_S, STOP_S = 0.02, 3.0, 1.0
 SILENT_S = 2.0
 """A driver that looks at its servos says nothing meanwhile."""
 KEYS = "1-9 choose a joint, + and - move it, space stops, a arms, q ends"
@@ -94,10 +94,10 @@ class _Link:
 
     def wait_for_arm(self) -> None:
         """Ends the command if no driver says where the joints are, or none listens."""
-        end_s = time.monotonic() + PATIENCE_S
+        end_s = time.monotonic() + TIMEOUT_S
         while not (self.jogging.angles and self._trajectories.subscriptions and self._arming.state):
             if time.monotonic() > end_s:
-                raise ended(f"no arm is heard within {PATIENCE_S:g} s: is its driver running?", exit_codes.UNAVAILABLE)
+                raise ended(f"no arm is heard within {TIMEOUT_S:g} s: is its driver running?", exit_codes.UNAVAILABLE)
             self._subscribers[0].socket.poll(int(1e3 * PERIOD_S))
             self.exchange()
 

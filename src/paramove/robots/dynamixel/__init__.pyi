@@ -1,6 +1,6 @@
 from .arm.driven_arm import DrivenArm as DrivenArm
 from .arm.gravity_compensated_arm import GravityCompensatedArm as GravityCompensatedArm
-from .arm.servo_arm import Patience as Patience
+from .arm.servo_arm import Timeouts as Timeouts
 from .arm.servo_loop import LoopSettings as LoopSettings
 from .arm.setup import ServoArmSetup as ServoArmSetup
 from .arm.setup import joint_servos as joint_servos

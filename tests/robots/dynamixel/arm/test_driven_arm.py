@@ -16,7 +16,7 @@ from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import StopRequest
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import SLOW_NS, DrivenArm
-from paramove.robots.dynamixel.arm.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
@@ -30,7 +30,7 @@ from paramove.robots.dynamixel.emulated.wire_faults import WireFaults
 from tests.robots.dynamixel.person import Person
 from tests.robots.dynamixel.untrue_replies import OneElsewhere
 
-SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
+SETTINGS = LoopSettings(timeouts=Timeouts(silent_s=2.0, watchdog_s=2.54, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
 TORQUE_LOST = "lost its torque: it was switched off, lost power or was rebooted; the arm must be armed again"
@@ -333,7 +333,7 @@ def test_pulled_out_and_plugged_in_again_it_is_disarmed(emulator, tmp_path, monk
     with DynamixelEmulator(emulator.bus.servos, link) as linked:
         port = servo_port(ROBOT, str(link))
         port.latency_s = LATENCY_S
-        settings = LoopSettings(patience=Patience(silent_s=0.5, watchdog_s=0.5, read_s=1.0))
+        settings = LoopSettings(timeouts=Timeouts(silent_s=0.5, watchdog_s=0.5, read_s=1.0))
         with DrivenArm(ROBOT, joint_servos(ROBOT), port, settings) as arm:
             person = PersonAtEmulator(arm, linked)
             person.arms_and_waits()

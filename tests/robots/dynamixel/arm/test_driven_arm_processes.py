@@ -17,7 +17,7 @@ import pytest
 
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
-from paramove.robots.dynamixel.arm.servo_arm import Patience
+from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.setup import joint_servos, servo_port
 from paramove.robots.dynamixel.emulated.arm import emulated_servos
@@ -26,7 +26,7 @@ from tests.robots.dynamixel.person import PATIENT_S, Person
 
 ROOT = Path(__file__).parents[4]
 ROBOT = RobotDescription.load(ROOT / "robot_description" / "open_manipulator_x")
-SETTINGS = LoopSettings(patience=Patience(silent_s=2.0, watchdog_s=1.0, read_s=1.0))
+SETTINGS = LoopSettings(timeouts=Timeouts(silent_s=2.0, watchdog_s=1.0, read_s=1.0))
 """Other programs may keep the emulator waiting, and the test."""
 LATENCY_S = 0.3
 TRIPPED = 0xFF
@@ -163,7 +163,7 @@ def test_logic_that_hangs_while_the_loop_lives_ends_in_the_stop_ramp(emulator):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="others than root cannot open a port that is in use")
 def test_another_program_that_talks_on_the_bus_stops_the_arm(emulator):
-    with driven(emulator.port, replace(SETTINGS, patience=replace(SETTINGS.patience, silent_s=0.5))) as person:
+    with driven(emulator.port, replace(SETTINGS, timeouts=replace(SETTINGS.timeouts, silent_s=0.5))) as person:
         person.arms_and_waits()
         with process(TALK, emulator.port) as other:
             assert other.stdout.readline() == "open\n"

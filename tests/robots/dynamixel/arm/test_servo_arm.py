@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paramove.robots.dynamixel.arm.servo_arm import Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoRefusedError
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
@@ -45,7 +45,7 @@ def port(emulator):
 
 @pytest.fixture
 def arm(port):
-    return ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=2.54))
+    return ServoArm(JOINTS, ServoChain(port), PERIOD_S, Timeouts(watchdog_s=2.54))
 
 
 def memory(emulator, name: str) -> list[int]:
@@ -165,7 +165,7 @@ def test_an_adapter_that_keeps_answers_for_16_ms_is_told_with_time_and_remedy(em
 
 
 def test_servos_that_stopped_by_themselves_are_told_take_no_goal_and_hold_again_when_armed(emulator, port):
-    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(watchdog_s=1.0))
+    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Timeouts(watchdog_s=1.0))
     assert arm.take_hold() == ()
     while memory(emulator, "Bus Watchdog") != [0xFF] * 3:  # nobody asks them anything
         pass
@@ -273,7 +273,7 @@ def test_low_voltage_is_warned_of_and_too_low_a_one_is_a_fault(arm, emulator):
 
 @pytest.mark.parametrize(("share", "latency_s", "noisy"), [(0.01, 0.1, False), (0.3, 0.01, True)])
 def test_one_damaged_answer_in_a_hundred_is_no_matter_and_many_are_a_fault(emulator, port, share, latency_s, noisy):
-    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Patience(silent_s=60.0))
+    arm = ServoArm(JOINTS, ServoChain(port), PERIOD_S, Timeouts(silent_s=60.0))
     arm.measured()
     port.latency_s = latency_s
     emulator.faults = WireFaults(damaged=share, seed=5)

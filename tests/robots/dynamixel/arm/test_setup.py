@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from paramove.documents.input_error import InputError
 from paramove.msgs.safety_state_pb2 import SafetyState
 from paramove.robots.description import DescriptionError, RobotDescription
-from paramove.robots.dynamixel.arm.servo_arm import Patience
+from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.setup import ServoArmSetup, calibrated, joint_servos, servo_port, uncalibrated
 from paramove.robots.dynamixel.calibration.arm_calibration import CalibrationError, JointCalibration
 from paramove.robots.dynamixel.emulated.arm import emulated_servos
@@ -25,7 +25,7 @@ from tests.robots.dynamixel.small_arm import calibration
 
 FOLDER = Path("robot_description")
 KOCH, OPEN = (RobotDescription.load(FOLDER / name) for name in ("koch_v1_1", "open_manipulator_x"))
-PATIENCE = Patience(silent_s=2.0, watchdog_s=2.54, read_s=0.4)
+TIMEOUTS = Timeouts(silent_s=2.0, watchdog_s=2.54, read_s=0.4)
 
 
 def one_of(place: int) -> JointCalibration:
@@ -36,7 +36,7 @@ def one_of(place: int) -> JointCalibration:
     )  # fmt: skip
 
 
-LIMITS = {"patience": PATIENCE, "nominal": True}
+LIMITS = {"timeouts": TIMEOUTS, "nominal": True}
 HERE = ThisLaunch(os.getpid())
 """The launch that emulates the servos, in the tests of emulated ones."""
 
@@ -85,7 +85,7 @@ def test_no_servo_turns_faster_than_its_joint_may_whatever_it_is_told():
 def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(tmp_path):
     assert uncalibrated(OPEN) == ()
     link = tmp_path / "usb-FTDI_0001-if00-port0"
-    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, patience=PATIENCE).driven_arm(tmp_path) as arm:
+    with DynamixelEmulator(emulated_servos(KOCH), link), setup(link, timeouts=TIMEOUTS).driven_arm(tmp_path) as arm:
         person = Person(arm)
         person.waits_for("DISARMED")
         person.arms()
@@ -214,6 +214,6 @@ def test_a_robot_without_a_servo_bus_is_refused():
 
 
 @pytest.mark.parametrize("wrong", [{"silent_s": 0.0}, {"watchdog_s": 3.0}, {"watchdog_s": 0.001}])
-def test_impossible_patience_is_refused(wrong):
+def test_impossible_timeouts_is_refused(wrong):
     with pytest.raises((InputError, ValidationError), match=r"watchdog_s 0\.02 to 2\.54 s"):
-        ServoArmSetup(robot=FOLDER / "koch_v1_1", port=Path("x"), patience=wrong)
+        ServoArmSetup(robot=FOLDER / "koch_v1_1", port=Path("x"), timeouts=wrong)

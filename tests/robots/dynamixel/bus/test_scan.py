@@ -20,7 +20,7 @@ RATE = 1_000_000
 
 
 @pytest.fixture(autouse=True)
-def patience(monkeypatch):
+def timeouts(monkeypatch):
     """Other programs may keep the emulator waiting."""
     monkeypatch.setattr("paramove.robots.dynamixel.bus.scan.SHORT_LATENCY_S", LATENCY_S)
 

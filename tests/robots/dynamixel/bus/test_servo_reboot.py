@@ -52,4 +52,4 @@ def test_a_silent_servo_is_told(arm):
         servo_before_reboot(arm.chain, 9)
     arm.chain.reboot(1)
     with pytest.raises(ServoSilentError, match=r"servo 1 (does|did) not answer"):
-        reboot_servo(arm.chain, 1, patience_s=0.05)
+        reboot_servo(arm.chain, 1, timeout_s=0.05)

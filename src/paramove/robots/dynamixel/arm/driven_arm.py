@@ -28,7 +28,7 @@ FOLLOWING = float(np.deg2rad(10.0))
 """How far a joint may be from where it is commanded: more means that somebody or something holds it."""
 EMERGENCY_MS = 500.0
 SILENCE = 1.5
-"""Times the loop's patience is the gate's, so that the loop, which knows the servos, tells first who is silent."""
+"""Times the loop's timeout is the gate's, so that the loop, which knows the servos, tells first who is silent."""
 SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
 
 
@@ -54,7 +54,7 @@ class DrivenArm:
         following = np.full(description.n_joints, FOLLOWING)
         following[list(description.gripper_indices)] = np.inf
         safety = SafetySettings(
-            measured_timeout_ms=SILENCE * settings.patience.silent_s * 1e3,
+            measured_timeout_ms=SILENCE * settings.timeouts.silent_s * 1e3,
             following=following,
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )

@@ -37,7 +37,7 @@ LOW_VOLTAGE_SHARE = 0.10
 
 
 @dataclass(frozen=True)
-class Patience:
+class Timeouts:
     """How long silence and slowness are borne.
 
     Attributes:
@@ -91,20 +91,20 @@ class ServoArm:
         servos: In the order of the robot's joint vector.
         chain: Of their bus.
         period_s: Of the loop that will read and command.
-        patience: With silence.
+        timeouts: For servos and reads.
 
     All methods raise PortLostError when the port went away.
     """
 
     def __init__(
-        self, servos: Sequence[JointServo], chain: ServoChain, period_s: float, patience: Patience | None = None
+        self, servos: Sequence[JointServo], chain: ServoChain, period_s: float, timeouts: Timeouts | None = None
     ) -> None:
         self.servos = tuple(servos)
         self.health = {servo.joint: ServoHealth() for servo in servos}
         self.holds = False
         self._chain = chain
         self._period_s = period_s
-        self._patience = patience or Patience()
+        self._timeouts = timeouts or Timeouts()
         self._turns = [0 for _ in servos]
         self._numbers = [servo.number for servo in servos]
         self._registers = servos[0].model.registers  # those used here have one address in all models
@@ -118,7 +118,7 @@ class ServoArm:
         if faults:
             return faults
         self._watch.jump = None
-        fault = bus_fault(self.measured, self._patience.read_s or self._period_s) or self._fault_of_jump()
+        fault = bus_fault(self.measured, self._timeouts.read_s or self._period_s) or self._fault_of_jump()
         return () if fault is None else (fault,)
 
     def take_hold(self) -> tuple[Fault, ...]:
@@ -160,7 +160,7 @@ class ServoArm:
         self._chain.write(number, registers["Torque Enable"], 1)
         if not self._chain.read(number, registers["Torque Enable"]):
             raise ServoError(number, f"servo {number} was told to hold and does not: reboot it")
-        self._chain.write(number, registers["Bus Watchdog"], round(self._patience.watchdog_s / WATCHDOG_UNIT_S))
+        self._chain.write(number, registers["Bus Watchdog"], round(self._timeouts.watchdog_s / WATCHDOG_UNIT_S))
         return goal
 
     def _position(self, number: int, torque: bool) -> int:
@@ -231,7 +231,7 @@ class ServoArm:
         """A joint that jumped, joints that are silent for too long, or a wire that damages too much."""
         if self._watch.jump is not None:
             return self._fault_of_jump()
-        allowed_s = self._patience.silent_s
+        allowed_s = self._timeouts.silent_s
         late = [self.servos[place] for place in np.flatnonzero(reading.ages_s > allowed_s)]
         if not late:
             return self._fault_of_noise()
@@ -288,7 +288,7 @@ class ServoArm:
     def look_after_watchdogs(self) -> Fault | None:
         """Read the bus watchdogs of all servos; one that has tripped takes no goal until somebody arms again."""
         tripped = [servo for servo, _, (units,) in self._told("Bus Watchdog") if units == WATCHDOG_TRIPPED]
-        return watchdog_fault(tripped[0], self._patience.watchdog_s) if tripped else None
+        return watchdog_fault(tripped[0], self._timeouts.watchdog_s) if tripped else None
 
     def _told(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
         """Of each servo that answers, its health so far and these registers."""

@@ -20,7 +20,7 @@ import numpy as np
 from paramove.documents import Floats, InputError
 from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryStatus
 from paramove.robots import RESTARTED, RobotDescription, ThisLaunch
-from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, Patience, ServoArm
+from paramove.robots.dynamixel.arm.servo_arm import ArmReading, Counts, ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
@@ -60,7 +60,7 @@ class LoopSettings:
 
     Attributes:
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
-        patience: With silence.
+        timeouts: For servos and reads.
         standing_faults: That keep the arm from being armed, whatever its servos say.
         stop_inputs: Files that press the emergency stop.
         rest: Angles by joint, rad, to which the armed arm goes slowly at a normal end, and then goes limp; without time
@@ -71,7 +71,7 @@ class LoopSettings:
     """
 
     torque_off: bool = False
-    patience: Patience = field(default_factory=Patience)
+    timeouts: Timeouts = field(default_factory=Timeouts)
     standing_faults: tuple[Fault, ...] = ()
     stop_inputs: StopInputs = field(default_factory=StopInputs)
     rest: Mapping[str, float] | None = None
@@ -122,7 +122,7 @@ class ServoLoop:
         self._servos = servos
         self._settings = settings
         self._said = said
-        self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.patience)
+        self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
         self._reader: StreamReader | None = None
         self._output: list[DriverOutput] = []
         self._step = 0
@@ -237,7 +237,7 @@ class ServoLoop:
 
     def _fault(self, reading: ArmReading) -> Fault | None:
         fault = self._arm.fault_of_answers(reading)
-        if self._arm.holds and self._silent_s > WATCHDOG_SHARE * self._settings.patience.watchdog_s:
+        if self._arm.holds and self._silent_s > WATCHDOG_SHARE * self._settings.timeouts.watchdog_s:
             fault = self._arm.look_after_watchdogs() or fault
         if self._step % HEALTH_STEPS == 0:
             fault = self._arm.look_after() or fault
@@ -275,7 +275,7 @@ class ServoLoop:
             self._reopen_s = time.monotonic() + REOPEN_S
             return
         self.lost = ""
-        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.patience)
+        self._arm = ServoArm(self._servos, ServoChain(self._port), self._period_s, self._settings.timeouts)
 
     def _let_go(self, torque_off: bool) -> None:
         for failed in self._arm.let_go(torque_off):

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from paramove.documents import OldNames
 from paramove.robots import DescriptionError, RobotDescription, ThisLaunch
 from paramove.robots.dynamixel.arm.driven_arm import DrivenArm
-from paramove.robots.dynamixel.arm.servo_arm import Patience
+from paramove.robots.dynamixel.arm.servo_arm import Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
 from paramove.robots.dynamixel.arm.servo_loop import LoopSettings
 from paramove.robots.dynamixel.arm.stop_inputs import StopInputs
@@ -26,28 +27,30 @@ LATENCY_SHARE = 0.8
 costs none."""
 
 
-class EmulatedLimits(BaseModel):
+class EmulatedLimits(OldNames):
     """What is allowed to servos that the launch itself emulates, and to no others.
 
     Attributes:
-        patience: With silence: they share the processors with everything else, and may be late.
+        timeouts: For servos and reads: they share the processors with everything else, and may be late.
         nominal: Whether they are even for an arm that everybody assembles differently.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    patience: Patience = Patience()
+    old_names = (("patience", "timeouts"),)
+
+    timeouts: Timeouts = Timeouts()
     nominal: bool = False
 
 
-class ServoArmSetup(BaseModel):
+class ServoArmSetup(OldNames):
     """Parameters of a servo arm.
 
     Attributes:
         robot: Folder of the arm's description.
         port: Of its bus, seen from the run's folder: a link in /dev/serial/by-id, whose name has the adapter's number.
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
-        patience: With silence.
+        timeouts: For servos and reads.
         calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
         stop_file: The emergency stop is pressed while there is a file of this name, for programs that watch a button.
         stop_line: File in which the system shows the line of a stop button, such as /sys/class/gpio/gpio17/value; read
@@ -56,18 +59,20 @@ class ServoArmSetup(BaseModel):
             pressed.
         on_exit: At a normal end: left as when it is disarmed, or slowly to `rest_deg`, then limp.
         rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
-        emulated: Takes the place of `patience` where the driver verifies, at every open of the port, that this very
+        emulated: Takes the place of `timeouts` where the driver verifies, at every open of the port, that this very
             launch emulates the servos; only then a program may arm them. None: they count as real in any case.
     """
+
+    old_names = (("patience", "timeouts"),)
 
     robot: Path
     port: Path
     torque_off: bool = False
-    patience: Patience = Patience()
+    timeouts: Timeouts = Timeouts()
     calibration: Path | None = None
     emulated: EmulatedLimits | None = None
     on_exit: Literal["as_disarmed", "rest_then_off"] = "as_disarmed"
-    rest_deg: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}
+    rest_deg: dict[str, Annotated[float, Field(allow_inf_nan=False)]] = {}  # noqa: RUF012 - pydantic copies it
     stop_file: Path | None = None
     stop_line: Path | None = None
     stop_line_pressed: Literal[0, 1] = 1
@@ -85,8 +90,8 @@ class ServoArmSetup(BaseModel):
         description = RobotDescription.load(self.robot)
         reason = (launch or ThisLaunch()).why_not_servos(run_folder / self.port)
         emulated = None if reason else self.emulated
-        patience = self.patience if emulated is None else emulated.patience
-        port = servo_port(description, str(run_folder / self.port), patience.read_s)
+        timeouts = self.timeouts if emulated is None else emulated.timeouts
+        port = servo_port(description, str(run_folder / self.port), timeouts.read_s)
         calibration = None
         if self.calibration is not None:
             calibration = ArmCalibration.load(self.calibration, serial_of(self.port.name))
@@ -95,7 +100,7 @@ class ServoArmSetup(BaseModel):
         faults = () if is_even or calibration is not None else uncalibrated(description)
         servos = joint_servos(description, calibration)
         stop_inputs = StopInputs(self.stop_file, self.stop_line, self.stop_line_pressed)
-        settings = LoopSettings(self.torque_off, patience, faults, stop_inputs, self._rest(description))
+        settings = LoopSettings(self.torque_off, timeouts, faults, stop_inputs, self._rest(description))
         if emulated is not None:
             settings = replace(settings, emulated_by=launch)
         elif self.emulated is not None:

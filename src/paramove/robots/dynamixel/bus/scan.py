@@ -232,7 +232,7 @@ def _not_understood(chain: ServoChain) -> int:
 
 
 def _pinged_in_vain(chain: ServoChain, number: int) -> PingedServo | None:
-    """Most likely, and so without much patience."""
+    """Most likely, and so with short timeouts."""
     latency_s, chain.port.latency_s = chain.port.latency_s, min(chain.port.latency_s, SHORT_LATENCY_S)
     try:
         return chain.ping(number, patient=False)

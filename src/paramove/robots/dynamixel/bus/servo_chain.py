@@ -163,8 +163,8 @@ class ServoChain:
 
     def read(self, number: int, register: Register) -> int:
         """One number of one servo. Raises ServoError."""
-        for patience_s in ATTEMPTS_S:
-            answers = self._read([number], register.address, register.size, patience_s)
+        for timeout_s in ATTEMPTS_S:
+            answers = self._read([number], register.address, register.size, timeout_s)
             if number in answers:
                 _check(number, answers[number], f"read {register.name}")
                 return _values([register], answers[number])[register.name]
@@ -216,14 +216,14 @@ class ServoChain:
         content = [byte for number, value in values.items() for byte in (number, *_bytes(register, value))]
         self._send(lambda: self._sdk.syncWriteTxOnly(self.port, register.address, register.size, content, len(content)))
 
-    def _read(self, numbers: Sequence[int], address: int, size: int, patience_s: float = 0.0) -> dict[int, Packet]:
+    def _read(self, numbers: Sequence[int], address: int, size: int, timeout_s: float = 0.0) -> dict[int, Packet]:
         while not self.has_room():
             self._hear_late(self._late.rest_s)
         wide = self._late.length_for(size)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
             packet = [0, 0, 0, 0, numbers[0], 7, 0, Instruction.READ, *asked, 0, 0]
-            return self._exchange(lambda: self._sdk.txPacket(self.port, packet), {numbers[0]: wide}, patience_s)
+            return self._exchange(lambda: self._sdk.txPacket(self.port, packet), {numbers[0]: wide}, timeout_s)
         sizes = dict.fromkeys(numbers, wide)
         return self._exchange(
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
@@ -238,10 +238,10 @@ class ServoChain:
     def _insist(self, packet: list[int], number: int, size: int, attempts_s: Sequence[float]) -> Packet | None:
         """Ask one servo more than once if need be; answers to its first questions may come with that to the last."""
         late = 0
-        for patience_s in attempts_s:
+        for timeout_s in attempts_s:
             stray = self.counts.stray
             answers = self._exchange(
-                lambda: self._sdk.txPacket(self.port, list(packet)), {number: size}, patience_s, late
+                lambda: self._sdk.txPacket(self.port, list(packet)), {number: size}, timeout_s, late
             )
             if number in answers:
                 return answers[number]
@@ -249,7 +249,7 @@ class ServoChain:
         return None
 
     def _exchange(
-        self, send: Callable[[], int], sizes: dict[int, int], patience_s: float = 0.0, late: int = 0
+        self, send: Callable[[], int], sizes: dict[int, int], timeout_s: float = 0.0, late: int = 0
     ) -> dict[int, Packet]:
         """Ask, and wait for the answer of each of these servos with so many bytes of data.
 
@@ -259,7 +259,7 @@ class ServoChain:
         self._send(send)
         self.counts.asked += len(sizes)
         answer_bytes = sum(PACKET_BYTES + size for size in sizes.values())
-        self.port.setPacketTimeout(answer_bytes, len(sizes), patience_s)
+        self.port.setPacketTimeout(answer_bytes, len(sizes), timeout_s)
         noisy, stray, owing = self.counts.noisy, self.counts.stray, bool(self._late)
         found = self._answers(dict(sizes))
         answers = self._trusted(found, sizes, late)

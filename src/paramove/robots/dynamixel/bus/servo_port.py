@@ -141,10 +141,10 @@ class ServoPort:
             raise OSError(errno.EIO, "end of file")
         return data
 
-    def setPacketTimeout(self, packet_length: int, answers: int = 1, patience_s: float = 0.0) -> None:
+    def setPacketTimeout(self, packet_length: int, answers: int = 1, timeout_s: float = 0.0) -> None:
         """For so many bytes of so many answers to what was just sent, and so much longer, from now on."""
         wire_s = (self._asked_bytes + packet_length) * BITS_PER_BYTE / self.baud_rate
-        self._wait_for(wire_s + answers * self.return_delay_s + self.latency_s + patience_s)
+        self._wait_for(wire_s + answers * self.return_delay_s + self.latency_s + timeout_s)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
         """For an answer that takes at most so long, from now on."""

@@ -9,7 +9,7 @@ from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
 from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
 
-PATIENCE_S = 3.0
+TIMEOUT_S = 3.0
 LOADED_SHARE = 0.05
 """Of the greatest load or current: more is a joint that carries something."""
 FULL_LOAD = 1000
@@ -54,12 +54,12 @@ def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
         )
 
 
-def reboot_servo(chain: ServoChain, number: int, patience_s: float = PATIENCE_S) -> FoundServo:
+def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -> FoundServo:
     """Reboot it and wait until it answers again: torque off, errors cleared. Raises ServoError."""
     chain.reboot(number)
-    end_s = time.monotonic() + patience_s
+    end_s = time.monotonic() + timeout_s
     while time.monotonic() < end_s:
         pinged = chain.ping(number, patient=False)
         if pinged is not None:
             return looked_at(chain, pinged)
-    raise ServoSilentError(number, f"servo {number} does not answer {patience_s:g} s after its reboot: check its power")
+    raise ServoSilentError(number, f"servo {number} does not answer {timeout_s:g} s after its reboot: check its power")
