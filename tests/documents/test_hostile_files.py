@@ -124,6 +124,8 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "encrypted": ("NPZ", encrypted, "encrypted or compressed in an unusual way"),
     "bzip2": ("NPZ", lambda: npz(npy("(3,)", bytes(24)), zipfile.ZIP_BZIP2), "in an unusual way"),
     "lzma": ("NPZ", lambda: npz(npy("(3,)", bytes(24)), zipfile.ZIP_LZMA), "in an unusual way"),
+    "half a character": ("NPZ", lambda: npz(npy("(1,)", b"\x80\xdc\0\0", "<U1")), "halves of characters"),
+    "no character": ("NPZ", lambda: npz(npy("(1,)", b"\xff\xff\xff\x7f", "<U1")), "halves of characters"),
     "no length": ("NPZ", lambda: npz(npy("(1000000000000,)", b"", "<U0")), "values of no length"),
     "directory": ("NPZ", lambda: b"PK\x05\x06" + struct.pack("<HHHHIIH", 0, 0, 1, 1, 3 * 10**9, 0, 0), "damaged"),
     "zeros by zstd": ("MCAP", zeros_by_zstd, "holds no pose"),

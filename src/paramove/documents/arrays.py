@@ -12,6 +12,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
@@ -108,4 +109,8 @@ def _array(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, raisin
             raise ValueError(f"{member.filename!r:.80} claims {prod(shape)} values of no length")
     with archive.open(member) as file:
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
-        return array
+    if array.dtype.kind == "U" and array.size and array.dtype.itemsize:
+        codes = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).view(np.uint32)
+        if np.any((codes - 0xD800 < 0x800) | (codes > 0x10FFFF)):  # unsigned: only 0xD800 to 0xDFFF are below 0x800
+            raise ValueError(f"{member.filename!r:.80} holds halves of characters, which no text has")
+    return array

@@ -15,6 +15,8 @@ from mcap.records import Channel, Chunk, Message, Schema
 from zstandard import ZstdDecompressor, ZstdError
 
 HEAD_BYTES = 9  # opcode and length of a record
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+"""Of a message's record: channel, sequence, log time, publish time; the rest is the message (MCAP specification)."""
 RECORD_BYTES = 128 * 2**20
 """Of one record in a file, and of a chunk decompressed. Our chunks have 64 KiB, those of other writers some MiB."""
 ALWAYS_BYTES = 16 * 2**20
@@ -60,13 +62,15 @@ def records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Me
         end = at + HEAD_BYTES + length
         if end > len(data):
             break
-        stream = ReadDataStream(BytesIO(data[at + HEAD_BYTES : end]))
-        if data[at] == Opcode.MESSAGE:
-            yield at, Message.read(stream, length)
+        if data[at] == Opcode.MESSAGE:  # nearly all are: read here, which takes a fifth of the time of a stream
+            if length < MESSAGE_HEAD.size:
+                raise ValueError("a message is shorter than its head")
+            channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(data, at + HEAD_BYTES)
+            yield at, Message(channel, log_ns, data[at + HEAD_BYTES + MESSAGE_HEAD.size : end], publish_ns, sequence)
         elif data[at] == Opcode.CHANNEL:
-            yield at, Channel.read(stream)
+            yield at, Channel.read(ReadDataStream(BytesIO(data[at + HEAD_BYTES : end])))
         elif data[at] == Opcode.SCHEMA:
-            yield at, Schema.read(stream)
+            yield at, Schema.read(ReadDataStream(BytesIO(data[at + HEAD_BYTES : end])))
         elif not data[at]:
             break  # there is no record of kind 0
         at = end

@@ -41,6 +41,12 @@ def test_points_names_unit_and_rate(tmp_path, points, unit, factor):
     assert_allclose(take.positions, factor * points[:, [0, 2]], rtol=1e-6, atol=factor * 1e-4)
 
 
+def test_names_that_are_no_utf_8_are_taken_for_latin_1(tmp_path, points):
+    path = write(tmp_path / "take.c3d", points, names=["Ann?:RSHO", *NAMES[1:]])
+    path.write_bytes(path.read_bytes().replace(b"Ann?:RSHO", b"Ann\xe9:RSHO"))
+    assert read_c3d(path)[0].point_names[0] == "Ann\u00e9:RSHO"
+
+
 def test_lost_markers_are_named_filled_or_refused(tmp_path, points):
     points[10:14, 1] = np.nan
     points[30:42, 2] = 0.0

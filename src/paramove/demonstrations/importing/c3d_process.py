@@ -16,6 +16,15 @@ CPU_S = 4
 CPU_BYTES_PER_S = 2**20
 
 
+def text(read: str) -> str:
+    """Text of a C3D file, which does not tell its encoding: what is no UTF-8 is taken for Latin-1."""
+    try:
+        read.encode("utf-8")
+    except UnicodeEncodeError:
+        return read.encode("utf-8", "surrogateescape").decode("latin-1")
+    return read
+
+
 def main(source: str, result: str) -> int:
     """Points, their names, unit, rate; 0, or 1 with the reader's complaint on standard error."""
     size = os.stat(source).st_size
@@ -33,8 +42,8 @@ def main(source: str, result: str) -> int:
         np.savez(
             result,
             positions=np.moveaxis(points[:3], -1, 0).swapaxes(1, 2),
-            points=np.array(labels[: points.shape[1]], dtype=np.str_),
-            unit=units[0] if units else "",
+            points=np.array([text(label) for label in labels[: points.shape[1]]], dtype=np.str_),
+            unit=text(units[0]) if units else "",
             rate_hz=float(read["header"]["points"]["frame_rate"]),
         )
     except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, MemoryError) as error:
