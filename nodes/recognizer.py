@@ -25,6 +25,8 @@ PUBLISHES = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
 class Config(NodeConfig, PointingSetup):
+    old_names = (("motion.patience_s", "motion.timeout_s"),)
+
     motion: MotionThresholds = MotionThresholds()
     pointing: PointingThresholds = PointingThresholds()
 

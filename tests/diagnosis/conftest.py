@@ -1,7 +1,5 @@
 """Programs, and folders outside of pytest's, which only root may enter and whose names are too long for sockets."""
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
@@ -9,22 +7,6 @@ import pytest
 
 HOLD = "import sys; port = open(sys.argv[1], 'r+b', buffering=0); print('held', flush=True); sys.stdin.read()"
 """A program that has a device open until its input ends."""
-
-
-@pytest.fixture
-def started():
-    """Starts programs; returns each and what it says first."""
-    running = []
-
-    def start(code, *arguments):
-        pipe = subprocess.PIPE
-        program = subprocess.Popen([sys.executable, "-c", code, *arguments], stdin=pipe, stdout=pipe, text=True)
-        running.append(program)
-        return program, program.stdout.readline().strip()
-
-    yield start
-    for program in running:
-        program.communicate()
 
 
 @pytest.fixture

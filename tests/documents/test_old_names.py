@@ -8,9 +8,10 @@ from paramove.documents import OldNames
 
 class Waiting(OldNames):
     model_config = ConfigDict(extra="forbid")
-    old_names = (("patience_s", "timeout_s"),)
+    old_names = (("patience_s", "timeout_s"), ("limits.patience_s", "limits.timeout_s"))
 
     timeout_s: float = 1.0
+    limits: dict[str, float] = {}  # noqa: RUF012 - pydantic copies it
 
 
 def test_the_old_name_is_taken_with_a_warning(caplog):
@@ -21,6 +22,12 @@ def test_the_old_name_is_taken_with_a_warning(caplog):
 def test_the_new_name_is_taken_silently(caplog):
     assert Waiting.model_validate({"timeout_s": 2.0}).timeout_s == 2.0
     assert caplog.text == ""
+
+
+def test_an_old_name_within_a_field(caplog):
+    assert Waiting.model_validate({"limits": {"patience_s": 3.0}}).limits == {"timeout_s": 3.0}
+    assert "limits.patience_s is called limits.timeout_s" in caplog.text
+    assert Waiting.model_validate({"limits": {}}).limits == {}
 
 
 def test_both_at_once_are_refused():

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paramove.phmm import LinearPHMM, MovementDescription
-from paramove.phmm import cached_model as kept_models
+from paramove.phmm import LinearPHMM, MovementDescription, model_cache
 from paramove.phmm.model_cache import cached_model, stored_model
 from paramove.source_code import code_digest
 
@@ -59,7 +58,7 @@ def test_a_file_that_is_damaged_or_of_another_source_is_replaced(train, tmp_path
 
 def test_a_model_of_other_code_is_replaced(train, tmp_path, monkeypatch):
     cached_model(LinearPHMM, "waving", "one person", train, tmp_path)
-    monkeypatch.setattr(kept_models, "code_digest", lambda *modules: " ".join(modules))
+    monkeypatch.setattr(model_cache, "code_digest", lambda *modules: " ".join(modules))
     model = cached_model(LinearPHMM, "waving", "one person", train, tmp_path, modules=["paramove.hmm"])
     assert model.description.source == f"one person, code {__name__} paramove.hmm"
     assert train.times == 2

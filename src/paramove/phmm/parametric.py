@@ -229,6 +229,8 @@ class ParametricHMM(ABC):
         expected and found.
         """
         record = read_record(Path(path))
+        if record.class_name not in _CLASSES:
+            _load_all_classes()
         known = {name: kind for name, kind in _CLASSES.items() if issubclass(kind, cls)}
         if record.class_name not in known:
             raise ModelFileError(f"{path}: expected one of {sorted(known)}, found a {record.class_name}")
@@ -290,6 +292,14 @@ class ParametricHMM(ABC):
 
 
 _CLASSES: dict[str, type[ParametricHMM]] = {}  # what a file may name; filled as the classes are defined
+
+
+def _load_all_classes() -> None:
+    """The package loads a class when it is first used; a file may name one that nobody has used yet."""
+    from paramove import phmm
+
+    for name in dir(phmm):
+        getattr(phmm, name)
 
 
 def check_training(

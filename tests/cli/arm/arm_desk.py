@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
 from paramove.robots.dynamixel.bus.servo_setup import only_servo
-from paramove.robots.dynamixel.calibration.arm_calibration import calibration_path
+from paramove.robots.dynamixel.calibration.path import calibration_path
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, koch_servos, rest
 from tests.robots.dynamixel.small_arm import LINK, SERIAL

@@ -11,7 +11,8 @@ from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.robots.dynamixel.bus.servo_models import MODELS
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
-from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, calibration_path
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
+from paramove.robots.dynamixel.calibration.path import calibration_path
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 from paramove.safety.gate_io import PERSON_STOP
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, hands, rest
@@ -221,7 +222,7 @@ def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
     fault = SafetyFault(code=PERSON_STOP, sentence="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
-    monkeypatch.setattr("paramove.operator.terminal_stop.stop_arm", lambda folder, source, timeout_s: state)
+    monkeypatch.setattr("paramove.operator.stop_arm", lambda folder, source, timeout_s: state)
     done = CliRunner().invoke(build("arm"), ["arm", "estop"])
     assert done.exit_code == code
     assert ("hold, stopped from the terminal" in done.stdout) == (code == 0)

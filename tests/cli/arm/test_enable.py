@@ -37,7 +37,7 @@ def words(tmp_path, monkeypatch):
             raise TopicTakenError("operator says operator/arm already")
         return ANSWERS[told["answer"]]
 
-    monkeypatch.setattr("paramove.operator.terminal_arming.arm_by_word", arm_by_word)
+    monkeypatch.setattr("paramove.operator.arm_by_word", arm_by_word)
     monkeypatch.setattr(TerminalPerson, "is_at_terminal", True)
     return told
 

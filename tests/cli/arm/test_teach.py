@@ -14,12 +14,8 @@ from paramove.cli.main import build
 from paramove.demonstrations import DemonstrationSet
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.arm.torque_off_arm import TorqueOffArm
-from paramove.robots.dynamixel.calibration.arm_calibration import (
-    ArmCalibration,
-    CalibratedBus,
-    JointCalibration,
-    calibration_path,
-)
+from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration, CalibratedBus, JointCalibration
+from paramove.robots.dynamixel.calibration.path import calibration_path
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
 from tests.robots.dynamixel.koch_arm import KOCH, PLAN, koch_servos
 from tests.robots.dynamixel.small_arm import LINK, SERIAL

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from paramove.msgs.relocation_pb2 import RelocationStatus
-from paramove.runs import relocate_by_pointing
 from paramove.runs.recorded_run import load_run
+from paramove.runs.relocate_by_pointing.__main__ import main
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 from sim import small_person
 from tests.runs.synthetic_relocations import GOOD, REFUSED, write_run
@@ -82,7 +82,7 @@ def test_a_run_that_did_not_come_to_its_end_is_a_failure(tmp_path):
 @pytest.mark.parametrize(("put", "code"), [(GOOD, 0), (FAR, 3)])
 def test_command_writes_numbers_report_and_video(tmp_path, capsys, put, code):
     folder = write_run(tmp_path / "run", [put], view=True)
-    assert relocate_by_pointing.main([str(folder)]) == code
+    assert main([str(folder)]) == code
     shown = capsys.readouterr().out
     assert ("SUCCESS: 1 of 1" if code == 0 else "FAILURE: 0 of 1") in shown
     assert "the scale is 0.42" in shown
@@ -96,14 +96,14 @@ def test_command_writes_numbers_report_and_video(tmp_path, capsys, put, code):
 
 def test_a_run_without_view_has_no_video(tmp_path):
     folder = write_run(tmp_path / "run", [GOOD])
-    assert relocate_by_pointing.main([str(folder)]) == 0
+    assert main([str(folder)]) == 0
     assert not (folder / "relocations.mp4").exists()
     assert "<video" not in (folder / "report.html").read_text()
 
 
 def test_a_folder_without_a_run_is_told(tmp_path, capsys):
-    assert relocate_by_pointing.main([str(tmp_path)]) == 66
+    assert main([str(tmp_path)]) == 66
     assert "holds no recording.mcap" in capsys.readouterr().err
     folder = write_run(tmp_path / "run", [GOOD], with_table=False)
-    assert relocate_by_pointing.main([str(folder)]) == 66
+    assert main([str(folder)]) == 66
     assert "does not tell where the person's table is" in capsys.readouterr().err

@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 
 from paramove.documents.input_error import InputError
 from paramove.robots.dynamixel.calibration.arm_calibration import (
-    DATA_VARIABLE,
     ArmCalibration,
     CalibratedBus,
     CalibrationError,
     JointCalibration,
-    calibration_path,
     sign_again,
 )
+from paramove.robots.dynamixel.calibration.path import DATA_VARIABLE, calibration_path
 
 SERIAL = "FT6Z5NCH"
 ELBOW = JointCalibration(

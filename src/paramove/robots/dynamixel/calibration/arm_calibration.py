@@ -8,11 +8,9 @@ crosses it works in Extended Position Control Mode, and `JointCalibration.turns`
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +18,6 @@ from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from platformdirs import user_data_path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 
@@ -28,7 +25,6 @@ from paramove.documents import InputError, findings, read_document, replacing
 from paramove.robots import JointUnits
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 
-DATA_VARIABLE = "PARAMOVE_DATA"
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
 CURRENT_BASED: Literal[5] = 5
@@ -232,26 +228,3 @@ def _writer() -> YAML:
     yaml = YAML()
     yaml.default_flow_style = False
     return yaml
-
-
-def calibration_path(serial: str, data: Path | None = None) -> Path:
-    """Where the calibration of the arm behind this adapter is kept.
-
-    Args:
-        serial: USB serial number of the adapter.
-        data: Folder; default $PARAMOVE_DATA, else that of the system for the user's data.
-    """
-    folder = data or Path(os.environ.get(DATA_VARIABLE) or user_data_path("paramove"))
-    return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
-
-
-def check_can_be_kept(path: Path) -> None:
-    """Look whether a calibration can be written there, before somebody takes the trouble. Raises OSError."""
-    if path.is_dir():
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_suffix(".part")
-    try:
-        unfinished.write_bytes(b" ")
-    finally:
-        unfinished.unlink(missing_ok=True)
