@@ -209,7 +209,7 @@ class Statistics(Moments):
 
     @classmethod
     def of(cls, parameters: Parameters, stacks: Sequence[Stack], kind: Covariance = "full") -> "Statistics":
-        """E-step over all stacks; `second` holds diagonals alone if the covariances are diagonal."""
+        """E-step over all stacks; of diagonal covariances the second moments are diagonals alone."""
         evaluator, diagonal = Evaluator.of(parameters), kind == "diagonal"
         moments, durations = Moments.none(evaluator.means), np.zeros_like(parameters.durations)
         gamma = np.empty((len(parameters.means), max(stack.n_frames for stack in stacks)))
