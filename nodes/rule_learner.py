@@ -28,6 +28,7 @@ class Config(NodeConfig):
     grasp_z: float = -0.098
     surface_x: tuple[float, float] = (0.100, 0.240)
     surface_y: tuple[float, float] = (-0.170, 0.130)
+    ask_again_s: float = 25.0
     arming_timeout_s: float = 10.0
     pointing: Pointing = "nearness"
 

@@ -8,7 +8,7 @@ from paramove.action_space.particle_filter import (
     FilterOptions,
     ParticleFilter,
     effective_number,
-    systematic_selection,
+    systematic_resampling,
     tempering,
 )
 from paramove.action_space.propagation import Propagation
@@ -18,25 +18,25 @@ from tests.action_space.toy_kalman import KalmanToy
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_systematic_selection_takes_each_about_as_often_as_it_weighs(seed):
+def test_systematic_resampling_takes_each_about_as_often_as_it_weighs(seed):
     rng = np.random.default_rng(seed)
     weights = rng.dirichlet(np.full(40, 0.3))
-    counts = np.bincount(systematic_selection(weights, rng), minlength=40)
+    counts = np.bincount(systematic_resampling(weights, rng), minlength=40)
     assert counts.sum() == 40
     assert (counts >= np.floor(40 * weights - 1e-9)).all()
     assert (counts <= np.ceil(40 * weights + 1e-9)).all()
 
 
-def test_systematic_selection_is_unbiased():
+def test_systematic_resampling_is_unbiased():
     weights = np.array([0.05, 0.6, 0.0, 0.35])
     rng = np.random.default_rng(0)
-    counts = sum(np.bincount(systematic_selection(weights, rng), minlength=4) for _ in range(4000)) / 16000.0
+    counts = sum(np.bincount(systematic_resampling(weights, rng), minlength=4) for _ in range(4000)) / 16000.0
     np.testing.assert_allclose(counts, weights, atol=0.01)
     assert counts[2] == 0.0
 
 
 def test_equal_weights_keep_every_particle():
-    rows = systematic_selection(np.full(7, 1.0 / 7.0), np.random.default_rng(1))
+    rows = systematic_resampling(np.full(7, 1.0 / 7.0), np.random.default_rng(1))
     np.testing.assert_array_equal(rows, np.arange(7))
 
 
@@ -66,7 +66,7 @@ def test_filter_equals_the_exact_posterior(resample_below):
     toy = KalmanToy(seed=2)
     filter_ = toy.particle_filter(FilterOptions(30_000, resample_below, least_effective=0.0), seed=5)
     for elapsed_s, seen in toy.frames(12):
-        filter_.select()
+        filter_.resample()
         filter_.predict(elapsed_s)
         found = filter_.measure(toy.log_likelihoods(filter_.particles.poses, seen))
         evidence = toy.kalman(elapsed_s, seen)
@@ -87,7 +87,7 @@ def test_a_wrong_diffusion_is_noticed():
     filter_ = toy.particle_filter(FilterOptions(30_000, 0.5, least_effective=0.0), seed=5, diffusion_factor=0.5)
     worst = 0.0
     for elapsed_s, seen in toy.frames(12):
-        filter_.select()
+        filter_.resample()
         filter_.predict(elapsed_s)
         filter_.measure(toy.log_likelihoods(filter_.particles.poses, seen))
         toy.kalman(elapsed_s, seen)

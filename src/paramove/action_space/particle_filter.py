@@ -1,4 +1,7 @@
-"""The particle filter in its three steps: select, predict, measure (thesis 6.4.2 and appendix C.3.2, corrected)."""
+"""The particle filter in its three steps: resample, predict, measure (thesis 6.4.2 and appendix C.3.2, corrected).
+
+The thesis calls resampling selection.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +18,11 @@ ARRAYS = ("step", "origin", "theta", "tau", "deviation", "poses")
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """How many particles, and when they are selected.
+    """How many particles, and when they are resampled.
 
     Attributes:
         n_particles: 400 in the thesis.
-        resample_below: particles are selected when their effective number is below this share of them; otherwise they
+        resample_below: particles are resampled when their effective number is below this share of them; otherwise they
             keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
         least_effective: if a likelihood leaves fewer effective particles than this share, it is flattened until it
             leaves so many: with several views it is sharper than 400 particles are dense. 0 never flattens.
@@ -72,7 +75,7 @@ class Measurement:
 
 
 class ParticleFilter:
-    """Particles of one arm. `select`, `predict`, `measure` in this order make one frame (C.10)."""
+    """Particles of one arm. `resample`, `predict`, `measure` in this order make one frame (C.10)."""
 
     def __init__(self, propagation: Propagation, options: FilterOptions | None = None, seed: int = 0) -> None:
         self.propagation = propagation
@@ -80,11 +83,11 @@ class ParticleFilter:
         self.rng = np.random.default_rng(seed)
         self.particles = propagation.at_base(self.options.n_particles, self.rng)
 
-    def select(self) -> None:
+    def resample(self) -> None:
         """Draws particles by their weights, where few of them carry the weight."""
         weights = self.particles.weights
         if effective_number(weights) < self.options.resample_below * len(weights) * (1.0 + 1e-9):
-            self.particles = self.particles.taken(systematic_selection(weights, self.rng))
+            self.particles = self.particles.taken(systematic_resampling(weights, self.rng))
 
     def predict(self, elapsed_s: float) -> None:
         """Moves the particles by the propagation density."""
@@ -120,7 +123,7 @@ class ParticleFilter:
         new = [self.propagation.at_base(n_new - n_anywhere, self.rng)] if n_new > n_anywhere else []
         new += [self.propagation.anywhere(n_anywhere, self.rng)] if n_anywhere else []
         kept = len(self.particles) - n_new
-        old = [self.particles.taken(systematic_selection(self.particles.weights, self.rng, kept))] if kept else []
+        old = [self.particles.taken(systematic_resampling(self.particles.weights, self.rng, kept))] if kept else []
         self.particles = joined([*old, *new])
 
 
@@ -131,7 +134,7 @@ def joined(parts: list[Particles]) -> Particles:
     return Particles(**arrays, weights=np.full(n_particles, 1.0 / n_particles))
 
 
-def systematic_selection(weights: Floats, rng: np.random.Generator, n_drawn: int | None = None) -> Ints:
+def systematic_resampling(weights: Floats, rng: np.random.Generator, n_drawn: int | None = None) -> Ints:
     """Rows drawn by weights (M,) with one random number: each is drawn floor(N pi) or ceil(N pi) times. Shape (N,).
 
     The smallest j with c^j >= r (C.3.2, corrected), for N equally spaced r.

@@ -152,7 +152,7 @@ class ActionTracker:
             return replace(last, sentence=f"a frame {last.time_s - time_s:.3f} s older than the last was left out")
         elapsed_s = 0.0 if last is None else time_s - last.time_s
         self._renew(elapsed_s)
-        self.filter.select()
+        self.filter.resample()
         if elapsed_s > 0.0:
             if self._blind_since_s is None:
                 self.filter.explore(per_step(self.options.explored, min(THESIS_RATE_HZ * elapsed_s, 1.0)))

@@ -28,14 +28,14 @@ from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
 from paramove.robots.streaming import ArmDriver, DriverOutput, StreamReader
 from paramove.safety import Fault, State
 
-SLOW_SHARE = 0.5
+EXIT_SPEED_SHARE = 0.5
 """Of the operating velocity."""
-PEAK = 1.875
+EXIT_PEAK = 1.875
 """Highest velocity of a movement with smooth ends, of its mean."""
-SHORTEST_S = 0.5
-LONGEST_S = 4.0
+SHORTEST_EXIT_S = 0.5
+LONGEST_EXIT_S = 4.0
 """With all that belongs to it: a launcher kills a driver 5 s after it was asked to end."""
-MARGIN_S = 0.5
+EXIT_MARGIN_S = 0.5
 """Until the arm has settled and every servo has heard the last word."""
 _log = logging.getLogger(__name__)
 
@@ -283,7 +283,7 @@ class ServoLoop:
 
     def _goes_to(self, rest: Mapping[str, float]) -> bool:
         """Go to rest, slowly and through the gate; whether the arm is there. It is not where anything is wrong."""
-        ends_s, name, sentence = time.monotonic() + LONGEST_S, "", "it is not armed"
+        ends_s, name, sentence = time.monotonic() + LONGEST_EXIT_S, "", "it is not armed"
         reader = self._reader
         if reader is not None and not reader.at_rest:
             reader, sentence = None, "it was moving, and stops"
@@ -292,7 +292,7 @@ class ServoLoop:
                 start = self._description.units.to_radians(reader.target)
                 message, duration_s = movement_to(self._description, start, rest, f"rest {time.monotonic_ns()}")
                 sentence = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
-                if time.monotonic() + duration_s + MARGIN_S > ends_s:
+                if time.monotonic() + duration_s + EXIT_MARGIN_S > ends_s:
                     break
                 name, sentence = message.id, "it was stopped on its way"
                 with self.lock:
@@ -350,8 +350,8 @@ def movement_to(
     """
     places = [description.index(joint) for joint in angles]
     goal = np.array(list(angles.values()))
-    slow = SLOW_SHARE * description.operating_velocity[places]
-    duration_s = float(max(SHORTEST_S, (PEAK * np.abs(goal - start[places]) / slow).max(initial=0.0)))
+    slow = EXIT_SPEED_SHARE * description.operating_velocity[places]
+    duration_s = float(max(SHORTEST_EXIT_S, (EXIT_PEAK * np.abs(goal - start[places]) / slow).max(initial=0.0)))
     message = JointTrajectory(id=name, joints=list(angles))
     for time_s, point in ((0.0, start[places]), (duration_s, goal)):
         message.points.add(time_s=time_s, position_rad=point.tolist())
