@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import importlib.util
 import inspect
+import subprocess
 import sys
 
 import pytest
@@ -55,7 +56,10 @@ def test_both_programs_speak_of_the_same_packages():
 
 def test_page_is_that_of_the_code():
     """To renew it: `python docs/api_page.py`."""
-    assert (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") == API.api_page()
+    code = "import sys; sys.path.insert(0, 'docs'); import api_page; sys.stdout.write(api_page.api_page())"
+    # In a process of its own: other tests put other things into the place of public names.
+    page = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") == page
 
 
 def test_pages_can_be_built(tmp_path):

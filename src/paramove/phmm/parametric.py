@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -296,10 +297,9 @@ _CLASSES: dict[str, type[ParametricHMM]] = {}  # what a file may name; filled as
 
 def _load_all_classes() -> None:
     """The package loads a class when it is first used; a file may name one that nobody has used yet."""
-    from paramove import phmm
-
-    for name in dir(phmm):
-        getattr(phmm, name)
+    package = importlib.import_module(__package__ or "")  # no import statement: cached results depend on no other class
+    for name in dir(package):
+        getattr(package, name)
 
 
 def check_training(

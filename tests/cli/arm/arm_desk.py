@@ -71,7 +71,7 @@ class Bench:
         texts = [str(word) for word in ("arm", *words, *places)]
         app = build("arm")
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("paramove.robots.dynamixel.bus.servo_setup.only_servo", few_rates)
+            patch.setattr("paramove.robots.dynamixel.only_servo", few_rates)
             patch.setattr("paramove.robots.dynamixel.bus.servo_chain.TURN_S", 0.0)  # emulated servos answer at once
             for module in ("setup", "calibrate"):
                 patch.setattr(f"paramove.cli.arm.{module}.TerminalPerson", lambda: TerminalPerson(Script(steps)))
