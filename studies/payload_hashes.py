@@ -21,6 +21,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -42,18 +43,21 @@ NOT_MET = 3
 """Exit code of an evaluation that measured everything and missed a goal."""
 FREE_TEXT = frozenset({"sentence", "reason", "refusal"})
 LEFT_OUT = ("status/", "clock")
+LAST_MESSAGES = 50
 RENAMED: dict[str, str] = {}
 """Topics: name before the change -> name after it."""
 TIMES = re.compile(r"(?<![a-z])(seconds?|minutes?|times?|ms|took|date|commit|versions?)(?![a-z])")
 """Words in the names of numbers that differ from run to run."""
 
 
-def payload_hashes(recording: Path) -> dict[str, list[Any]]:
-    """By topic: how many messages, and the hash of all payloads in order.
+def payload_hashes(recording: Path) -> dict[str, dict[str, str]]:
+    """By topic: the hashes of all payloads in order up to each of the last messages, by how many these are.
 
-    Messages are decoded by the schemas in the file.
+    Messages are decoded by the schemas in the file. A launcher ends a run by the wall clock, so how many ticks are
+    recorded after the application has come to its end differs: two runs are the same if one begins as the other.
     """
-    hashes: dict[str, tuple[int, Any]] = {}
+    hashes: dict[str, Any] = {}
+    last: dict[str, deque[tuple[int, str]]] = {}
     classes: dict[int, Any] = {}
     with recording.open("rb") as file:
         for schema, channel, message in make_reader(file).iter_messages():
@@ -63,11 +67,21 @@ def payload_hashes(recording: Path) -> dict[str, list[Any]]:
                 classes[schema.id] = _message_class(schema.name, schema.data)
             one = classes[schema.id].FromString(message.data)
             _clear_text(one)
-            count, digest = hashes.setdefault(channel.topic, (0, hashlib.sha256()))
+            digest = hashes.setdefault(channel.topic, hashlib.sha256())
             payload = one.SerializeToString(deterministic=True)
             digest.update(len(payload).to_bytes(4, "little") + payload)
-            hashes[channel.topic] = (count + 1, digest)
-    return {topic: [count, digest.hexdigest()] for topic, (count, digest) in sorted(hashes.items())}
+            ends = last.setdefault(channel.topic, deque([(0, "")], LAST_MESSAGES))
+            ends.append((ends[-1][0] + 1, digest.hexdigest()))
+    return {topic: {str(count): digest for count, digest in ends} for topic, ends in sorted(last.items())}
+
+
+def same(before: Any, after: Any) -> bool:
+    """Whether two numbers are equal, NaN too, or two topics up to the end of the shorter one."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        ends = [max(one, key=int) for one in (before, after)]
+        end = min(ends, key=int)
+        return end in before and before[end] == after.get(end)
+    return bool(before == after or (before != before and after != after))
 
 
 def _message_class(name: str, descriptors: bytes) -> Any:
@@ -145,8 +159,9 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:
             if kind == "hashes":
                 old = {RENAMED.get(topic, topic): one for topic, one in old.items()}
             for key in sorted({*old, *new}):
-                if old.get(key) != new.get(key) and not (old.get(key) != old.get(key) and new.get(key) != new.get(key)):
-                    yield f"{name}: {key}: {old.get(key, 'nothing')} before, {new.get(key, 'nothing')} after"
+                if not same(old.get(key), new.get(key)):
+                    told = [list(one)[-1:] if isinstance(one, dict) else one for one in (old.get(key), new.get(key))]
+                    yield f"{name}: {key}: {told[0]} before, {told[1]} after"
 
 
 def main() -> None:
