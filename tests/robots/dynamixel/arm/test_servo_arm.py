@@ -198,10 +198,14 @@ def test_a_joint_that_falls_silent_is_named_and_keeps_its_last_position(arm, emu
     arm.measured()
     change(emulator, 2, "ID", 9)
     port.latency_s = 0.03
-    reading = arm.measured()
+    until_s = time.monotonic() + 60.0
+    fault = None
+    while fault is None or fault.joint != "wrist":  # a pause of the machine may make others silent for a while
+        assert time.monotonic() < until_s, fault
+        reading = arm.measured()
+        fault = arm.fault_of_answers(reading)
     assert reading.counts[2] == 3000
-    fault = arm.fault_of_answers(reading)
-    assert (fault.code, fault.joint) == ("joint_silent", "wrist")
+    assert fault.code == "joint_silent"
 
 
 def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port):
