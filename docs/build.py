@@ -20,14 +20,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
+from api_page import PACKAGES
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = sorted(
-    ".".join(stub.parent.relative_to(ROOT / "src").parts)
-    for stub in (ROOT / "src").rglob("__init__.pyi")
-    if stub.parent.name != "cli"  # commands have their own help
-)
 MARK = ".built-from-docs"
 """File in the output, which may be made anew only where it lies."""
 STYLE = """

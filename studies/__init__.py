@@ -1,8 +1,5 @@
-"""Experiments of the thesis and ours: `python -m studies NAME`."""
+"""The experiments of the thesis and ours, beside those of peers; `python -m studies` lists them."""
 
-import os
+from paramove.linear_algebra_threads import use_one_thread
 
-from paramove.linear_algebra_threads import ONE_THREAD
-
-for _name, _number in ONE_THREAD.items():  # numpy looks when it is imported, which is after this
-    os.environ.setdefault(_name, _number)
+use_one_thread()

@@ -60,6 +60,7 @@ def test_each_row_imports_rows_above_it():
         above.add(package)
 
 
+@cache
 def offering(module):
     """The package with an interface that a module of the library lies in: the innermost one."""
     words = module.split(".")

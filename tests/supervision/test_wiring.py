@@ -120,6 +120,13 @@ def test_names_of_the_release_before_are_read_with_a_warning(workspace):
         assert read_interface("nodes.odd", workspace.root).subscribes == (topics.SPEECH,)
 
 
+def test_old_names_are_read_where_the_module_has_to_be_imported(workspace):
+    source = "from paramove.bus import topics\nHEARS = tuple([topics.SPEECH])\nPUBLISHES = ()"
+    (workspace.root / "nodes" / "computed.py").write_text(source)
+    with pytest.warns(UserWarning, match="HEARS is called SUBSCRIBES"):
+        assert read_interface("nodes.computed", workspace.root).subscribes == (topics.SPEECH,)
+
+
 @pytest.mark.parametrize("module", NODES)
 def test_no_node_has_to_be_imported_to_be_known(module, monkeypatch):
     """Each of those would make every launch two seconds longer."""

@@ -282,7 +282,7 @@ class ActionTracker:
 
 
 class ProgressJumps:
-    """Counts them.
+    """Counts how often the estimated progress jumps: the way out and the way back of an arm look alike.
 
     Attributes:
         count: jumps so far, between frames with one action and a progress of which the filter was sure.

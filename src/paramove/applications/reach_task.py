@@ -263,7 +263,7 @@ class ReachTask:
 
 
 class SettledJoints:
-    """Remembers the last third of a second.
+    """Where an arm's joints are once they rest, from what its driver reported in the last third of a second.
 
     Args:
         joints: Names, in the order that is wanted.

@@ -73,9 +73,9 @@ def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Con
         raise ConfigurationError(_sentence(path, error, "parameters.")) from error
 
 
-def publish_each(bus: Bus, said: Sequence[Topic], messages: Sequence[Iterable[Any]]) -> None:
-    """Says all messages of the first topic, then those of the second, and so on; see `Bus.publish`."""
-    for topic, some in zip(said, messages, strict=True):
+def publish_each(bus: Bus, published: Sequence[Topic], messages: Sequence[Iterable[Any]]) -> None:
+    """Publishes all messages of the first topic, then those of the second, and so on; see `Bus.publish`."""
+    for topic, some in zip(published, messages, strict=True):
         for message in some:
             bus.publish(topic, message)
 

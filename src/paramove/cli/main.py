@@ -17,7 +17,7 @@ import typer
 
 from paramove.cli.completions import typed_words
 from paramove.documents import InputError
-from paramove.linear_algebra_threads import ONE_THREAD
+from paramove.linear_algebra_threads import use_one_thread
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
@@ -84,8 +84,7 @@ def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> 
 
 def main() -> None:
     """Entry point of the `paramove` script."""
-    for name, number in ONE_THREAD.items():  # numpy looks when it is imported, which is later
-        os.environ.setdefault(name, number)
+    use_one_thread()
     try:
         build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
     except InputError as error:  # of a command that has nothing more to say of it

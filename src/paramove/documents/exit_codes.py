@@ -17,7 +17,7 @@ INPUT_MISSING = 66
 UNAVAILABLE = 69
 """A device is not there or does not answer, or nobody answers who should."""
 NODE_FAILED = 70
-"""A node raised an exception, or said of itself that it has failed."""
+"""A node raised an exception, or reported that it has failed."""
 TEMPORARY = 75
 """Something else holds what is needed, such as another run in the same domain."""
 PERMISSION = 77

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import logging
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, model_validator
@@ -23,16 +23,20 @@ class OldNames(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _renamed(cls, values: Any) -> Any:
-        if not isinstance(values, dict):
-            return values
-        given = copy.deepcopy(values)
         for old, new in cls.old_names:
-            *outer, old_key = old.split(".")
-            new_key = new.rpartition(".")[2]
-            inner: Any = given
-            for key in outer:
-                inner = inner.get(key) if isinstance(inner, dict) else None
-            if isinstance(inner, dict) and old_key in inner and new_key not in inner:
-                _log.warning("%s is called %s now; the next release knows the new name only", old, new)
-                inner[new_key] = inner.pop(old_key)
-        return given
+            values = _renamed(values, old, new, old.split("."))
+        return values
+
+
+def _renamed(values: Any, old: str, new: str, path: Sequence[str]) -> Any:
+    """The mapping with the key at the end of `path` renamed; the one that is given if there is no such key."""
+    key, *inner = path
+    new_key = new.rpartition(".")[2]
+    if not isinstance(values, dict) or key not in values:
+        return values
+    if inner:
+        return {**values, key: _renamed(values[key], old, new, inner)}
+    if new_key in values:
+        return values
+    _log.warning("%s is called %s now; the next release knows the new name only", old, new)
+    return {new_key if name == key else name: value for name, value in values.items()}

@@ -318,9 +318,7 @@ class ServoReachingOptions:
     lift: float = 0.05  # learned movements end and begin so far above an object
     speed: float = 0.06  # of straight lines, at most
     way_duration: float = 1.6  # of a learned movement, at least
-    longest_duration: float = (
-        6.0  # s; where a learned movement takes longer, because the joints turn far, a milder one is tried
-    )
+    longest_duration: float = 6.0  # where a learned movement takes longer, as joints turn far, a milder one is tried
     gripper_duration: float = 0.8
     settle_duration: float = 0.4  # the closed gripper is given so long to press
     work_opening: float = 0.6  # ξ

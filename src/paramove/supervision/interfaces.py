@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,31 +83,38 @@ def read_interface(module: str, workspace: Path) -> Interface:
         raise InterfaceError(f"{path}:{error.lineno}: {error.msg}") from error
     config = _config(tree)
     about = (_parameters(config), config is not None, config is not None and _needs_parameters(config))
+    assigned = _assigned(tree)
+    names = [_declared(name, assigned, path) for name in OLD_NAMES]
     try:
-        return Interface(path, _constant(tree, "SUBSCRIBES", path), _constant(tree, "PUBLISHES", path), *about)
+        subscribes, publishes = (_topics(assigned[name], assigned, path) for name in names)
     except _NotPlainError:
-        subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns)
-        return Interface(path, subscribes, publishes, *about)
+        subscribes, publishes = _imported(module, workspace, path.stat().st_mtime_ns, *names)
+    return Interface(path, subscribes, publishes, *about)
 
 
 class _NotPlainError(Exception):
     """The expression is more than names of topics."""
 
 
-def _constant(tree: ast.Module, name: str, path: Path) -> tuple[Topic, ...]:
+def _assigned(tree: ast.Module) -> dict[str, ast.expr]:
     assigned = {}
     for statement in tree.body:
         if isinstance(statement, ast.Assign) and isinstance(statement.targets[0], ast.Name):
             assigned[statement.targets[0].id] = statement.value
         elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name) and statement.value:
             assigned[statement.target.id] = statement.value
+    return assigned
+
+
+def _declared(name: str, assigned: Mapping[str, ast.expr], path: Path) -> str:
+    """The name under which the module has it: `name`, or that of the release before, with a warning."""
+    if name in assigned:
+        return name
     old = OLD_NAMES[name]
-    if name not in assigned and old in assigned:
-        warnings.warn(f"{path}: {old} is called {name} now; the next release reads that only", stacklevel=2)
-        name = old
-    if name not in assigned:
+    if old not in assigned:
         raise InterfaceError(f"{path}: a node says what it subscribes to and publishes, but {name} is missing")
-    return _topics(assigned[name], assigned, path)
+    warnings.warn(f"{path}: {old} is called {name} now; the next release reads that only", stacklevel=2)
+    return old
 
 
 def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> tuple[Topic, ...]:
@@ -165,17 +173,18 @@ def _needs_parameters(config: ast.ClassDef) -> bool:
 
 _ASK = (
     "import importlib, json, sys; node = importlib.import_module(sys.argv[1]);"
-    "sys.stdout.write('\\n' + json.dumps([[t.name for t in topics] for topics in (node.SUBSCRIBES, node.PUBLISHES)]))"
+    "sys.stdout.write('\\n' + json.dumps([[t.name for t in getattr(node, name)] for name in sys.argv[2:]]))"
 )
 
 
 @functools.cache
-def _imported(module: str, workspace: Path, changed_ns: int) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
+def _imported(
+    module: str, workspace: Path, changed_ns: int, *names: str
+) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """SUBSCRIBES and PUBLISHES of a module, imported in another process; again only when its file has changed."""
+    command = [sys.executable, "-c", _ASK, module, *names]
     try:
-        answer = subprocess.run(
-            [sys.executable, "-c", _ASK, module], cwd=workspace, capture_output=True, text=True, timeout=60, check=False
-        )
+        answer = subprocess.run(command, cwd=workspace, capture_output=True, text=True, timeout=60, check=False)
     except subprocess.TimeoutExpired as error:
         raise InterfaceError(f"importing '{module}' took more than 60 s") from error
     if answer.returncode != 0:
