@@ -111,8 +111,9 @@ def _labels(path: Path) -> object:
 
 def _launch(path: Path) -> object:
     from paramove.supervision import load
+    from paramove.workspace import Workspace
 
-    return load(ROOT / "launch", str(path), overlays=[])
+    return load(Workspace.at(ROOT), str(path), overlays=[])
 
 
 def _robot(path: Path) -> object:

@@ -6,7 +6,6 @@ World frame: the torso frame of the robot's model. The files of the robot are ta
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -14,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paramove.documents import Floats
+from paramove.workspace import Workspace
 from sim import looks, opening, places, tool_box
 from sim.looks import Looks
 
-ROBOT_MODEL = Path(__file__).resolve().parent.parent / "robot_description" / "hoap3" / "hoap3.xml"
+ROBOT_MODEL = Workspace.here().find("robot_description/hoap3/hoap3.xml")
 
 SOLREF = (0.002, 1.0)  # stiff: nothing sinks in by more than 0.7 mm
 SOLIMP = (0.99, 0.999, 0.0003, 0.5, 2.0)

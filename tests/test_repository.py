@@ -8,6 +8,7 @@ from pathlib import Path
 
 from paramove.bus import topics
 from paramove.supervision.interfaces import read_interface
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parent.parent
 LIBRARY = ROOT / "src" / "paramove"
@@ -65,7 +66,7 @@ def test_headers_of_nodes_name_their_topics():
     """Every topic of SUBSCRIBES and PUBLISHES is in the table, and the header tells of it."""
     known, missing = {topic.name for topic in topics.TOPICS}, []
     for path in PROCESSES:
-        interface = read_interface(f"{path.parent.name}.{path.stem}", ROOT)
+        interface = read_interface(f"{path.parent.name}.{path.stem}", Workspace.at(ROOT))
         header = ast.get_docstring(parsed(path)) or ""
         named = [topic.name for topic in (*interface.subscribes, *interface.publishes)]
         assert set(named) <= known

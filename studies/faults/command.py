@@ -12,8 +12,9 @@ from rich.progress import Progress
 from rich.table import Table
 from rich.text import Text
 
-from paramove.cli import PROGRESS, JsonFileOption, workspace_here, write_numbers
+from paramove.cli import PROGRESS, JsonFileOption, write_numbers
 from paramove.documents import exit_codes
+from paramove.workspace import Workspace
 
 RUNS = Path("runs/kills")
 WIDTH = 130
@@ -49,8 +50,8 @@ def kills(
     from studies.faults.live_run import APPLICATION
 
     console = Console(highlight=False, emoji=False)
-    workspace = workspace_here()
-    file = load(workspace / "launch", APPLICATION, ["sim", "real_time"]).file
+    workspace = Workspace.here().root
+    file = load(Workspace.here(), APPLICATION, ["sim", "real_time"]).file
     try:
         cases = cases_of(file, _names(nodes), _names(signals), _names(moments))
     except CaseError as error:
@@ -81,7 +82,7 @@ def faults(
     from studies.faults.fault_tests import TestsNotRunError, run_tests
 
     console = Console(highlight=False, emoji=False)
-    workspace = workspace_here()
+    workspace = Workspace.here().root
     try:
         rows = read_page(workspace / PAGE)
     except (FileNotFoundError, FaultPageError) as error:

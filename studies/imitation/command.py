@@ -10,8 +10,9 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli import seeds_in, workspace_here
+from paramove.cli import seeds_in
 from paramove.documents import exit_codes
+from paramove.workspace import Workspace
 
 if TYPE_CHECKING:
     from studies.imitation.thesis import Compared
@@ -30,17 +31,17 @@ def imitation(
     """Compare the robot's reaching with the person's: errors of gripper and elbow, beside those of thesis 5.2.7.
 
     Writes report.html, imitation.json and the plots. Exit codes: 0 every goal is met; 3 some are not, and the report
-    says in which states and why; 66 no workspace.
+    says in which states and why.
     """
     from studies.imitation.experiment import Setup, run_experiment
     from studies.imitation.report import write_results
     from studies.imitation.thesis import compared
 
     console = Console(highlight=False, emoji=False)
-    wanted, workspace = seeds_in(seeds), workspace_here()
+    wanted, workspace = seeds_in(seeds), Workspace.here().root
     cache = user_cache_path("paramove")
     cache.mkdir(parents=True, exist_ok=True)
-    setup = Setup(workspace / "robot_description" / "hoap3", tuple(wanted), repetitions, raster, cache)
+    setup = Setup(Path("hoap3"), tuple(wanted), repetitions, raster, cache)
     with console.status("training") as status:
         experiment = run_experiment(setup, status.update)
         folder = (report or workspace / FOLDER).resolve()

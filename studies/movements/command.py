@@ -12,8 +12,9 @@ from platformdirs import user_cache_path
 from rich.console import Console
 from rich.table import Table
 
-from paramove.cli import JsonFileOption, workspace_here, write_numbers
+from paramove.cli import JsonFileOption, write_numbers
 from paramove.documents import exit_codes
+from paramove.workspace import Workspace
 from studies.terminal import say_error, stored_results
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ def _compare(
     from studies.movements.sweep import jobs_of, keys_of
 
     console = Console(highlight=False, emoji=False)
-    folder = (out or workspace_here() / FOLDER / name).resolve()
+    folder = (out or Workspace.here().root / FOLDER / name).resolve()
     cache = user_cache_path("paramove") / "movements"
     work = jobs_of(rows, folds)
     results = stored_results(work, keys_of(work), cache, "folds", console, jobs=jobs, scheduler=scheduler)

@@ -8,6 +8,7 @@ from paramove.cli import one_run as live_view
 from paramove.dashboard.link_file import LinkFile
 from paramove.supervision import application
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,10 +28,10 @@ class Shown:
     ("overlays", "expected"), [(None, ["sim", "view"]), (["sim", "real_time"], ["sim", "real_time", "view"])]
 )
 def test_the_page_is_laid_over_what_was_chosen_and_fits(overlays, expected):
-    found, title = live_view.with_page(ROOT / "launch", "rule_learning", overlays)
+    found, title = live_view.with_page(Workspace.at(ROOT), "rule_learning", overlays)
     assert found == expected
-    launch = load(ROOT / "launch", "rule_learning", found, [title])
-    application.check(launch, ROOT)
+    launch = load(Workspace.at(ROOT), "rule_learning", found, [title])
+    application.check(launch, Workspace.at(ROOT))
     page = launch.file.nodes["dashboard"]
     assert page.parameters["title"] == launch.file.description
     assert not page.lockstep, "time never waits for a page"

@@ -103,7 +103,6 @@ def test_a_variable_in_the_way_is_told(monkeypatch):
     assert any("XDG_RUNTIME_DIR" in one.sentence for one in environment_findings(ROOT) if one.level is Level.WARNING)
 
 
-def test_outside_of_a_workspace_runs_lie_where_one_is(tmp_path):
+def test_outside_of_a_clone_runs_lie_where_one_is(tmp_path):
     found = {one.subject: one for one in resources_findings(Machine(folder=tmp_path))}
     assert found["runs folder"].facts["folder"] == str(tmp_path / "runs")
-    assert "environment" not in found

@@ -9,6 +9,7 @@ from paramove.supervision.graph import graph_of
 from paramove.supervision.graph_svg import as_svg
 from paramove.supervision.launch_file import load
 from paramove.supervision.launch_schema import editor_schema
+from paramove.workspace import Workspace
 from tests.docs.markdown import ROOT, table
 
 PAGE = ROOT / "docs" / "reference" / "launch_file.md"
@@ -54,8 +55,8 @@ MODELS = {
 
 def test_picture_is_that_of_the_launch_file():
     """To renew it: `paramove graph rule_learning --format svg --output docs/images/rule_learning.svg`."""
-    launch = load(ROOT / "launch", "rule_learning")
-    picture = as_svg(graph_of(launch, application.check(launch, ROOT)))
+    launch = load(Workspace.at(ROOT), "rule_learning")
+    picture = as_svg(graph_of(launch, application.check(launch, Workspace.at(ROOT))))
     assert (ROOT / "docs" / "images" / "rule_learning.svg").read_text(encoding="utf-8") == picture
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from paramove.bus import topics
 from paramove.supervision.interfaces import read_interface
+from paramove.workspace import Workspace
 from tests.docs.markdown import PAGES, ROOT, anchors, table
 
 ARCHITECTURE = ROOT / "docs" / "explanation" / "architecture.md"
@@ -17,7 +18,7 @@ MODULES = [
     "sim.arm_judge",
     "sim.dynamixel_emulator",
 ]
-INTERFACES = {module.partition(".")[2]: read_interface(module, ROOT) for module in MODULES}
+INTERFACES = {module.partition(".")[2]: read_interface(module, Workspace.at(ROOT)) for module in MODULES}
 
 pages = pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 

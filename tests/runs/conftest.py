@@ -7,6 +7,7 @@ import pytest
 from paramove.robots.description import RobotDescription
 from paramove.runs.recorded_run import load_run
 from paramove.runs.rule_learning.summary import RunEvaluation
+from paramove.workspace import Workspace
 from tests.runs.synthetic_run import SyntheticRun
 
 ROOT = Path(__file__).parents[2]
@@ -25,6 +26,6 @@ def evaluated(tmp_path, robot):
         folder = tmp_path / name
         folder.mkdir()
         SyntheticRun(folder, robot, **options).write(after_end)
-        return RunEvaluation(load_run(folder), robot, ROOT)
+        return RunEvaluation(load_run(folder), robot, Workspace.at(ROOT))
 
     return make

@@ -8,6 +8,7 @@ from paramove.recording.writer import RecordingWriter
 from paramove.runs.recorded_run import RecordingGap, load_run
 from paramove.runs.rule_learning.report import page
 from paramove.runs.rule_learning.summary import RunEvaluation
+from paramove.workspace import Workspace
 from tests.runs.conftest import ROOT
 from tests.runs.synthetic_run import END_S, SyntheticRun
 
@@ -32,7 +33,7 @@ def test_parts_are_read_as_one_and_the_gap_is_told(tmp_path, robot, name):
     gap = RecordingGap(name, parts[0][-1].publish_ns * 1e-9, parts[1][0].publish_ns * 1e-9)
     assert run.gaps == (gap,)
     assert run.done
-    evaluation = RunEvaluation(run, robot, ROOT)
+    evaluation = RunEvaluation(run, robot, Workspace.at(ROOT))
     assert evaluation.summary["gaps"] == [{"recording": name, "begin_s": gap.begin_s, "end_s": gap.end_s}]
     told = f"Nothing was recorded of the {name} from {gap.begin_s:.2f} to {gap.end_s:.2f} s: its process was"
     assert told in page(evaluation, None)

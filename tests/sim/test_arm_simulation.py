@@ -21,6 +21,7 @@ from paramove.objects.colour_tracker import ColourTracker
 from paramove.pointing.events import PointingEventOptions, PointingEvents
 from paramove.robots.description import RobotDescription
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 from sim import arm_simulator, looks, tool_box, truth
 from sim.arm_instructor import SEATED_S, TIP
 from sim.arm_simulation import ArmSimulation
@@ -102,7 +103,7 @@ def test_the_person_sits_at_first_and_then_withdraws(description: RobotDescripti
 
 
 def test_the_overlay_knows_where_the_table_frame_is() -> None:
-    launch = load(LAUNCH, "rule_learning", ["sim", "action_space"])
+    launch = load(Workspace.at(LAUNCH.parent), "rule_learning", ["sim", "action_space"])
     place = TablePlace.model_validate(launch.file.nodes["action_tracker"].parameters["table_place"])
     points = np.random.default_rng(1).normal(size=(4, 3))
     assert place.frame == "right_shoulder"
@@ -118,7 +119,7 @@ def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescrip
     with tempfile.TemporaryDirectory() as folder:
         simulation.write_measures(Path(folder))
         assert len(read_cameras(Path(folder) / "cameras.yaml")) == 2
-        launch = load(LAUNCH, "rule_learning", ["sim", "action_space"])
+        launch = load(Workspace.at(LAUNCH.parent), "rule_learning", ["sim", "action_space"])
         setup = TrackingSetup.model_validate(launch.file.nodes["action_tracker"].parameters)
         tracker = setup.video_tracker(Path(folder))
     events = PointingEvents(PointingEventOptions(least_certainty=0.6))

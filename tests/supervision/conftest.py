@@ -17,6 +17,7 @@ from rich.console import Console
 from paramove.supervision import application
 from paramove.supervision.launch_file import load
 from paramove.supervision.view import LineView
+from paramove.workspace import Workspace
 
 NODES = Path(__file__).parent / "nodes"
 TIMEOUT_S = 120.0
@@ -32,11 +33,12 @@ def until(condition, what):
         pause.wait(0.02)
 
 
-class Workspace:
+class OwnWorkspace:
     """A folder with launch/ and nodes/ in which the launcher runs."""
 
     def __init__(self, root):
         self.root = root
+        self.folders = Workspace((root,))
         (root / "launch" / "overlays").mkdir(parents=True)
         shutil.copytree(NODES, root / "nodes", ignore=shutil.ignore_patterns("__pycache__"))
         self.launchers = []
@@ -45,14 +47,14 @@ class Workspace:
         (self.root / "launch" / f"{name}.yaml").write_text(text)
 
     def load(self, *settings, overlays=None, seed=None, headless=False):
-        return load(self.root / "launch", "test", overlays, settings, seed, headless)
+        return load(self.folders, "test", overlays, settings, seed, headless)
 
     def run(self, *settings, headless=False):
         """Runs in this process; returns outcome, run folder and what was shown."""
         with (self.root / "shown.txt").open("w+") as file:
             console = Console(file=file, width=200)
             outcome, folder = application.run(
-                self.load(*settings, headless=headless), self.root, lambda _: LineView(console)
+                self.load(*settings, headless=headless), self.folders, lambda _: LineView(console)
             )
             file.seek(0)
             return outcome, folder, file.read()
@@ -108,11 +110,19 @@ class Workspace:
 
 
 @pytest.fixture
+def launches(tmp_path):
+    """An empty folder of launch files."""
+    folder = tmp_path / "launch"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
 def workspace(tmp_path, monkeypatch):
     runtime = tempfile.mkdtemp(prefix="pm-", dir="/tmp")  # paths of sockets are short
     monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
     monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
-    made = Workspace(tmp_path)
+    made = OwnWorkspace(tmp_path)
     yield made
     for launcher in made.launchers:
         if launcher.poll() is None:

@@ -172,7 +172,7 @@ def test_a_socket_folder_that_cannot_be_made_is_told_with_the_variable(tmp_path)
     assert "Traceback" not in answer.stderr
 
 
-def test_outside_of_a_clone_it_is_said_where_to_go(tmp_path):
-    answer = launch("rule_learning", cwd=tmp_path)
-    assert answer.returncode == 66
-    assert "change into your clone first" in answer.stderr
+def test_an_empty_folder_is_a_workspace_before_the_installed_one(tmp_path):
+    answer = launch("rule_learning", "--check", cwd=tmp_path)
+    assert answer.returncode == 0, answer.stderr
+    assert f"workspace {tmp_path}, then {ROOT}" in answer.stdout

@@ -17,13 +17,14 @@ from paramove.supervision import application
 from paramove.supervision.graph import as_mermaid, as_text, graph_of, running_graph
 from paramove.supervision.graph_svg import BOX_PX, LETTER_PX, as_svg
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 
 
 def graph(overlay="sim"):
-    launch = load(ROOT / "launch", "rule_learning", [overlay])
-    return graph_of(launch, application.check(launch, ROOT))
+    launch = load(Workspace.at(ROOT), "rule_learning", [overlay])
+    return graph_of(launch, application.check(launch, Workspace.at(ROOT)))
 
 
 @pytest.fixture(scope="module")

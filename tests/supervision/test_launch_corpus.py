@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 from paramove.documents.positions import MAX_CHARACTERS, DocumentError
 from paramove.supervision import application, wiring
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 CORPUS = ROOT / "tests" / "data" / "launch"
@@ -29,7 +30,7 @@ EXPECTED = expected()
 
 def refusal(folder, name):
     with pytest.raises(DocumentError) as caught:
-        application.check(load(folder, name), ROOT)
+        application.check(load(Workspace((folder.parent,)), name), Workspace.at(ROOT))
     return str(caught.value).replace(f"{folder}/", "").replace(str(ROOT), "WORKSPACE").splitlines()
 
 
@@ -61,9 +62,9 @@ GOOD = "nodes:\n  operator:\n    module: nodes.operator\n    optional_topics: ['
     ],
     ids=["plain", "line ends of Windows", "byte order mark", "no last line end", "document marks"],
 )
-def test_what_editors_make_of_a_file_does_not_matter(tmp_path, content):
-    (tmp_path / "good.yaml").write_bytes(content)
-    assert list(application.check(load(tmp_path, "good"), ROOT)) == ["operator"]
+def test_what_editors_make_of_a_file_does_not_matter(launches, content):
+    (launches / "good.yaml").write_bytes(content)
+    assert list(application.check(load(Workspace((launches.parent,)), "good"), Workspace.at(ROOT))) == ["operator"]
 
 
 @pytest.mark.parametrize(
@@ -76,15 +77,15 @@ def test_what_editors_make_of_a_file_does_not_matter(tmp_path, content):
     ],
     ids=["no UTF-8", "zero byte", "too long", "1 MB"],
 )
-def test_bytes_that_are_no_launch_file(tmp_path, content, message):
-    (tmp_path / "bad.yaml").write_bytes(content)
-    assert message in refusal(tmp_path, "bad")[0]
+def test_bytes_that_are_no_launch_file(launches, content, message):
+    (launches / "bad.yaml").write_bytes(content)
+    assert message in refusal(launches, "bad")[0]
 
 
-def test_a_folder_is_no_launch_file(tmp_path):
-    (tmp_path / "bad.yaml").mkdir()
+def test_a_folder_is_no_launch_file(launches):
+    (launches / "bad.yaml").mkdir()
     with pytest.raises(DocumentError, match="there is no such launch file"):
-        load(tmp_path, "bad")
+        load(Workspace((launches.parent,)), "bad")
 
 
 def test_no_value_reaches_a_shell(workspace):
@@ -143,15 +144,17 @@ def mutated(text, mutations):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(mutations=MUTATIONS)
 def test_damaged_launch_file_raises_nothing_but_its_error(path, mutations, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("damaged")
-    (folder / "overlays").mkdir()
+    folder = tmp_path_factory.mktemp("damaged") / "launch"
+    (folder / "overlays").mkdir(parents=True)
     for real, text in REAL.items():
         text = mutated(text, mutations) if real == path else text
         (folder / real.relative_to(LAUNCH)).write_text(text, encoding="utf-8", errors="surrogatepass")
     overlays = [path.stem] if path.parent.name == "overlays" else ["sim"]
     try:
-        launch = load(folder, "rule_learning", overlays, ["camera.width=640"], seed=1, headless=True)
-        interfaces = wiring.read_interfaces(launch, ROOT)
+        launch = load(
+            Workspace((folder.parent,)), "rule_learning", overlays, ["camera.width=640"], seed=1, headless=True
+        )
+        interfaces = wiring.read_interfaces(launch, Workspace.at(ROOT))
         list(wiring.topic_findings(launch, interfaces))
     except DocumentError as error:
         lines = str(error).splitlines()
@@ -162,4 +165,4 @@ def test_damaged_launch_file_raises_nothing_but_its_error(path, mutations, tmp_p
 @given(setting=st.text(max_size=30) | st.from_regex(r"\A[a-z]+\.[a-z]+=.{0,10}\Z"))
 def test_any_setting_is_taken_or_refused(setting):
     with contextlib.suppress(DocumentError):  # any other exception fails the test
-        load(LAUNCH, "rule_learning", ["sim"], [setting])
+        load(Workspace.at(ROOT), "rule_learning", ["sim"], [setting])

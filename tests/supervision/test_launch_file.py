@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.documents.positions import DocumentError, read_mapping
-from paramove.supervision.launch_file import LaunchFileMissingError, load, start_waves, validated
+from paramove.supervision import launch_file
+from paramove.supervision.launch_file import LaunchFileMissingError, start_waves, validated
 from paramove.supervision.supervisor import stop_waves
+from paramove.workspace import Workspace
 
 GOOD = """\
 description: Two nodes
@@ -24,13 +26,17 @@ nodes:
 """
 
 
+def load(folder, *arguments, **options):
+    return launch_file.load(Workspace((folder.parent,)), *arguments, **options)
+
+
 @pytest.fixture
-def folder(tmp_path):
-    (tmp_path / "overlays").mkdir()
-    (tmp_path / "good.yaml").write_text(GOOD)
-    (tmp_path / "overlays" / "slow.yaml").write_text("nodes: {camera: {parameters: {rate_hz: 5, lens: {k1: 0.3}}}}\n")
-    (tmp_path / "overlays" / "bare.yaml").write_text("nodes: {world: null, extra: {module: nodes.extra}}\n")
-    return tmp_path
+def folder(launches):
+    (launches / "overlays").mkdir()
+    (launches / "good.yaml").write_text(GOOD)
+    (launches / "overlays" / "slow.yaml").write_text("nodes: {camera: {parameters: {rate_hz: 5, lens: {k1: 0.3}}}}\n")
+    (launches / "overlays" / "bare.yaml").write_text("nodes: {world: null, extra: {module: nodes.extra}}\n")
+    return launches
 
 
 def parameters(launch):
@@ -161,11 +167,11 @@ BAD = [
 
 
 @pytest.mark.parametrize(("text", "place", "message"), BAD)
-def test_error_points_at_the_place(tmp_path, text, place, message):
-    path = tmp_path / "bad.yaml"
+def test_error_points_at_the_place(launches, text, place, message):
+    path = launches / "bad.yaml"
     path.write_text(text)
     with pytest.raises(DocumentError) as caught:
-        load(tmp_path, "bad")
+        load(launches, "bad")
     assert str(caught.value).startswith(f"{path}:{place}: ")
     assert message in str(caught.value)
 
@@ -182,10 +188,10 @@ def test_every_finding_is_told():
     assert len(str(caught.value).splitlines()) == 2
 
 
-def test_unreadable_bytes_are_refused(tmp_path):
-    (tmp_path / "bad.yaml").write_bytes(b"\xff\xfe\x00nodes")
+def test_unreadable_bytes_are_refused(launches):
+    (launches / "bad.yaml").write_bytes(b"\xff\xfe\x00nodes")
     with pytest.raises(DocumentError, match="cannot be read"):
-        load(tmp_path, "bad")
+        load(launches, "bad")
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)

@@ -10,6 +10,7 @@ from paramove.cli.main import build
 from paramove.documents.positions import DocumentError, read_mapping
 from paramove.supervision.launch_file import load, validated
 from paramove.supervision.launch_schema import FILES, editor_schema, schema_as_text
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 LAUNCH = ROOT / "launch"
@@ -144,7 +145,7 @@ def test_every_key_is_explained():
 
 
 def test_defaults_of_the_schema_are_those_of_the_code():
-    launch = load(LAUNCH, "rule_learning", ["sim"]).file
+    launch = load(Workspace.at(LAUNCH.parent), "rule_learning", ["sim"]).file
     fresh = type(launch.nodes["camera"])(module="nodes.camera")
     for key, field in editor_schema("launch")["$defs"]["NodeSettings"]["properties"].items():
         if "default" in field and field["default"] is not None and key != "budget":

@@ -235,7 +235,7 @@ def test_an_outcome_that_finds_no_room_changes_nothing(workspace, caplog):
             fill(runs)
             return LineView(Console(file=io.StringIO()))
 
-        _, folder = application.run(workspace.load(), workspace.root, filled)
+        _, folder = application.run(workspace.load(), workspace.folders, filled)
         facts = YAML(typ="safe").load((folder.path / "run.yaml").read_text())
     assert "outcome" not in facts
     assert facts["launch"] == "test"

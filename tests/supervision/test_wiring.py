@@ -8,6 +8,7 @@ from paramove.bus import topics
 from paramove.documents.positions import DocumentError
 from paramove.supervision.interfaces import InterfaceError, read_interface
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 NODES = [
@@ -21,8 +22,8 @@ NODES = [
 def checked(workspace, text):
     workspace.write(text)
     launch = workspace.load()
-    interfaces = read_interfaces(launch, workspace.root)
-    check_wiring(launch, interfaces, workspace.root)
+    interfaces = read_interfaces(launch, workspace.folders)
+    check_wiring(launch, interfaces, workspace.folders)
     return interfaces
 
 
@@ -72,7 +73,7 @@ def test_misfit_is_told_with_its_place(workspace, text, place, message):
 
 def test_missing_module_names_what_there_is(workspace):
     with pytest.raises(InterfaceError, match=r"nodes has: actor, listener, silent_actor, world"):
-        read_interface("nodes.nothing", workspace.root)
+        read_interface("nodes.nothing", workspace.folders)
 
 
 def test_remap_makes_two_speakers_two_topics(workspace):
@@ -94,7 +95,7 @@ def test_optional_topic_needs_no_speaker(workspace):
 )
 def test_interface_is_read_from_the_source_or_by_import(workspace, source, subscribes):
     (workspace.root / "nodes" / "odd.py").write_text(f"from paramove.bus import topics\n{source}\nPUBLISHES = ()\n")
-    assert [topic.name for topic in read_interface("nodes.odd", workspace.root).subscribes] == subscribes
+    assert [topic.name for topic in read_interface("nodes.odd", workspace.folders).subscribes] == subscribes
 
 
 @pytest.mark.parametrize(
@@ -109,7 +110,7 @@ def test_interface_is_read_from_the_source_or_by_import(workspace, source, subsc
 def test_unreadable_interface_is_told(workspace, source, message):
     (workspace.root / "nodes" / "odd.py").write_text(source)
     with pytest.raises(InterfaceError, match=message):
-        read_interface("nodes.odd", workspace.root)
+        read_interface("nodes.odd", workspace.folders)
 
 
 def test_names_of_the_release_before_are_read_with_a_warning(workspace):
@@ -117,14 +118,14 @@ def test_names_of_the_release_before_are_read_with_a_warning(workspace):
         "from paramove.bus import topics\nHEARS = (topics.SPEECH,)\nPUBLISHES = ()"
     )
     with pytest.warns(UserWarning, match="HEARS is called SUBSCRIBES"):
-        assert read_interface("nodes.odd", workspace.root).subscribes == (topics.SPEECH,)
+        assert read_interface("nodes.odd", workspace.folders).subscribes == (topics.SPEECH,)
 
 
 def test_old_names_are_read_where_the_module_has_to_be_imported(workspace):
     source = "from paramove.bus import topics\nHEARS = tuple([topics.SPEECH])\nPUBLISHES = ()"
     (workspace.root / "nodes" / "computed.py").write_text(source)
     with pytest.warns(UserWarning, match="HEARS is called SUBSCRIBES"):
-        assert read_interface("nodes.computed", workspace.root).subscribes == (topics.SPEECH,)
+        assert read_interface("nodes.computed", workspace.folders).subscribes == (topics.SPEECH,)
 
 
 @pytest.mark.parametrize("module", NODES)
@@ -132,5 +133,5 @@ def test_no_node_has_to_be_imported_to_be_known(module, monkeypatch):
     """Each of those would make every launch two seconds longer."""
     asked = []
     monkeypatch.setattr("paramove.supervision.interfaces._imported", lambda *ask: asked.append(ask) or ((), ()))
-    read_interface(module, ROOT)
+    read_interface(module, Workspace.at(ROOT))
     assert asked == []

@@ -12,11 +12,12 @@ from pathlib import Path
 import pytest
 
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 from studies.faults.kill_cases import cases_of
 from studies.faults.kill_run import KillResult, KillRun
 
 ROOT = Path(__file__).parents[2]
-FILE = load(ROOT / "launch", "rule_learning", ["sim", "real_time"]).file
+FILE = load(Workspace.at(ROOT), "rule_learning", ["sim", "real_time"]).file
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import pytest
 
 from paramove.supervision import application
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 LAUNCH_FILES = sorted(path.stem for path in (ROOT / "launch").glob("*.yaml"))
@@ -17,35 +18,35 @@ SIMULATED = {"dynamixel_arm": "emulated"}
     ("name", "overlay"), [(name, one) for name in LAUNCH_FILES for one in (SIMULATED.get(name, "sim"), "real")]
 )
 def test_nodes_fit_together(name, overlay):
-    launch = load(ROOT / "launch", name, [overlay])
-    application.check(launch, ROOT)
+    launch = load(Workspace.at(ROOT), name, [overlay])
+    application.check(launch, Workspace.at(ROOT))
 
 
 def test_an_arm_that_is_tracked_fits_on_top_of_the_simulation():
-    launch = load(ROOT / "launch", "rule_learning", ["sim", "action_space"])
-    application.check(launch, ROOT)
+    launch = load(Workspace.at(ROOT), "rule_learning", ["sim", "action_space"])
+    application.check(launch, Workspace.at(ROOT))
     assert launch.file.nodes["rule_learner"].parameters["pointing"] == "action_space"
     assert launch.file.nodes["simulator"].parameters["video"]  # what the overlay sim sets stays
 
 
 @pytest.mark.parametrize("overlays", [["sim"], ["sim", "action_space"]])
 def test_only_simulator_and_judge_get_the_truth(overlays):
-    launch = load(ROOT / "launch", "rule_learning", overlays)
+    launch = load(Workspace.at(ROOT), "rule_learning", overlays)
     assert {name for name, node in launch.file.nodes.items() if node.truth} == {"simulator", "judge"}
 
 
 def test_truth_is_nowhere_with_a_real_robot():
-    launch = load(ROOT / "launch", "rule_learning", ["real"])
+    launch = load(Workspace.at(ROOT), "rule_learning", ["real"])
     assert not any(node.truth for node in launch.file.nodes.values())
 
 
 def test_recorder_ends_last_and_arm_first():
-    launch = load(ROOT / "launch", "rule_learning", ["sim"])
+    launch = load(Workspace.at(ROOT), "rule_learning", ["sim"])
     assert [name for name, node in launch.file.nodes.items() if node.stop == "first"] == ["arm_driver"]
     assert launch.file.nodes["recorder"].stop == "last"
 
 
 def test_seed_goes_to_the_simulator_alone():
-    launch = load(ROOT / "launch", "rule_learning", ["sim"], seed=4711)
+    launch = load(Workspace.at(ROOT), "rule_learning", ["sim"], seed=4711)
     seeded = [name for name, node in launch.file.nodes.items() if node.parameters.get("seed") == 4711]
     assert seeded == ["simulator"]

@@ -12,19 +12,23 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from paramove.workspace import Workspace
+
 _WITH_VALUE = ("--set", "--seed", "--runs")
 
 
 def launch_files(incomplete: str) -> list[str]:
     """Launch files of the workspace."""
-    return _beginning(incomplete, _names(_workspace() / "launch"))
+    return _beginning(incomplete, Workspace.here().names("launch"))
 
 
 def overlays(incomplete: str) -> list[str]:
     """Overlays of the workspace: those for every launch file, and those for the one that was typed."""
-    folder = _workspace() / "launch" / "overlays"
-    name, _ = _typed_launch()
-    return _beginning(incomplete, sorted({*_names(folder), *(_names(folder / name) if name else ())}))
+    from paramove.supervision import overlay_folders
+
+    workspace = Workspace.here()
+    found = {name for folder in overlay_folders(_typed_launch()[0]) for name in workspace.names(folder)}
+    return _beginning(incomplete, sorted(found))
 
 
 def schemas(incomplete: str) -> list[str]:
@@ -34,7 +38,7 @@ def schemas(incomplete: str) -> list[str]:
 
 def parameters(incomplete: str) -> list[str]:
     """`node.parameter=` of the launch file that was typed, with its overlays."""
-    return _beginning(incomplete, sorted(_parameters(_workspace(), *_typed_launch())))
+    return _beginning(incomplete, sorted(_parameters(Workspace.here(), *_typed_launch())))
 
 
 def _typed_launch() -> tuple[str, list[str]]:
@@ -89,16 +93,6 @@ def _beginning(incomplete: str, words: Iterable[str]) -> list[str]:
     return [word for word in words if word.startswith(incomplete)]
 
 
-def _workspace() -> Path:
-    """The nearest folder above that holds launch files; this one if there is none."""
-    here = Path.cwd()
-    return next((folder for folder in (here, *here.parents) if (folder / "launch").is_dir()), here)
-
-
-def _names(folder: Path) -> list[str]:
-    return sorted(path.stem for path in folder.glob("*.yaml"))
-
-
 def _sockets(pattern: str) -> list[Path]:
     from paramove.bus import default_folder
 
@@ -107,10 +101,10 @@ def _sockets(pattern: str) -> list[Path]:
     return []
 
 
-def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Iterator[str]:
-    for node, module in _modules(workspace / "launch", name, chosen).items():
+def _parameters(workspace: Workspace, name: str, chosen: Sequence[str] | None) -> Iterator[str]:
+    for node, module in _modules(workspace, name, chosen).items():
         with contextlib.suppress(OSError, SyntaxError, ValueError):
-            path = workspace / Path(*module.split(".")).with_suffix(".py")
+            path = workspace.find(Path(*module.split(".")).with_suffix(".py"))
             tree = ast.parse(path.read_text(encoding="utf-8"))
             configs = [line for line in tree.body if isinstance(line, ast.ClassDef) and line.name == "Config"]
             for line in (line for config in configs for line in config.body):
@@ -118,17 +112,18 @@ def _parameters(workspace: Path, name: str, chosen: Sequence[str] | None) -> Ite
                     yield f"{node}.{line.target.id}="
 
 
-def _modules(folder: Path, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
+def _modules(workspace: Workspace, name: str, chosen: Sequence[str] | None) -> dict[str, str]:
     """Node -> module, of a launch file that may be half written."""
     from paramove.documents import DocumentError, read_mapping
-    from paramove.supervision import overlay_folder
+    from paramove.supervision import overlay_folders
 
     modules: dict[str, str] = {}
     with contextlib.suppress(OSError, DocumentError, UnicodeDecodeError):
-        document = read_mapping((folder / f"{name}.yaml").read_text(encoding="utf-8-sig"), name)
+        document = read_mapping(workspace.find(f"launch/{name}.yaml").read_text(encoding="utf-8-sig"), name)
         names = chosen or document.data.get("default_overlays", [])
         for overlay in names if isinstance(names, list | tuple) else []:
-            path = overlay_folder(folder, name, overlay) / f"{overlay}.yaml"
+            paths = [workspace.find(folder / f"{overlay}.yaml") for folder in overlay_folders(name)]
+            path = next((path for path in paths if path.is_file()), paths[-1])
             document = document.overlaid(read_mapping(path.read_text(encoding="utf-8-sig"), str(path)))
         found = document.data.get("nodes")
         for node, settings in found.items() if isinstance(found, dict) else ():

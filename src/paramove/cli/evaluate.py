@@ -16,10 +16,10 @@ from paramove.cli.evaluation_io import (
     PROGRESS,
     JsonFileOption,
     seeds_in,
-    workspace_here,
     write_numbers,
 )
 from paramove.documents import exit_codes
+from paramove.workspace import Workspace
 
 app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
 STUDIES = ("kills", "faults", "imitation", "real", "peers", "chapter2", "chapter4", "chapter6", "real-images")
@@ -149,7 +149,7 @@ def _batch(
 ) -> list[dict[str, Any]]:
     from paramove.runs import BatchOptions, finished, run_batch
 
-    wanted, workspace = seeds_in(seeds), workspace_here()
+    wanted, workspace = seeds_in(seeds), Workspace.here().root
     folder = (runs or workspace / RUNS).resolve()
     options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays))
     results = {} if again else finished(folder, wanted, settings, overlays)

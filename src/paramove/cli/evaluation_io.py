@@ -1,4 +1,4 @@
-"""What `paramove evaluate` and the studies take in and give out alike: the workspace, seeds, numbers as JSON."""
+"""What `paramove evaluate` and the studies take in and give out alike: seeds, numbers as JSON."""
 
 from __future__ import annotations
 
@@ -11,20 +11,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
-from paramove.documents import exit_codes
-from paramove.supervision import application
-
 JsonFileOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="write the numbers to FILE too")]
 PROGRESS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-
-
-def workspace_here() -> Path:
-    """The workspace of the working directory; without one the command ends with exit code 66."""
-    try:
-        return application.find_workspace(Path.cwd())
-    except FileNotFoundError as error:
-        Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
-        raise typer.Exit(exit_codes.INPUT_MISSING) from error
 
 
 def seeds_in(text: str) -> list[int]:

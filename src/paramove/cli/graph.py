@@ -68,13 +68,14 @@ def graph(
 
 def _launched(name: str, overlays: list[str] | None) -> Graph:
     from paramove.documents import DocumentError, exit_codes
-    from paramove.supervision import LaunchFileMissingError, NoWorkspaceError, check, find_workspace, graph_of, load
+    from paramove.supervision import LaunchFileMissingError, check, graph_of, load
+    from paramove.workspace import Workspace
 
     try:
-        workspace = find_workspace(Path.cwd())
-        launch = load(workspace / "launch", name, overlays)
+        workspace = Workspace.here()
+        launch = load(workspace, name, overlays)
         return graph_of(launch, check(launch, workspace))
-    except (LaunchFileMissingError, NoWorkspaceError) as error:
+    except LaunchFileMissingError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(exit_codes.INPUT_MISSING) from None
     except DocumentError as error:

@@ -17,7 +17,8 @@ import typer
 
 from paramove.cli import completions
 from paramove.documents import printable
-from paramove.supervision import LEVELS, SUPERVISOR, LogLine, RunLogs, find_workspace
+from paramove.supervision import LEVELS, SUPERVISOR, LogLine, RunLogs
+from paramove.workspace import Workspace
 
 app = typer.Typer(add_completion=False)
 
@@ -74,19 +75,12 @@ def logs(
 
 
 def _run_folder(wanted: Path | None) -> Path:
-    folder = wanted or _workspace() / "runs" / "latest"
+    folder = wanted or Workspace.here().root / "runs" / "latest"
     if not (folder / "logs").is_dir():
         hint = "give the folder of a run with --run" if wanted is None else "a run's folder holds logs/ and run.yaml"
         typer.echo(f"{folder} holds no logs; {hint}", err=True)
         raise typer.Exit(66)
     return folder.resolve()
-
-
-def _workspace() -> Path:
-    try:
-        return find_workspace(Path.cwd())
-    except FileNotFoundError:
-        return Path.cwd()
 
 
 class _Shown:

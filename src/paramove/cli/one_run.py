@@ -35,6 +35,7 @@ from paramove.supervision import (
     examined,
     load,
 )
+from paramove.workspace import Workspace
 
 OVERLAY = "view"
 
@@ -63,23 +64,26 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
     launch = None
     try:
-        workspace = application.find_workspace(Path.cwd())
-        environment = examined(os.environ, workspace)
+        workspace = Workspace.here()
+        environment = examined(os.environ, workspace.root)
         for note in environment.notes:
             errors.print(f"note: {note}")
         overlays, settings = wanted.overlays, list(wanted.settings)
         if wanted.page:
-            overlays, title = with_page(workspace / "launch", wanted.name, overlays)
+            overlays, title = with_page(workspace, wanted.name, overlays)
             settings.insert(0, title)
-        launch = load(workspace / "launch", wanted.name, overlays, settings, wanted.seed, wanted.headless)
+        launch = load(workspace, wanted.name, overlays, settings, wanted.seed, wanted.headless)
         if check_only:
             application.check(launch, workspace)
-            console.print("\n".join(_found(launch, environment)), soft_wrap=True)
+            console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
             return exit_codes.OK
         outcome, folder = application.run(
-            launch, workspace, lambda folder: _view(console, output, folder, environment, wanted.headless), wanted.runs
+            launch,
+            workspace,
+            lambda folder: _view(console, output, folder, environment, workspace, wanted.headless),
+            wanted.runs,
         )
-    except (LaunchFileMissingError, application.NoWorkspaceError) as error:
+    except LaunchFileMissingError as error:
         errors.print(str(error))
         return exit_codes.INPUT_MISSING
     except (DocumentError, DomainNameError) as error:
@@ -94,7 +98,7 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
         errors.print(str(error))
         return exit_codes.PERMISSION
     except OSError as error:
-        errors.print(_about_files(error, (wanted.runs or workspace / "runs").resolve(), environment))
+        errors.print(_about_files(error, (wanted.runs or workspace.root / "runs").resolve(), environment))
         return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
     if output.dropped:
         errors.print("note: the terminal took nothing for a while, so lines are missing; `paramove logs` shows them")
@@ -108,7 +112,7 @@ def _left_out(launch: Launch) -> str:
     return "" if set(default) & set(launch.overlays) else " --with ".join(default)
 
 
-def _found(launch: Launch, environment: Environment) -> list[str]:
+def _found(launch: Launch, environment: Environment, workspace: Workspace) -> list[str]:
     """What a run would use, line by line."""
     seeds = f", seed {launch.seed}" if launch.seed is not None else ""
     clock = f"{launch.file.bus.clock}{', lockstep' if launch.file.bus.lockstep else ''}"
@@ -116,6 +120,7 @@ def _found(launch: Launch, environment: Environment) -> list[str]:
         f"{launch.name}: {len(launch.file.nodes)} nodes fit together",
         f"  overlays  {', '.join(launch.overlays) or 'none'}{seeds}",
         f"  clock     {clock}",
+        f"  workspace {workspace} ({workspace.digest})",
         f"  domain    {environment.domain}, sockets in {environment.sockets}",
         f"  python    {sys.executable}",
     ]
@@ -140,16 +145,24 @@ def _verdict(outcome: Outcome) -> str:
     return "done: " if outcome.code == exit_codes.OK else "FAILED: "
 
 
-def _view(console: Console, output: QueuedOutput, folder: RunFolder, environment: Environment, headless: bool) -> View:
+def _view(
+    console: Console,
+    output: QueuedOutput,
+    folder: RunFolder,
+    environment: Environment,
+    workspace: Workspace,
+    headless: bool,
+) -> View:
     console.print(f"run folder {folder.path}", soft_wrap=True)
+    console.print(f"workspace {workspace} ({workspace.digest})", soft_wrap=True)
     console.print(f"domain {environment.domain}, sockets in {environment.sockets}", soft_wrap=True)
     view = (TableView if console.is_terminal and not headless else LineView)(console, output)
     return AnnouncingView(view, folder.path)
 
 
-def with_page(folder: Path, name: str, overlays: Sequence[str] | None) -> tuple[list[str], str]:
+def with_page(workspace: Workspace, name: str, overlays: Sequence[str] | None) -> tuple[list[str], str]:
     """The overlays of a launch file, its default ones if None, with the page's on top; and the setting of its title."""
-    launch = load(folder, name, overlays)
+    launch = load(workspace, name, overlays)
     title = (launch.file.description or launch.name.replace("_", " "))[:80]
     return [*launch.overlays, OVERLAY], f"dashboard.title={json.dumps(title)}"
 

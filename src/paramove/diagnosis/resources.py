@@ -21,11 +21,10 @@ from paramove.supervision import (
     LONGEST_FOLDER,
     OPEN_FILES,
     DomainError,
-    NoWorkspaceError,
     check_name,
     examined,
-    find_workspace,
 )
+from paramove.workspace import Workspace
 
 LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
 """Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second
@@ -34,19 +33,15 @@ is told."""
 
 def resources_findings(machine: Machine) -> Iterator[Finding]:
     """Of folders, disks, limits, and variables of the environment."""
-    try:
-        workspace: Path | None = find_workspace(machine.folder)
-    except NoWorkspaceError:
-        workspace = None
+    workspace = Workspace.at(machine.folder).root
     folders = {"cache": user_cache_path("paramove"), "temporary": Path(tempfile.gettempdir())}
-    folders["runs"] = (workspace or machine.folder) / "runs"
+    folders["runs"] = workspace / "runs"
     for name, folder in folders.items():
         yield folder_finding(name, folder)
     yield sockets_finding()
     yield from disk_findings(folders)
     yield open_files_finding(resource.getrlimit(resource.RLIMIT_NOFILE)[1])
-    if workspace is not None:
-        yield from environment_findings(workspace)
+    yield from environment_findings(workspace)
 
 
 def folder_finding(name: str, folder: Path) -> Finding:

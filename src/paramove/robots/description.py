@@ -30,6 +30,7 @@ from paramove.robots.description_file import (
 from paramove.robots.joint_units import JointUnits
 from paramove.robots.planar_arm import PlanarArm
 from paramove.safety import MotionLimits
+from paramove.workspace import Workspace
 
 __all__ = ["Arm", "Chain", "DescriptionError", "RobotDescription"]
 
@@ -180,12 +181,17 @@ class RobotDescription:
 
     @classmethod
     def load(cls, path: str | Path) -> RobotDescription:
-        """Read and check a `robot.yaml`, or the one in the folder `path`.
+        """Read and check a `robot.yaml`.
+
+        Args:
+            path: The file or its folder, here or in the workspace; or the name of a folder in `robot_description/`.
 
         Raises:
             DescriptionError: The file is missing, is not YAML, has unknown or wrong fields, or contradicts itself.
         """
         path = Path(path)
+        if not path.exists() and not path.is_absolute():
+            path = Workspace.here().find(path if len(path.parts) > 1 else Path("robot_description", path))
         if path.is_dir():
             path = path / "robot.yaml"
         return _assemble(path, read_robot_file(path))

@@ -8,6 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from paramove.documents import InputError, findings, read_document
+from paramove.workspace import Workspace
 
 POSITION_MODE_MOST = 4095
 
@@ -153,7 +154,7 @@ class RobotFile(_Part):
 def read_robot_file(path: Path) -> RobotFile:
     """Read and check a `robot.yaml`. Raises DescriptionError with every wrong key, what was found and expected."""
     try:
-        remedy = "name the folder that holds robot.yaml"
+        remedy = f"name the folder that holds robot.yaml, or one of {', '.join(Workspace.here().robots())}"
         file = RobotFile.model_validate(read_document(path, "robot description", DescriptionError, remedy).data)
     except ValidationError as error:
         raise DescriptionError(f"{path}: {findings(error)}") from error

@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from paramove.documents import exit_codes, replacing
-from paramove.runs.recorded_run import RunFolderError, gaps_in
+from paramove.runs.recorded_run import RunFolderError, gaps_in, read_facts
 from paramove.supervision import QueuedOutput
 
 Evaluate = Callable[[argparse.Namespace, Console], bool | None]
@@ -49,9 +49,10 @@ def evaluated(
 
 
 def write_run_json(folder: Path, summary: dict[str, Any]) -> Path:
-    """Writes `run.json` into a run's folder: the numbers of the run, and the gaps of its recordings."""
+    """Writes `run.json` into a run's folder: its numbers, the gaps of its recordings, and the workspace."""
     path = folder / "run.json"
-    content = summary | {"gaps": [asdict(gap) for gap in gaps_in(folder)]}
+    gaps, workspace = [asdict(gap) for gap in gaps_in(folder)], read_facts(folder).get("workspace")
+    content = summary | {"gaps": gaps, "workspace": workspace}
     with replacing(path) as unfinished:
         unfinished.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     return path

@@ -151,7 +151,7 @@ def load_run(folder: Path) -> RecordedRun:
         traffic=traffic,
         truth=truth,
         verdict=_read_json(folder / "truth.json"),
-        facts=_read_yaml(folder / "run.yaml"),
+        facts=read_facts(folder),
         end_s=end_ns * 1e-9,
         done=done,
         gaps=_gaps({"recording": recording, "truth": truth_file}, end_ns),
@@ -251,7 +251,9 @@ def _read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
+def read_facts(folder: Path) -> dict[str, Any]:
+    """What the launcher wrote into `run.yaml`; empty without one. Raises RunFolderError."""
+    path = folder / "run.yaml"
     if not path.is_file():
         return {}
     return read_document(path, "file of a run", RunFolderError).data

@@ -10,6 +10,7 @@ from paramove.bus import topics
 from paramove.documents import read_document
 from paramove.recording import Recorded
 from paramove.supervision import InterfaceError, read_interface
+from paramove.workspace import Workspace
 
 
 @dataclass
@@ -78,7 +79,7 @@ class Traffic:
         return {"total": sum(lost.values()), "topics": lost}
 
 
-def speakers(launch_file: Path, workspace: Path) -> dict[str, str]:
+def speakers(launch_file: Path, workspace: Workspace) -> dict[str, str]:
     """Topic -> name of the node that says it, from a run's effective launch file; what cannot be read is left out."""
     found: dict[str, str] = {}
     if not launch_file.is_file():

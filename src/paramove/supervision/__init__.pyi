@@ -1,7 +1,5 @@
 from . import application as application
-from .application import NoWorkspaceError as NoWorkspaceError
 from .application import check as check
-from .application import find_workspace as find_workspace
 from .control import NoRunError as NoRunError
 from .control import ask as ask
 from .domain import LONGEST_FOLDER as LONGEST_FOLDER
@@ -24,7 +22,7 @@ from .interfaces import read_interface as read_interface
 from .launch_file import Launch as Launch
 from .launch_file import LaunchFileMissingError as LaunchFileMissingError
 from .launch_file import load as load
-from .launch_file import overlay_folder as overlay_folder
+from .launch_file import overlay_folders as overlay_folders
 from .launch_schema import FILES as FILES
 from .launch_schema import LaunchFile as LaunchFile
 from .launch_schema import editor_schema as editor_schema

@@ -19,25 +19,12 @@ from paramove.supervision.launch_file import Launch
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
 from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+from paramove.workspace import Workspace
 
 _log = logging.getLogger(__name__)
 
 
-class NoWorkspaceError(FileNotFoundError):
-    """The working directory lies in no workspace."""
-
-
-def find_workspace(start: Path) -> Path:
-    """The nearest folder at or above `start` that holds `launch/` and `nodes/`; raises NoWorkspaceError."""
-    for folder in (start, *start.parents):
-        if (folder / "launch").is_dir() and (folder / "nodes").is_dir():
-            return folder
-    raise NoWorkspaceError(
-        f"{start} lies in no paramove workspace (a folder with launch/ and nodes/); change into your clone first"
-    )
-
-
-def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
+def check(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
     """Checks all that can be known before a process starts; returns the interfaces; raises DocumentError."""
     interfaces = read_interfaces(launch, workspace)
     check_wiring(launch, interfaces, workspace)
@@ -45,15 +32,15 @@ def check(launch: Launch, workspace: Path) -> dict[str, Interface]:
 
 
 def run(
-    launch: Launch, workspace: Path, make_view: Callable[[RunFolder], View], runs: Path | None = None
+    launch: Launch, workspace: Workspace, make_view: Callable[[RunFolder], View], runs: Path | None = None
 ) -> tuple[Outcome, RunFolder]:
     """Checks the launch file, makes the run folder and runs to the end.
 
     Args:
         launch: From `launch_file.load`.
-        workspace: Root of the workspace, working directory of the nodes.
+        workspace: Where nodes are found; its root is their working directory.
         make_view: Gets the run folder, so that it can be shown.
-        runs: Where the run folder is made; default `runs` in the workspace.
+        runs: Where the run folder is made; default `runs` in the workspace's root.
 
     Raises DocumentError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
     """
@@ -62,7 +49,7 @@ def run(
     name = os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     with _private_files(), held_domain(name, f"paramove launch {launch.name}") as domain:
         begun = datetime.datetime.now().astimezone()
-        folder = RunFolder.create((runs or workspace / "runs").resolve(), begun)
+        folder = RunFolder.create((runs or workspace.root / "runs").resolve(), begun)
         folder.write_effective(launch)
         folder.write_configs(launch, domain.folder, domain.truth_folder, clock_speaker(interfaces))
         facts = _facts(launch, workspace, domain.name, begun)
@@ -103,7 +90,7 @@ def _private_files() -> Iterator[None]:
         os.umask(before)
 
 
-def _facts(launch: Launch, workspace: Path, domain: str, begun: datetime.datetime) -> dict[str, Any]:
+def _facts(launch: Launch, workspace: Workspace, domain: str, begun: datetime.datetime) -> dict[str, Any]:
     return {
         "launch": launch.name,
         "overlays": list(launch.overlays),
@@ -111,16 +98,19 @@ def _facts(launch: Launch, workspace: Path, domain: str, begun: datetime.datetim
         "domain": domain,
         "begun": begun.isoformat(timespec="seconds"),
         "version": importlib.metadata.version("paramove"),
-        "commit": _commit(workspace),
+        "commit": _commit(workspace.clone),
+        "workspace": {"folders": [str(folder) for folder in workspace.folders], "sha256": workspace.digest},
     }
 
 
-def _commit(workspace: Path) -> str | None:
-    """Commit of the workspace, with `+` if files differ from it; None where git or its history is not there."""
+def _commit(clone: Path | None) -> str | None:
+    """Commit of the clone, with `+` if files differ from it; None without a clone, git or its history."""
+    if clone is None:
+        return None
     try:
         answer = subprocess.run(
             ["git", "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"],
-            cwd=workspace,
+            cwd=clone,
             capture_output=True,
             text=True,
             timeout=10,

@@ -15,7 +15,9 @@ from pathlib import Path
 from platformdirs import user_cache_path
 
 from paramove.bus import default_folder
+from paramove.linear_algebra_threads import ONE_THREAD
 from paramove.supervision.domain import check_name
+from paramove.workspace import Workspace
 
 OPEN_FILES = 256
 """A node has two or three for each topic; the recorder, which hears nearly all, about a hundred."""
@@ -54,6 +56,17 @@ def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
         *_owner(workspace),
     ]
     return Environment(domain, sockets, tuple(notes))
+
+
+def node_environment(own: Mapping[str, str], workspace: Workspace) -> dict[str, str]:
+    """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set.
+
+    Python finds modules in the working directory, the workspace's root, and then in the workspace's other folders.
+    """
+    environment = {**ONE_THREAD, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
+    environment.pop("PYTHONSAFEPATH", None)
+    path = [*map(str, workspace.folders[1:]), *filter(None, [own.get("PYTHONPATH")])]
+    return {**environment, "PYTHONPATH": os.pathsep.join(path)} if path else environment
 
 
 def _unusable(folder: str) -> str:

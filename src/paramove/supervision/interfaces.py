@@ -6,6 +6,7 @@ import ast
 import functools
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import warnings
@@ -14,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from paramove.bus import Topic, topics
+from paramove.supervision.environment import node_environment
+from paramove.workspace import Workspace
 
 OLD_NAMES = {"SUBSCRIBES": "HEARS", "PUBLISHES": "SAYS"}
 """What nodes of the release before call theirs."""
@@ -44,20 +47,21 @@ class Interface:
     needs_parameters: bool = False
 
 
-def source_of(module: str, workspace: Path) -> Path:
+def source_of(module: str, workspace: Workspace) -> Path:
     """Source file of a module of the workspace or of the installed library; raises InterfaceError."""
     relative = Path(*module.split("."))
-    for candidate in (workspace / relative.with_suffix(".py"), workspace / relative / "__main__.py"):
-        if candidate.is_file():
+    for place in (relative.with_suffix(".py"), relative / "__main__.py"):
+        if (candidate := workspace.find(place)).is_file():
             return candidate
     if module.startswith("paramove."):
         found = _installed(module)
         if found is not None:
             return found
-    folder = workspace / relative.parent
-    known = sorted(file.stem for file in folder.glob("*.py") if not file.stem.startswith("_"))
+    known = [name for name in workspace.names(relative.parent, "*.py") if not name.startswith("_")]
     neighbours = f"; {relative.parent} has: {', '.join(known)}" if known else ""
-    raise InterfaceError(f"there is no module '{module}' ({relative.with_suffix('.py')}) in {workspace}{neighbours}")
+    raise InterfaceError(
+        f"there is no module '{module}' ({relative.with_suffix('.py')}) in {workspace.root}{neighbours}"
+    )
 
 
 def _installed(module: str) -> Path | None:
@@ -68,7 +72,7 @@ def _installed(module: str) -> Path | None:
     return Path(found.origin) if found is not None and found.origin else None
 
 
-def read_interface(module: str, workspace: Path) -> Interface:
+def read_interface(module: str, workspace: Workspace) -> Interface:
     """Interface of a node's module.
 
     SUBSCRIBES and PUBLISHES are read from the source as long as they are written as `topics.NAME`, tuples and sums of
@@ -179,12 +183,20 @@ _ASK = (
 
 @functools.cache
 def _imported(
-    module: str, workspace: Path, changed_ns: int, *names: str
+    module: str, workspace: Workspace, changed_ns: int, *names: str
 ) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """SUBSCRIBES and PUBLISHES of a module, imported in another process; again only when its file has changed."""
     command = [sys.executable, "-c", _ASK, module, *names]
     try:
-        answer = subprocess.run(command, cwd=workspace, capture_output=True, text=True, timeout=60, check=False)
+        answer = subprocess.run(
+            command,
+            cwd=workspace.root,
+            env=node_environment(os.environ, workspace),
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
     except subprocess.TimeoutExpired as error:
         raise InterfaceError(f"importing '{module}' took more than 60 s") from error
     if answer.returncode != 0:

@@ -26,9 +26,11 @@ from paramove.documents import (
 )
 from paramove.supervision.launch_schema import LaunchFile, NodeSettings
 from paramove.supervision.references import with_values, wrong_references
+from paramove.workspace import Workspace
 
 _QUOTED = re.compile(r"'([^']*)'")
 _PLAIN_NAME = re.compile(r"[a-z][a-z0-9_]*")
+_FOLDER = Path("launch")
 
 
 class LaunchFileMissingError(DocumentError):
@@ -52,18 +54,18 @@ class Launch:
 
 
 def load(
-    folder: Path,
+    workspace: Workspace,
     name: str,
     overlays: Sequence[str] | None = None,
     settings: Sequence[str] = (),
     seed: int | None = None,
     headless: bool = False,
 ) -> Launch:
-    """Reads `<folder>/<name>.yaml` with its overlays and settings and checks the result.
+    """Reads `launch/<name>.yaml` with its overlays and settings and checks the result.
 
     Args:
-        folder: Holds the launch files; overlays lie in its sub-folder `overlays`, those for this launch file alone in
-            a folder of its name there.
+        workspace: Holds the launch files; overlays lie in `launch/overlays`, those for this launch file alone in a
+            folder of its name there.
         name: Of the launch file without `.yaml`, or a path that ends in `.yaml`.
         overlays: Names or paths likewise; None takes the file's `default_overlays`, which are names.
         settings: Each `node.parameter=value`; the value is YAML.
@@ -72,8 +74,8 @@ def load(
 
     Raises LaunchFileMissingError, or DocumentError with all that is wrong.
     """
-    path = path_of(folder, name, "launch file")
-    document, chosen = _with_overlays(folder, path.stem, _read(path), overlays)
+    path = _typed(workspace, (_FOLDER,), name, "launch file")
+    document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays)
     document, findings = with_values(document, settings, seed, headless, overlays is not None)
     try:
         file = validated(document)
@@ -85,28 +87,28 @@ def load(
 
 
 def _with_overlays(
-    folder: Path, name: str, document: Document, overlays: Sequence[str] | None
+    workspace: Workspace, name: str, document: Document, overlays: Sequence[str] | None
 ) -> tuple[Document, list[str]]:
     """The document with its overlays, and their names; raises DocumentError with what is wrong in any of them."""
     paths, findings = [], []
+    folders = overlay_folders(name)
     if overlays is None:
         chosen = document.data.get("default_overlays", [])
         if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
             raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
         for index, overlay in enumerate(chosen):
-            path = overlay_folder(folder, name, overlay) / f"{overlay}.yaml"
+            place = ("default_overlays", str(index))
             if not _PLAIN_NAME.fullmatch(overlay):
-                message = f"{overlay!r}: expected the plain name of an overlay in {folder / 'overlays'}, no path"
-                findings.append(document.error(("default_overlays", str(index)), message))
-            elif not path.is_file():
-                message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, names_in(path.parent))}"
-                findings.append(document.error(("default_overlays", str(index)), message))
+                message = f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path"
+                findings.append(document.error(place, message))
+            elif not (path := _named(workspace, folders, overlay)).is_file():
+                message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, _known(workspace, folders))}"
+                findings.append(document.error(place, message))
             else:
                 paths.append(path)
     else:
         chosen = list(overlays)
-        own = names_in(folder / "overlays" / name)
-        paths = [path_of(overlay_folder(folder, name, overlay), overlay, "overlay", own) for overlay in chosen]
+        paths = [_typed(workspace, folders, overlay, "overlay") for overlay in chosen]
     for path in paths:
         try:
             top = _read(path)
@@ -139,27 +141,27 @@ def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
     return [found for found in details if found["type"] != "missing" or tuple(map(str, found["loc"])) not in mistyped]
 
 
-def overlay_folder(folder: Path, launch: str, overlay: str) -> Path:
-    """Where an overlay lies: made for this launch file alone in `overlays/<launch file>`, else in `overlays`."""
-    own = folder / "overlays" / launch
-    return own if (own / f"{overlay}.yaml").is_file() else folder / "overlays"
+def overlay_folders(launch: str) -> tuple[Path, Path]:
+    """Folders of a workspace with the overlays of a launch file: those for it alone, and those for all."""
+    return _FOLDER / "overlays" / launch, _FOLDER / "overlays"
 
 
-def names_in(folder: Path) -> list[str]:
-    """Names of the launch files, or overlays, in a folder."""
-    return sorted(file.stem for file in folder.glob("*.yaml"))
+def _named(workspace: Workspace, folders: Sequence[Path], name: str) -> Path:
+    """The file of this name in the first of the folders that has one; in the last where none has."""
+    places = [workspace.find(folder / f"{name}.yaml") for folder in folders]
+    return next((place for place in places if place.is_file()), places[-1])
 
 
-def path_of(folder: Path, name: str, kind: str, others: Sequence[str] = ()) -> Path:
-    """File of a launch file or overlay named on the command line; raises LaunchFileMissingError.
+def _known(workspace: Workspace, folders: Sequence[Path]) -> list[str]:
+    return list(dict.fromkeys(name for folder in folders for name in workspace.names(folder)))
 
-    Args:
-        others: Names that are told first where there is none of this name, beside those in the folder.
-    """
+
+def _typed(workspace: Workspace, folders: Sequence[Path], name: str, kind: str) -> Path:
+    """File of a launch file or overlay named on the command line; raises LaunchFileMissingError."""
     if name.endswith(".yaml"):
         path = Path(name)
     elif _PLAIN_NAME.fullmatch(name):
-        path = folder / f"{name}.yaml"
+        path = _named(workspace, folders, name)
     else:
         raise LaunchFileMissingError(Position(name), f"no name of a {kind}: expected letters, digits, '_', or a *.yaml")
     try:
@@ -167,8 +169,7 @@ def path_of(folder: Path, name: str, kind: str, others: Sequence[str] = ()) -> P
     except ValueError:  # a NUL byte in it
         there = False
     if not there:
-        names = list(dict.fromkeys([*others, *names_in(folder)]))
-        message = f"there is no such {kind}; {nearest(path.stem, names)}"
+        message = f"there is no such {kind}; {nearest(path.stem, _known(workspace, folders))}"
         raise LaunchFileMissingError(Position(str(path)), message)
     return path
 

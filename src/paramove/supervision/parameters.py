@@ -8,24 +8,28 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from paramove.documents import DocumentError, nearest
+from paramove.supervision.environment import node_environment
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
+from paramove.workspace import Workspace
 
 TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
 
 
-def wrong_parameters(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> Iterator[DocumentError]:
+def wrong_parameters(
+    launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace
+) -> Iterator[DocumentError]:
     """What the nodes' own Config refuses of their parameters, and modules that cannot be imported."""
     asked = {
         name: (launch.file.nodes[name].module, launch.file.nodes[name].parameters)
@@ -55,13 +59,14 @@ def _sentence(node: str, parameter: str, finding: dict[str, Any]) -> str:
     return f"'{node}' refuses {parameter or 'its parameters'}: {finding['message']}, found {finding['found']}"
 
 
-def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Path) -> tuple[list[Any], str]:
+def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> tuple[list[Any], str]:
     """Answers of a process that imports the modules in turn, and how it ended if an answer is missing."""
     try:
         answer = subprocess.run(
             [sys.executable, "-m", __name__],
             input=json.dumps(asked),
-            cwd=workspace,
+            cwd=workspace.root,
+            env=node_environment(os.environ, workspace),
             capture_output=True,
             text=True,
             timeout=TIMEOUT_S,

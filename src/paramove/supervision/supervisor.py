@@ -7,18 +7,17 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, Protocol, Self
 
 from paramove.documents import exit_codes
-from paramove.linear_algebra_threads import ONE_THREAD
 from paramove.msgs.node_status_pb2 import NodeStatus
 from paramove.supervision import by_hand
 from paramove.supervision.control import Answer, ControlServer
 from paramove.supervision.domain import Domain
+from paramove.supervision.environment import node_environment
 from paramove.supervision.events import EventLog, signal_name
 from paramove.supervision.launch_file import Launch, start_waves
 from paramove.supervision.launch_schema import LaunchFile
@@ -26,6 +25,7 @@ from paramove.supervision.processes import Guard, SupervisedProcess, last_lines
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.status_subscriber import StatusSubscriber
 from paramove.supervision.supervised_node import ENDED, STOP_S, State, SupervisedNode
+from paramove.workspace import Workspace
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SUSPENDS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
@@ -78,16 +78,16 @@ class Supervisor:
 
     Args:
         launch: What to run.
-        workspace: Working directory of the nodes.
+        workspace: Where nodes are found; its root is their working directory.
         run_folder: Of this run; configurations of the nodes are written there before.
         domain: Folders of the bus.
         view: Shows what happens.
     """
 
-    def __init__(self, launch: Launch, workspace: Path, run_folder: RunFolder, domain: Domain, view: View) -> None:
+    def __init__(self, launch: Launch, workspace: Workspace, run_folder: RunFolder, domain: Domain, view: View) -> None:
         self._file = launch.file
         self._judging = ["--no-video"] if launch.headless else []
-        self._workspace = workspace
+        self._workspace = workspace.root
         self._folder = run_folder
         self._view = view
         self._interrupts = Interrupts()
@@ -95,7 +95,7 @@ class Supervisor:
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
         self._listener_folder = domain.folder
-        self._environment = node_environment(os.environ)
+        self._environment = node_environment(os.environ, workspace)
         self._ending = False
 
     def run(self) -> Outcome:
@@ -292,13 +292,6 @@ def stop_waves(file: LaunchFile) -> list[list[str]]:
     last = [name for name, node in file.nodes.items() if node.stop == "last"]
     between = [[name for name in wave if name not in (*first, *last)] for wave in reversed(start_waves(file))]
     return [wave for wave in (first, *between, last) if wave]
-
-
-def node_environment(own: Mapping[str, str]) -> dict[str, str]:
-    """Environment of the nodes: the launcher's own, with one thread for each linear-algebra library unless set."""
-    environment = {**ONE_THREAD, **own, "PYTHONUNBUFFERED": "1", "PYTHONFAULTHANDLER": "1"}
-    environment.pop("PYTHONSAFEPATH", None)  # nodes are found in the workspace, their working directory
-    return environment
 
 
 def _drain(wake_fd: int) -> None:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from paramove.bus import CLOCK, Topic, topics
 from paramove.documents import DocumentError, nearest, raise_any
 from paramove.supervision.interfaces import Interface, InterfaceError, read_interface, source_of
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.parameters import wrong_parameters
+from paramove.workspace import Workspace
 
 
-def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:
+def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
     """Interface of every node.
 
     Raises DocumentError with every `module` and `after_run` that does not exist, and with the wrong parameters of
@@ -35,7 +35,7 @@ def read_interfaces(launch: Launch, workspace: Path) -> dict[str, Interface]:
     return interfaces
 
 
-def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace: Path) -> None:
+def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace) -> None:
     """Checks topics, parameters and access to ground truth.
 
     Every topic that is heard has a speaker, no topic has two, only nodes with `truth: true` know a truth topic, topics

@@ -12,6 +12,7 @@ from paramove.runs.recorded_run import load_run
 from paramove.runs.rule_learning.report import page
 from paramove.runs.rule_learning.summary import RunEvaluation
 from paramove.runs.verdict_table import rows_of
+from paramove.workspace import Workspace
 from tests.runs.conftest import ROOT
 from tests.runs.synthetic_run import PERIOD_NS, SyntheticRun
 
@@ -53,7 +54,7 @@ class PointedRun(SyntheticRun):
 def evaluate(tmp_path, robot):
     def make(told, **more):
         PointedRun(tmp_path, robot, told, **more).write()
-        return RunEvaluation(load_run(tmp_path), robot, ROOT)
+        return RunEvaluation(load_run(tmp_path), robot, Workspace.at(ROOT))
 
     return make
 

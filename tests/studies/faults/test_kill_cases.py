@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from paramove.supervision.launch_file import load
+from paramove.workspace import Workspace
 from studies.faults.kill_cases import LAUNCHER, MOMENTS, CaseError, Expected, cases_of, runs_of
 
-FILE = load(Path(__file__).parents[3] / "launch", "rule_learning", ["sim", "real_time"]).file
+FILE = load(Workspace.at(Path(__file__).parents[3]), "rule_learning", ["sim", "real_time"]).file
 NODES = [*FILE.nodes, LAUNCHER]
 
 

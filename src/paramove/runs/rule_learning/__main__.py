@@ -19,13 +19,14 @@ from paramove.runs.after_a_run import evaluated
 from paramove.runs.recorded_run import load_run
 from paramove.runs.rule_learning.summary import RunEvaluation, as_json
 from paramove.runs.verdict_table import show_verdict
+from paramove.workspace import Workspace
 
 ROBOT = Path("robot_description/hoap3")
 
 
-def evaluate(folder: Path, workspace: Path) -> RunEvaluation:
+def evaluate(folder: Path, workspace: Workspace) -> RunEvaluation:
     """Read a run; raises RunFolderError or DescriptionError."""
-    return RunEvaluation(load_run(folder), RobotDescription.load(workspace / ROBOT), workspace)
+    return RunEvaluation(load_run(folder), RobotDescription.load(workspace.find(ROBOT)), workspace)
 
 
 def write_summary(evaluation: RunEvaluation) -> Path:
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _evaluate(options: argparse.Namespace, console: Console) -> bool:
-    evaluation = evaluate(options.run_folder, Path.cwd())
+    evaluation = evaluate(options.run_folder, Workspace.here())
     written = [write_summary(evaluation)]
     if not options.no_report:
         from paramove.runs.rule_learning.report import write_report

@@ -8,7 +8,6 @@ import platform
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from paramove.runs.rule_learning.homography_accuracy import MappedPoints, SeenAt
 from paramove.runs.rule_learning.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
 from paramove.runs.spread import spread
 from paramove.runs.traffic import speakers
+from paramove.workspace import Workspace
 
 WHERE = ("inside", "outside")
 DECIMALS = 6
@@ -41,7 +41,7 @@ class RunEvaluation:
 
     run: RecordedRun
     robot: RobotDescription
-    workspace: Path
+    workspace: Workspace
 
     @cached_property
     def relocations(self) -> list[Relocation]:
@@ -144,6 +144,7 @@ class RunEvaluation:
             "loss": run.traffic.loss(),
             "gaps": [{"recording": g.recording, "begin_s": g.begin_s, "end_s": g.end_s} for g in run.gaps],
             "versions": _versions(run.facts),
+            "workspace": run.facts.get("workspace"),
             "wall": self._wall(),
         }
 
