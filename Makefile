@@ -69,7 +69,7 @@ messages: setup ## generates src/paramove/msgs from msgs/*.proto
 lock: ## finds newer versions and writes requirements.lock and requirements-peers.lock
 	python3 -m venv build/lock
 	build/lock/bin/python -m pip install --quiet uv
-	build/lock/bin/uv pip compile pyproject.toml --extra dev --extra docs --universal --python-version 3.11 --upgrade \
+	build/lock/bin/uv pip compile pyproject.toml --extra robot --extra c3d --extra dev --extra docs --universal --python-version 3.11 --upgrade \
 	  --generate-hashes --no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
 	  --output-file requirements.lock
 	build/lock/bin/uv pip compile pyproject.toml --extra peers --extra cluster --universal --python-version 3.11 --upgrade \

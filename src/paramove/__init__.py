@@ -1,1 +1,5 @@
 """paramove: parametric human movements, learned from few demonstrations."""
+
+import importlib.metadata
+
+__version__ = importlib.metadata.version("paramove")

@@ -148,10 +148,14 @@ def _batch(
     drop_recordings: bool,
 ) -> list[dict[str, Any]]:
     from paramove.runs import BatchOptions, finished, run_batch
+    from paramove.supervision import check, load
 
-    wanted, workspace = seeds_in(seeds), Workspace.here().root
-    folder = (runs or workspace / RUNS).resolve()
-    options = BatchOptions(workspace, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays))
+    wanted, workspace = seeds_in(seeds), Workspace.here()
+    check(load(workspace, "rule_learning", overlays or None, settings), workspace)  # what is wrong is said at once
+    folder = (runs or workspace.root / RUNS).resolve()
+    options = BatchOptions(
+        workspace.root, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays)
+    )
     results = {} if again else finished(folder, wanted, settings, overlays)
     if results:
         console.print(

@@ -15,11 +15,13 @@ from typing import Annotated
 
 import typer
 
+from paramove import __version__
 from paramove.cli.completions import typed_words
-from paramove.documents import InputError
+from paramove.documents import UNAVAILABLE, InputError
 from paramove.linear_algebra_threads import use_one_thread
 
 COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("paramove.cli.demo", "Run the demonstration: `paramove launch rule_learning`."),
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
     "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
     "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
@@ -38,13 +40,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "doctor": ("paramove.cli.doctor", "Check this machine and its installation."),
 }
 """Name -> module and one line of help."""
+EXTRAS = dict.fromkeys(("av", "cv2", "dynamixel_sdk", "mujoco", "serial", "websockets", "zmq"), "robot")
+"""Module -> the extra of the package that brings it."""
 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        typer.echo(f"paramove {version('paramove')}")
+        typer.echo(f"paramove {__version__}")
         raise typer.Exit
 
 
@@ -87,6 +89,15 @@ def main() -> None:
     use_one_thread()
     try:
         build(wanted_command(sys.argv, os.environ))(prog_name="paramove")
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        sys.stderr.write(
+            f"this needs {package}, which the extra '{EXTRAS[package]}' brings: "
+            f"pip install 'paramove[{EXTRAS[package]}]'\n"
+        )
+        sys.exit(UNAVAILABLE)
     except InputError as error:  # of a command that has nothing more to say of it
         sys.stderr.write(f"{error}\n")
         sys.exit(error.exit_code)

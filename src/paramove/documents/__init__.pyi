@@ -9,6 +9,7 @@ from .atomic_writing import replacing as replacing
 from .exit_codes import FAILURE as FAILURE
 from .exit_codes import NEVER_RESTARTED as NEVER_RESTARTED
 from .exit_codes import OK as OK
+from .exit_codes import UNAVAILABLE as UNAVAILABLE
 from .exit_codes import describe as describe
 from .files import read_text as read_text
 from .files import size_of as size_of

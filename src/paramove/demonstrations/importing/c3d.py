@@ -5,6 +5,7 @@ A damaged file can hang or crash ezc3d, so it is given a time limit and harms no
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import tempfile
@@ -26,6 +27,8 @@ def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
     Raises DemonstrationError if the file cannot be read, which names the reader's complaint.
     """
     size_of(path, "C3D file", DemonstrationError)
+    if importlib.util.find_spec("ezc3d") is None:
+        raise DemonstrationError(f"{path} is a C3D file; what reads these is installed by: pip install 'paramove[c3d]'")
     with tempfile.TemporaryDirectory(prefix="paramove-c3d-") as folder:
         result = Path(folder) / "result.npz"
         command = [sys.executable, c3d_process.__file__, str(path), str(result)]
