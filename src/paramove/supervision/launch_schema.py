@@ -28,17 +28,17 @@ class _Checked(BaseModel):
 class BusSettings(_Checked):
     """The bus of a run."""
 
-    clock: Literal["simulated", "monotonic"] = Field(default="monotonic", description="what the time of the run is")
+    clock: Literal["simulated", "monotonic"] = Field(default="monotonic", description="the clock of the run")
     lockstep: bool = Field(
-        default=False, description="simulated time advances only when all members are done with a tick"
+        default=False, description="simulated time advances only when all members have acknowledged a tick"
     )
 
 
 class RestartBudget(_Checked):
     """So many restarts within so many seconds; one more and the node is given up."""
 
-    restarts: int = Field(default=5, ge=0, le=1000, description="so many restarts")
-    window_s: Seconds = Field(default=300.0, description="within so many seconds")
+    restarts: int = Field(default=5, ge=0, le=1000, description="number of restarts")
+    window_s: Seconds = Field(default=300.0, description="within this time")
 
 
 class NodeSettings(_Checked):
@@ -48,7 +48,7 @@ class NodeSettings(_Checked):
     parameters: dict[str, Any] = Field(default_factory=dict, description="checked by the node's own Config")
     remaps: dict[str, str] = Field(default_factory=dict, description="topic name in the node: topic name on the bus")
     restart: Literal["never", "on-failure", "always"] = Field(
-        default="never", description="what follows its end: nothing; a restart after a failure; a restart in any case"
+        default="never", description="reaction to its end: none; a restart after a failure; a restart in any case"
     )
     backoff_s: Seconds = Field(default=0.5, description="wait before the first restart; doubles up to 30 s")
     budget: RestartBudget = Field(
@@ -57,28 +57,28 @@ class NodeSettings(_Checked):
     required: bool = Field(default=True, description="the run fails when this node ends before the run does")
     after: list[Name] = Field(default_factory=list, description="started when these nodes are ready")
     ready_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
-        default=30.0, description="a node that is not ready so long after its start has failed"
+        default=30.0, description="a node that is not ready within this time after its start has failed"
     )
     silent_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = Field(
         default=10.0,
-        description="a node that was ready and says no status for so long hangs and is killed; null: never",
+        description="a node that was ready and publishes no status for this time is killed; null: never",
     )
     stopped_timeout_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = Field(
-        default=1.0, description="a process that was stopped (SIGSTOP) for so long is killed; null: never"
+        default=1.0, description="a process that is stopped (SIGSTOP) for this time is killed; null: never"
     )
     restart_ends_run: bool = Field(
-        default=False, description="once the node is back after a restart, the run ends with its ready sentence"
+        default=False, description="once the node is back after a restart, the run ends with its ready message"
     )
     memory_limit_mb: Annotated[float, Field(gt=0.0)] | None = Field(
-        default=None, description="a node that uses more is killed, and restarted as `restart` says"
+        default=None, description="a node that uses more is killed, and restarted according to `restart`"
     )
     priority: Literal["low", "normal", "high"] = Field(
-        default="normal", description="share of the processor where it is scarce; high only where the system allows it"
+        default="normal", description="priority on a busy processor; high only where the system allows it"
     )
-    ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
-    lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
+    ends_run: bool = Field(default=False, description="the run succeeds when this node finishes with exit code 0")
+    lockstep: bool = Field(default=True, description="if the bus runs in lockstep: whether time waits for this node")
     optional_topics: list[str] = Field(
-        default_factory=list, description="heard topics that may lack a speaker; '*': all"
+        default_factory=list, description="subscribed topics that may lack a publisher; '*': all"
     )
     truth: bool = Field(
         default=False, description="gets the folder of ground truth; for the simulator and the judge only"
@@ -94,11 +94,11 @@ class LaunchFile(_Checked):
     description: str = Field(default="", description="what the application does, for people")
     bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
     nodes: dict[Name, NodeSettings] = Field(min_length=1, description="name of the node: how it runs")
-    default_overlays: list[str] = Field(default_factory=list, description="laid over it where --with is not given")
+    default_overlays: list[str] = Field(default_factory=list, description="overlays applied without --with")
     seed_parameters: list[str] = Field(default_factory=list, description="node.parameter that --seed sets")
     connections: list[str] = Field(
         default_factory=list,
-        description="node.parameter that says which hardware is used: --set takes it only with an overlay, named by "
+        description="node.parameter that selects the hardware: --set accepts it only with an overlay, named by "
         "--with, that sets it",
     )
     headless: dict[str, Any] = Field(default_factory=dict, description="node.parameter: value that --headless sets")
