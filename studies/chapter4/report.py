@@ -135,7 +135,7 @@ def _questions(results: Results, summary: dict[str, Any], likeliest: dict[str, A
         ),
         section(
             "What is none of the movements, and how sure a model is",
-            "AUROC: probability that a genuine movement seems more typical than another one. Aborted: half of the "
+            "AUROC: probability that a genuine movement fits the model better than another one. Aborted: half of the "
             "fingertip's way out, back along the same way, then at rest. Stopped: held there. Redirect: to two places.",
             rejection_table(summary),
         ),

@@ -20,9 +20,9 @@ from paramove.documents import Floats, Ints
 from paramove.phmm.features import Monomials
 from paramove.phmm.left_out import folds_of, inflation_of
 from paramove.phmm.noise import distances_with_noise
+from paramove.phmm.predictive_distribution import PredictiveDistribution
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
-from paramove.phmm.typicality import PredictiveDistribution
 
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""
@@ -154,7 +154,7 @@ class CorrelatedRegression:
         diagonal = np.diagonal(self.root)
         return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(y) * np.log(2.0 * np.pi))
 
-    def log_typicality(self, distance: float) -> float:
+    def log_p_value(self, distance: float) -> float:
         """Logarithm of the probability that a genuine movement lies as far from the model or farther.
 
         The logarithms of the distances of unseen training movements are taken for normally distributed, in a group that

@@ -53,7 +53,7 @@ class WindowBelief:
     @property
     def likeness(self) -> float:
         """0 of what is no pointing to 1 of what is as pointing usually is."""
-        return float(self.judgement.typicality**0.25) if self.pointing else 0.0
+        return float(self.judgement.p_value**0.25) if self.pointing else 0.0
 
 
 class PointingWindow:
@@ -145,7 +145,7 @@ class PointingWindow:
         placed = self._placement.in_model(samples)
         windows = [at_times(np.linspace(-length, 0.0, FRAMES), times, placed) for length in lengths]
         judged = [self._model.judged(window) for window in windows]
-        chosen = int(np.argmin([one.strangeness for one in judged]))
+        chosen = int(np.argmin([one.outlier_score for one in judged]))
         best = judged[chosen]
         place = self._placement.in_world(table_place(best.theta))
         slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
@@ -155,7 +155,7 @@ class PointingWindow:
     def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
         options = self._options
         beside = np.maximum(-judged.theta, judged.theta - 1.0).max()
-        if judged.typicality < options.level or beside > options.margin:
+        if judged.p_value < options.level or beside > options.margin:
             return False
         return self._model.lead(window, judged) >= options.least_lead
 
@@ -166,8 +166,8 @@ class PointingWindow:
                 return None
             self._said_at = None
         belief, best = self.belief, self._best
-        least = np.inf if best is None else best.judgement.strangeness
-        if belief is not None and belief.pointing and belief.judgement.strangeness < least:
+        least = np.inf if best is None else best.judgement.outlier_score
+        if belief is not None and belief.pointing and belief.judgement.outlier_score < least:
             self._best = best = belief
         if best is None or now_ns - best.captured_ns < self._options.settled_s * 1e9:
             return None

@@ -1,4 +1,4 @@
-"""How probable so strange a movement is, judged by few persons.
+"""Predictive distribution of a value of a new person's movement, learned from few persons: it gives p-values.
 
 Movements of one person are alike, so a hundred movements of nine persons say about a tenth person hardly more than nine
 numbers do. A value of a new person's movement has the variance between persons and that within them, and its mean is
