@@ -24,7 +24,7 @@ from paramove.bus import Bus, BusSettings, Received, Subscriber, topics
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 
 SMALL = topics.WIRE_HOAP3_STREAM
-IMAGES = replace(topics.CAMERA_LIGHT, rate_hz=30)
+IMAGES = replace(topics.CAMERA_IMAGE_RAW, rate_hz=30)
 IMAGE_BYTES = 1_000_000
 IMAGE_EVERY = 33
 """Messages at 1 kHz per image: 30 images a second."""

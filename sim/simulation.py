@@ -122,8 +122,8 @@ class Simulation:
                 self._firmware_log = None
         self.physics_s += time.perf_counter() - started
 
-    def light(self) -> RawImage | None:
-        """What falls on the camera's sensor now; None without a camera."""
+    def image_raw(self) -> RawImage | None:
+        """The camera's image now; None without a camera."""
         if self._eye is None:
             return None
         started = time.perf_counter()

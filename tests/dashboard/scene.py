@@ -100,7 +100,7 @@ def messages() -> list[tuple[Topic, Any]]:
         ),
         (topics.ARM_JOINT_STATES, joints),
         (topics.ARM_SAFETY, safety()),
-        (topics.status("camera"), status("camera", sentence="frames from topic:camera/light")),
+        (topics.status("camera"), status("camera", sentence="frames from topic:camera/image_raw")),
         (
             topics.status("recognizer"),
             status(

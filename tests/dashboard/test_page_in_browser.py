@@ -149,7 +149,7 @@ def test_all_that_a_person_wants_to_know_is_on_the_page(run: Run, browser: Brows
         "in an opening",
         "2 of 3 learned",
         "calibration refused",
-        "frames from topic:camera/light",
+        "frames from topic:camera/image_raw",
     ):
         assert words in text, words
     assert browser.run("document.querySelector('#stages .now').textContent") == "Apply"

@@ -115,12 +115,12 @@ def _picture(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).integers(40, 200, (36, 48, 3), dtype=np.uint8)
 
 
-def _light(seed: int) -> RawImage:
+def _image_raw(seed: int) -> RawImage:
     return RawImage(encoding="bgr8", width=48, height=36, step=144, data=_picture(seed).tobytes())
 
 
 def of_camera() -> list[Event]:
-    return timed((topics.CAMERA_LIGHT, _light(seed)) for seed in range(60))
+    return timed((topics.CAMERA_IMAGE_RAW, _image_raw(seed)) for seed in range(60))
 
 
 def of_colour_tracker() -> list[Event]:

@@ -104,10 +104,10 @@ def test_camera_shows_each_colour_where_it_stands(seeing: Simulation) -> None:
     for colour, place in places.items():
         world.place(colour, tool_box.standing_centre(*place))
     world.step(np.zeros(world.description.n_joints))
-    light = seeing.light()
-    assert light is not None
-    assert (light.width, light.height, light.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
-    image = np.frombuffer(light.data, np.uint8).reshape(light.height, light.width, 3)
+    image_raw = seeing.image_raw()
+    assert image_raw is not None
+    assert (image_raw.width, image_raw.height, image_raw.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
+    image = np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
     found = {item.name: item for item in ColourTracker().update(np.ascontiguousarray(image[:, :, ::-1])).objects}
     assert set(found) == set(places)
     for colour in places:

@@ -87,7 +87,7 @@ def test_optional_topic_needs_no_speaker(workspace):
     ("source", "subscribes"),
     [
         ("_TWO = (topics.SPEECH, topics.CLOCK)\nSUBSCRIBES = _TWO + (topics.RULES,)", ["speech", "clock", "rules"]),
-        ("SUBSCRIBES = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/light", "rules"]),
+        ("SUBSCRIBES = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/image_raw", "rules"]),
         ("SUBSCRIBES = tuple(t for t in topics.TOPICS if t.name == 'rules')", ["rules"]),
         ("SUBSCRIBES = topics.TOPICS", [topic.name for topic in topics.TOPICS]),
     ],

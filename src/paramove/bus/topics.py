@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import re
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -102,11 +103,11 @@ _IMAGE_BYTES = 2**24
 _MOVEMENT_BYTES = 2**20
 
 CLOCK = Topic("clock", Clock, 15, _QUEUE)
-CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
+CAMERA_IMAGE_RAW = Topic("camera/image_raw", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
 CAMERA_IMAGE = Topic(
     "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=_IMAGE_BYTES
 )
-CAMERA_LIGHTS = tuple(replace(CAMERA_LIGHT, name=f"camera_{number}/light") for number in range(1, 5))
+CAMERA_IMAGES_RAW = tuple(replace(CAMERA_IMAGE_RAW, name=f"camera_{number}/image_raw") for number in range(1, 5))
 CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
 """Of the calibrated cameras that look at a person."""
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
@@ -151,7 +152,7 @@ TOPICS: tuple[Topic, ...] = tuple(
 """Every topic but the status topics, which exist once per node: see `status`."""
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
-STEREO_LIGHTS = CAMERA_LIGHTS[:2]
+STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 """What two cameras see of a tracked arm."""
 ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
 """Arming requests: a driver subscribes to all of them."""
@@ -178,8 +179,36 @@ def status(node: str) -> Topic:
     return Topic(name, NodeStatus, 1, _LATCHED, recorded=True)
 
 
+OLD_NAMES = {f"{camera}/light": f"{camera}/image_raw" for camera in ("camera", *(f"camera_{n}" for n in range(1, 5)))}
+"""Topics that had another name in the release before; the old one is taken for one release, with a warning."""
+_OLD_CONSTANTS = {
+    "CAMERA_LIGHT": "CAMERA_IMAGE_RAW", "CAMERA_LIGHTS": "CAMERA_IMAGES_RAW", "STEREO_LIGHTS": "STEREO_IMAGES_RAW",
+}  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """The constants by the names that they had in the release before."""
+    if name not in _OLD_CONSTANTS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return globals()[_now_called(f"topics.{name}", _OLD_CONSTANTS[name])]
+
+
+def present_names(text: str) -> str:
+    """The text of a launch file with the names that its topics have now."""
+    for old, new in OLD_NAMES.items():
+        if re.search(rf"(?<![\w/]){old}(?![\w/])", text):
+            text = re.sub(rf"(?<![\w/]){old}(?![\w/])", _now_called(f"topic {old}", new), text)
+    return text
+
+
+def _now_called(old: str, new: str) -> str:
+    warnings.warn(f"{old} is called {new} now; the next release knows the new name only", FutureWarning, stacklevel=3)
+    return new
+
+
 def by_name(name: str) -> Topic:
-    """Topic of that name; raises KeyError that names the nearest topics."""
+    """Topic of that name, or of that name before; raises KeyError that names the nearest topics."""
+    name = OLD_NAMES.get(name, name)
     if name.startswith(_STATUS_PREFIX):
         return status(name.removeprefix(_STATUS_PREFIX))
     for topic in TOPICS:

@@ -23,7 +23,7 @@ class FolderFrames:
     Raises InputError if there are none; EndOfFrames after the last one.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(self, folder: Path, rate_hz: float) -> None:
         self._files = sorted(file for file in folder.glob("*") if file.suffix.lower() in PICTURES)
@@ -36,7 +36,7 @@ class FolderFrames:
         self._start_ns: int | None = None
         self._next = 0
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The newest picture that is due. Raises FrameError for one that cannot be read."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         index = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + TICK_SHARE)
@@ -61,7 +61,7 @@ class RecordingFrames:
     Raises InputError if the recording has none; EndOfFrames after the last one.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(self, path: Path, topic: str) -> None:
         if not path.is_file():
@@ -78,7 +78,7 @@ class RecordingFrames:
         self._start_ns: int | None = None
         self._index = 0
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The newest image that is due. Raises FrameError for one that cannot be decoded."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         due_ns = self._first_ns + (now_ns - self._start_ns) + 1_000_000
