@@ -103,7 +103,7 @@ def test_status_is_said_at_once_and_carries_exact_counts(speaker: Bus, listener:
     status = topics.status("recognizer")
     heard = next(item for item in listener.events(status) if item.message.state == NodeStatus.STATE_READY)
     assert (heard.message.sentence, heard.message.pid) == ("recognising", os.getpid())
-    assert {count.topic: count.messages for count in heard.message.said}["gestures"] == 1
+    assert {count.topic: count.messages for count in heard.message.published}["gestures"] == 1
 
 
 def test_status_is_said_every_second_while_waiting(speaker: Bus, listener: Bus, wait: Wait) -> None:

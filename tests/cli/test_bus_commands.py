@@ -161,7 +161,7 @@ def test_long_bytes_and_enums_are_readable() -> None:
     gesture = Gesture(kind=Gesture.KIND_MOVED, x=float("nan"))
     gesture.captured.FromNanoseconds(2_000_000_003)
     assert readable(gesture) == {"captured": {"seconds": 2, "nanos": 3}, "kind": "KIND_MOVED", "x": "nan"}
-    assert readable(topics.CLOCK.type(said=[{"topic": "a"}])) == {"said": [{"topic": "a"}]}
+    assert readable(topics.CLOCK.type(published=[{"topic": "a"}])) == {"published": [{"topic": "a"}]}
 
 
 def test_only_the_called_command_is_imported() -> None:

@@ -104,7 +104,7 @@ def messages() -> list[tuple[Topic, Any]]:
         (
             topics.status("recognizer"),
             status(
-                "recognizer", NodeStatus.STATE_DEGRADED, "calibration refused", heard=[TopicCount(topic="x", lost=3)]
+                "recognizer", NodeStatus.STATE_DEGRADED, "calibration refused", received=[TopicCount(topic="x", lost=3)]
             ),
         ),
     ]

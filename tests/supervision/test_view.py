@@ -24,7 +24,7 @@ def node():
     made = SupervisedNode("camera", NodeSettings(module="m"), lambda _: OwnProcess(), lambda _: None)
     made.start(0.0)
     status = NodeStatus(node="camera", state=NodeStatus.STATE_READY, sentence="480x360 [red]", pid=os.getpid())
-    status.heard.add(topic="clock", lost=3)
+    status.received.add(topic="clock", lost=3)
     made.hear(status)
     return made
 

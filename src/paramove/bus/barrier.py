@@ -109,7 +109,7 @@ class LockstepBarrier:
         self._bus.keep_time(now_ns)
         self._answered.clear()
         beat = Clock(time_ns=now_ns, tick=self.tick, period_ns=TICK_PERIOD_NS, lockstep=self._lockstep)
-        beat.said.extend(from_marks(self._all_marks()))
+        beat.published.extend(from_marks(self._all_marks()))
         self._bus.say_at_once(topics.CLOCK, beat)
         while not self._exchange.stopped and (missing := self._marks.keys() - self._answered):
             self._wait(missing, f"be done with tick {self.tick}")
@@ -172,7 +172,7 @@ class LockstepBarrier:
             return True
         if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:
             return False  # of a process that is no member any more
-        self._marks[node] = to_marks(answer.said)
+        self._marks[node] = to_marks(answer.published)
         if answer.kind == TickDone.KIND_LEAVE:
             self._remove(node, "left")
         elif answer.tick == self.tick:
@@ -182,7 +182,7 @@ class LockstepBarrier:
     def _admit(self) -> None:
         """Takes newcomers in; done between beats only, so that each beat has one set of members."""
         for node, greeting in sorted(self._newcomers.items()):
-            self._marks[node] = to_marks(greeting.said)
+            self._marks[node] = to_marks(greeting.published)
             if self.tick > 0:
                 _log.warning("lockstep: %s joins at tick %d", node, self.tick)
         self._newcomers.clear()

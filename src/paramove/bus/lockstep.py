@@ -114,7 +114,7 @@ class LockstepTicks:
             if beat is None:
                 continue
             self.now_ns = beat.time_ns
-            marks = to_marks(beat.said)
+            marks = to_marks(beat.published)
             if marks.get(member_mark(self._node), (0, 0))[0] != os.getpid():
                 continue  # the barrier has not read our greeting yet
             read_up_to(self._exchange, marks, heard)
@@ -154,7 +154,7 @@ class LockstepTicks:
 
     def _answer(self, kind: TickDone.Kind, tick: int) -> None:
         marks = self._exchange.marks() | {member_mark(self._node): (os.getpid(), 0)}
-        answer = TickDone(node=self._node, pid=os.getpid(), kind=kind, tick=tick, said=from_marks(marks))
+        answer = TickDone(node=self._node, pid=os.getpid(), kind=kind, tick=tick, published=from_marks(marks))
         payload = answer.SerializeToString()
         envelope = Envelope(self._schema, publisher_id(self._node), 0, tick, self.now_ns, self.now_ns)
         self._socket.send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)

@@ -65,9 +65,9 @@ class StatusReporter:
         )
         message.captured.FromNanoseconds(now_ns)
         for publisher in self._exchange.publishers.values():
-            message.said.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
+            message.published.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
         for subscriber in self._exchange.subscribers.values():
-            message.heard.append(_count(subscriber.name, subscriber.counter))
+            message.received.append(_count(subscriber.name, subscriber.counter))
         self._publisher.publish(message, now_ns, now_ns)
 
 

@@ -34,7 +34,7 @@ def list_nodes(
     as_json: JsonOption = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="how long to wait for an answer")] = 2.0,
 ) -> None:
-    """List the nodes: state, what they say of themselves, messages, losses, seconds spent, restarts and last end."""
+    """List the nodes: state, their own status, messages, losses, seconds spent, restarts and last end."""
     folder = bus_folder(domain)
     try:
         supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
@@ -44,6 +44,8 @@ def list_nodes(
     rows = [_row(node, said.get(node), node in said, supervised.get(node), seconds) for node in {**supervised, **said}]
     if not rows and not as_json:
         typer.echo("no node is on the bus")
+    if as_json:
+        rows = [{**row, "heard": row["received"]} for row in rows]  # as it was called before, for one release
     show(rows, as_json)
 
 
@@ -121,9 +123,9 @@ def _row(
         "pid": status.pid or known.get("pid"),
         "processed": status.processed,
         "seconds": round(status.processing_seconds, 3),
-        "heard": sum(count.messages for count in status.heard),
-        "lost": sum(count.lost for count in status.heard),
-        "refused": sum(count.refused for count in status.heard),
+        "received": sum(count.messages for count in status.received),
+        "lost": sum(count.lost for count in status.received),
+        "refused": sum(count.refused for count in status.received),
         "restarts": known["restarts"],
         "last_end": known["exit_reason"],
         "sentence": status.sentence or known["sentence"],

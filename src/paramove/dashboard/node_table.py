@@ -50,7 +50,7 @@ class NodeTable:
                 "state": NodeStatus.State.Name(node.status.state).removeprefix("STATE_").lower(),
                 "sentence": node.status.sentence,
                 "ms": None if node.processing_ms is None else round(node.processing_ms, 1),
-                "lost": sum(count.lost for count in node.status.heard),
+                "lost": sum(count.lost for count in node.status.received),
                 "restarts": node.restarts,
                 "silent_s": round(now_s - node.heard_s),
             }

@@ -95,7 +95,7 @@ def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
     states: dict[str, str] = {}
     for node, status in inspection.statuses(folder, 2.0).items():
         states[node] = _state(status)
-        for there, counts in ((said, status.said if status else ()), (heard, status.heard if status else ())):
+        for there, counts in ((said, status.published if status else ()), (heard, status.received if status else ())):
             for count in counts:
                 if not count.topic.startswith("status/"):
                     there.setdefault(count.topic, []).append(node)
