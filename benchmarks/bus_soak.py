@@ -68,7 +68,7 @@ def speak(folder: Path, seconds: float, listeners: int) -> None:
             bus.exchange.wait(0.01)
 
 
-def hear(folder: Path, sleeping: bool) -> None:
+def handle(folder: Path, sleeping: bool) -> None:
     """Hears both topics until it knows of as many messages as a line on standard input says, then tells its counts."""
     latencies = {SMALL.name: array("q"), IMAGES.name: array("q")}
     with Bus("sleeper" if sleeping else f"listener_{os.getpid()}", BusSettings(folder=folder), (SMALL, IMAGES)) as bus:
@@ -184,7 +184,7 @@ def main() -> None:
     if arguments.role == "speak":
         speak(arguments.folder, arguments.seconds, arguments.listeners)
     else:
-        hear(arguments.folder, arguments.sleeping)
+        handle(arguments.folder, arguments.sleeping)
 
 
 if __name__ == "__main__":

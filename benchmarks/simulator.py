@@ -25,7 +25,7 @@ PERIOD_MS = 1000 / 15
 def measure(ticks: int, camera: bool, video: bool) -> tuple[float, float]:
     """Milliseconds per tick of physics and of rendering while the instructor shows the rules."""
     simulation = Simulation(0, RobotDescription.load(scene.ROBOT_MODEL.parent), camera, video)
-    simulation.instructor.hear(Speech.REQUEST_SHOW_RULES)
+    simulation.instructor.handle(Speech.REQUEST_SHOW_RULES)
     simulation.run_to_tick(1)
     simulation.image_raw()
     simulation.view()

@@ -38,7 +38,7 @@ def run(bus: Bus, config: Config) -> None:
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")
     for heard in bus.events(*SUBSCRIBES):
-        for topic, message in pointing.hear(heard.topic, heard.message):
+        for topic, message in pointing.handle(heard.topic, heard.message):
             bus.publish(topic, message, heard.captured_ns)
         if heard.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
             continue

@@ -96,12 +96,12 @@ class Simulation:
     def write_measures(self, folder: Path) -> None:
         """Writes what people measure before the run: nothing in this world."""
 
-    def hear(self, heard: Received) -> None:
+    def handle(self, heard: Received) -> None:
         """Take in a message of the stream or of what the robot says."""
         if heard.topic is topics.WIRE_HOAP3_STREAM:
             self.stream.offer(heard.message)
         elif heard.topic is topics.SPEECH:
-            self.instructor.hear(heard.message.request, heard.message.object)
+            self.instructor.handle(heard.message.request, heard.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""

@@ -102,7 +102,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation, say_more: Callable[[
         _say(bus, simulation)
         say_more(bus, simulation)
         for heard in barrier.advance(simulation.now_ns):
-            simulation.hear(heard)
+            simulation.handle(heard)
         if bus.stopped:
             break
         simulation.run_to_tick(barrier.tick)

@@ -115,7 +115,7 @@ class LiveRun:
         if self._exchange is None and (self.bus_folder / "clock").exists():
             self._exchange = Exchange("onlooker", BusSettings(folder=self.bus_folder))
             for topic in _HEARD:
-                self._exchange.hear(topic)
+                self._exchange.subscribe(topic)
         if self._exchange is None:
             time.sleep(wait_s)
             return

@@ -83,7 +83,7 @@ class ServoCell:
         if TrajectoryStatus.STATE_SUCCEEDED in self.answers:
             self.angles = np.array(message.points[-1].position_rad)
 
-    def _hear(self, topic: topics.Topic, message: Any, hear: Any) -> None:
+    def _hear(self, topic: topics.Topic, message: Any, handle: Any) -> None:
         now_ns = self._number * PERIOD_NS
         self.events.append(Received(topic, message, now_ns, now_ns, self._number))
-        hear(message)
+        handle(message)

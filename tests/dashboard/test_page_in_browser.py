@@ -66,8 +66,8 @@ class Run:
         with self._lock:
             self._number += 1
             for heard in scene.heard(list(said), self._number * 1_000_000_000):
-                self.picture.hear(heard)
-                self.button.hear(heard)
+                self.picture.handle(heard)
+                self.button.handle(heard)
             self._show()
 
     def _show(self) -> None:

@@ -57,7 +57,7 @@ def through_the_chain(
         bus = RecordedBus(images_raw)
         camera.run(bus, camera.Config(width=width, height=height))
         states.append(bus.states)
-        images += heard(bus.said, topic)
+        images += heard(bus.published, topic)
     images.sort(key=lambda one: one.captured_ns)
     end_ns = round(times_s[-1] * 1e9) + 1
     nobody = Received(
@@ -65,9 +65,9 @@ def through_the_chain(
     )  # time goes on when no camera gives images
     tracking = RecordedBus(with_ticks([*images, nobody]))
     action_tracker.run(tracking, config)
-    estimates = [one for one in tracking.said if one.topic is topics.ACTION_ESTIMATE]
+    estimates = [one for one in tracking.published if one.topic is topics.ACTION_ESTIMATE]
     recognizing = RecordedBus(heard(estimates, topics.ACTION_ESTIMATE))
     recognizer.run(recognizing, recognizer.Config())
     return Outcome(
-        states, tracking.states, [one.message for one in estimates], [one.message for one in recognizing.said]
+        states, tracking.states, [one.message for one in estimates], [one.message for one in recognizing.published]
     )

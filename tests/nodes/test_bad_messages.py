@@ -296,7 +296,7 @@ def test_no_message_makes_a_node_fall_over(node: str, protected: bool, tmp_path:
     except Exception as error:
         raise AssertionError(f"after {bus.fault}: {type(error).__name__}: {error}") from error
     assert bus.fault == faulty[-1][0]
-    assert bus.said or not module.PUBLISHES
+    assert bus.published or not module.PUBLISHES
     numbers = [fault for fault, _ in faulty if "=nan" in fault]
     assert all(fault in bus.left_out for fault in numbers) or not protected
 

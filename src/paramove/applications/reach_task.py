@@ -134,7 +134,7 @@ class ReachTask:
 
     def on_joint_states(self, message: JointStates) -> None:
         """Hear the measured joints."""
-        self._joints.hear(message, self._now_ns)
+        self._joints.handle(message, self._now_ns)
 
     def on_safety(self, message: SafetyState) -> None:
         """Hear the safety gate's state."""
@@ -277,7 +277,7 @@ class SettledJoints:
         self._heard: deque[tuple[int, Floats]] = deque()
         self.missing: tuple[str, ...] = ()
 
-    def hear(self, message: JointStates, now_ns: int) -> None:
+    def handle(self, message: JointStates, now_ns: int) -> None:
         """Take in measured joints; a message in which one is missing, or no angle, counts for nothing."""
         measured = {joint.name: joint.position for joint in message.joints}
         self.missing = tuple(name for name in self._joints if name not in measured)

@@ -37,9 +37,9 @@ from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
 class Profile(enum.Enum):
     """How a topic treats a message that a later one follows."""
 
-    LATEST = "latest"  # only the newest is of use; the reader drops the older ones
+    LATEST = "latest"  # only the latest message is of use; the reader drops older ones
     QUEUE = "queue"  # every message counts
-    LATCHED = "latched"  # every message counts and a late joiner gets the newest one
+    LATCHED = "latched"  # every message counts and a late joiner gets the latest one
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Topic:
 
     @property
     def budget_hz(self) -> float | None:
-        """Nominal rate by the messages' own publish times, which a listener enforces; None where there is none.
+        """Nominal rate by the messages' own publish times, which a subscriber enforces; None where there is none.
 
         The clock makes that time, and a status follows the wall clock also in simulated time.
         """
@@ -89,12 +89,12 @@ class Topic:
 
     @property
     def high_water_mark(self) -> int:
-        """How many messages may wait at the listener before the newest is dropped (and counted as lost)."""
+        """How many messages may wait at the subscriber before the latest is dropped (and counted as lost)."""
         return 60 if self.is_image else 1000
 
     @property
-    def speaker_high_water_mark(self) -> int:
-        """How many may wait at the speaker, for each listener. Few images: their memory is the speaker's."""
+    def publisher_high_water_mark(self) -> int:
+        """How many may wait at the publisher, for each subscriber. Few images: their memory is the publisher's."""
         return 6 if self.is_image else 1000
 
 
@@ -135,7 +135,7 @@ OPERATOR_ARM_AT_START = replace(OPERATOR_ARM, name="operator/arm_at_start")
 """From a program, for an emulated robot: the publisher of `operator/arm` is a person's terminal."""
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
 OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
-"""From a terminal: a topic has one speaker, and that of `operator/stop` may be the live page."""
+"""From a terminal: a topic has one publisher, and that of `operator/stop` may be the live page."""
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -157,7 +157,7 @@ STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
 """Arming requests: a driver subscribes to all of them."""
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
-"""A person's stops: a driver hears all of them."""
+"""A person's stops: a driver subscribes to all of them."""
 
 _STATUS_PREFIX = "status/"
 _NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")
@@ -169,7 +169,7 @@ def is_name(name: str) -> bool:
 
 
 def status(node: str) -> Topic:
-    """Topic on which the node called `node` says how it fares.
+    """Topic of the status of the node called `node`.
 
     Raises ValueError if the name has other characters than lower-case letters, digits and `_`.
     """

@@ -40,12 +40,11 @@ def list_nodes(
         supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
     except NoRunError:  # nodes that were started one by one
         supervised = {}
-    said = inspection.statuses(folder, seconds)
-    rows = [_row(node, said.get(node), node in said, supervised.get(node), seconds) for node in {**supervised, **said}]
+    found = inspection.statuses(folder, seconds)
+    nodes = {**supervised, **found}
+    rows = [_row(node, found.get(node), node in found, supervised.get(node), seconds) for node in nodes]
     if not rows and not as_json:
         typer.echo("no node is on the bus")
-    if as_json:
-        rows = [{**row, "heard": row["received"]} for row in rows]  # as it was called before, for one release
     show(rows, as_json)
 
 

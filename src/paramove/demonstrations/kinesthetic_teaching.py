@@ -75,7 +75,7 @@ class KinestheticTeacher:
         """Whether a segment has begun."""
         return self._samples is not None
 
-    def hear(self, at_ns: int, angles: Floats) -> None:
+    def handle(self, at_ns: int, angles: Floats) -> None:
         """Where all joints of the robot are, [J] in its order, rad."""
         if self._samples is not None and (not self._samples or at_ns > self._samples[-1][0]):
             self._samples.append((at_ns, angles))

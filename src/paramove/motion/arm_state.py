@@ -53,7 +53,7 @@ class ArmState:
         self.measured = 1.0
         self.lost = False
 
-    def hear(self, message: JointStates, now_ns: int) -> bool:
+    def handle(self, message: JointStates, now_ns: int) -> bool:
         """Take in the measured joints; returns False, and keeps what is known, if one is missing or not finite."""
         measured = {joint.name: joint.position for joint in message.joints}
         try:

@@ -134,7 +134,7 @@ class Synthesizer:
 
     def on_joint_states(self, message: JointStates) -> None:
         """Hear the measured joints: where the arm is, and by the fingers whether something is held."""
-        if not self._hand.hear(message, self._now_ns):
+        if not self._hand.handle(message, self._now_ns):
             return
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):

@@ -54,12 +54,12 @@ class Jogging:
         if 0 <= place < len(self.angles):
             self.chosen = place
 
-    def hear_states(self, message: JointStates) -> None:
+    def handle_states(self, message: JointStates) -> None:
         """Where the joints are."""
         self.angles = {joint.name: joint.position for joint in message.joints}
         self.chosen = min(self.chosen, max(len(self.angles) - 1, 0))
 
-    def hear_status(self, message: TrajectoryStatus) -> None:
+    def handle_status(self, message: TrajectoryStatus) -> None:
         """How the driver fares with a step."""
         if message.trajectory_id != self._waits_for or message.state not in OVER:
             return

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import zmq
 
-from paramove.bus import BusVisitor, Subscriber, say_now, topics
+from paramove.bus import BusVisitor, Subscriber, publish_now, topics
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 
 LOOKS_EVERY_S = 0.02
@@ -39,7 +39,7 @@ def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | No
         before = _until(gate, timeout_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
-        say_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
+        publish_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
 
         def is_answer(state: SafetyState) -> bool:
             return obeyed(state, armed) or (armed and _faults(state) not in ([], _faults(before)))

@@ -61,7 +61,7 @@ class NodeSettings(_Checked):
     )
     silent_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = Field(
         default=10.0,
-        description="a node that was ready and says no status for so long hangs and is killed; null: never",
+        description="a node that was ready and publishes no status for so long hangs and is killed; null: never",
     )
     stopped_timeout_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = Field(
         default=1.0, description="a process that was stopped (SIGSTOP) for so long is killed; null: never"
@@ -78,7 +78,7 @@ class NodeSettings(_Checked):
     ends_run: bool = Field(default=False, description="the run ends well when this node finishes with exit code 0")
     lockstep: bool = Field(default=True, description="where the bus runs in lockstep: whether time waits for this node")
     optional_topics: list[str] = Field(
-        default_factory=list, description="heard topics that may lack a speaker; '*': all"
+        default_factory=list, description="subscribed topics that may lack a publisher; '*': all"
     )
     truth: bool = Field(
         default=False, description="gets the folder of ground truth; for the simulator and the judge only"

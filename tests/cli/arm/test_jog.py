@@ -123,10 +123,10 @@ def jogged(monkeypatch, arm, first):
     read, write = os.pipe()
     arm.write = lambda text: os.write(write, text.encode())
     os.write(write, first.encode())
-    hear = Jogging.hear_status
+    handle = Jogging.handle_status
 
     def hear_and_press(jogging, message):
-        hear(jogging, message)
+        handle(jogging, message)
         arm.seen()
 
     monkeypatch.setattr(Jogging, "hear_status", hear_and_press)

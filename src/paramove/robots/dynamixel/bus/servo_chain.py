@@ -140,7 +140,7 @@ class ServoChain:
     def has_room(self) -> bool:
         """Whether a read asks at once; behind many questions that nobody answered it waits for its turn."""
         if self._late.many:
-            self._hear_late(0.0)
+            self._read_late_replies(0.0)
         return not self._late.rest_s
 
     def ping(self, number: int, patient: bool = True) -> PingedServo | None:
@@ -218,7 +218,7 @@ class ServoChain:
 
     def _read(self, numbers: Sequence[int], address: int, size: int, timeout_s: float = 0.0) -> dict[int, Packet]:
         while not self.has_room():
-            self._hear_late(self._late.rest_s)
+            self._read_late_replies(self._late.rest_s)
         wide = self._late.length_for(size)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
@@ -229,7 +229,7 @@ class ServoChain:
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
         )
 
-    def _hear_late(self, wait_s: float) -> None:
+    def _read_late_replies(self, wait_s: float) -> None:
         self.port.setPacketTimeoutMillis(1e3 * wait_s)
         for packet in PacketReader().feed(self.port.readPort(MOST_BYTES)):
             if isinstance(packet, Packet) and packet.instruction == Instruction.STATUS:

@@ -167,7 +167,7 @@ class DynamixelEmulator:
                 self._open() if self._wanted else self._close()
                 self._moved.set()
             behind_s = self._now_s() - lost_s - self.bus.now_s
-            heard, now_s = self._hear(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
+            heard, now_s = self._read(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
             with self.lock:
                 behind_s = now_s - lost_s - self.bus.now_s
                 if behind_s > LATE_S:
@@ -178,7 +178,7 @@ class DynamixelEmulator:
             if heard:
                 self._say(heard, self.faults.told(heard, answers), now_s)
 
-    def _hear(self, within_s: float) -> bytes:
+    def _read(self, within_s: float) -> bytes:
         """What the client has written, waiting so long for it."""
         if not self.plugged_in:
             self._stopped.wait(within_s)
