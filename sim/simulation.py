@@ -85,7 +85,7 @@ class Simulation:
 
     @property
     def tick(self) -> int:
-        """Number of the newest tick of 1/15 s."""
+        """Number of the latest tick of 1/15 s."""
         return self.world.steps * CAMERA_HZ // 1000
 
     @property

@@ -133,17 +133,17 @@ class LiveImages:
 
     def held(self) -> Found:
         """Views of the board before the camera, the table's included. Raises InputError."""
-        collector, looked_at, newest_s = ViewCollector(), 0, None
+        collector, looked_at, latest_s = ViewCollector(), 0, None
         self._say(f"{self.name}: hold the board before the camera, still for a moment, each time at another angle")
         for time_s, view in self._looks():
             looked_at += 1
-            newest_s = time_s if newest_s is None else newest_s
+            latest_s = time_s if latest_s is None else latest_s
             if collector.offer(view):
-                newest_s = time_s
+                latest_s = time_s
                 self._say(f"{self.name}: view {len(collector.views)} of {GOOD_VIEWS}")
             if len(collector.views) == GOOD_VIEWS:
                 break
-            if time_s - newest_s > TIMEOUT_S:
+            if time_s - latest_s > TIMEOUT_S:
                 raise CalibrationError(
                     f"{self.name}: no new view of the board for {TIMEOUT_S:g} s, {len(collector.views)} of "
                     f"{GOOD_VIEWS} taken: more light, the board nearer, tilted, and held still for a second"

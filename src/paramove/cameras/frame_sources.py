@@ -49,7 +49,7 @@ class FrameSource(Protocol):
     """True if frames come as messages, False if they are read at each tick."""
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
-        """The newest frame, None if there is no new one yet. Raises FrameError."""
+        """The latest frame, None if there is no new one yet. Raises FrameError."""
 
     def close(self) -> None: ...
 
@@ -61,18 +61,18 @@ class TopicFrames:
 
     def __init__(self) -> None:
         self._index = 0
-        self._newest_ns: int | None = None
+        self._latest_ns: int | None = None
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
         if raw is None:
-            self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
-            if now_ns - self._newest_ns > TIMEOUT_NS:
+            self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
+            if now_ns - self._latest_ns > TIMEOUT_NS:
                 raise FrameError(
                     "no image on camera/image_raw for more than 1 s: see what publishes it (the simulator)", "silent"
                 )
             return None
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._index += 1
         return Frame(image_of_raw(raw), now_ns, self._index - 1)
 
@@ -127,7 +127,7 @@ class FileFrames:
 
 
 class DeviceFrames:
-    """Frames of a V4L2 device, read by a thread that keeps only the newest, so that an old frame never waits.
+    """Frames of a V4L2 device, read by a thread that keeps only the latest, so that an old frame never waits.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
     #14044): silence is noticed here after `timeout_ns` of the caller's clock, repetition by `FrameChecks`. Every
@@ -159,21 +159,21 @@ class DeviceFrames:
         }
         self._timeout_ns = timeout_ns
         self._open_capture = open_capture or _open_v4l2
-        self._newest_ns: int | None = None
+        self._latest_ns: int | None = None
         self._index = 0
         self._reader = _Reader(self._open())
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The latest frame, None if there is no new one yet. Raises FrameError if none has come for long."""
-        self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
+        self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
         image = self._reader.take()
         if image is None:
-            silent_ns = now_ns - self._newest_ns
+            silent_ns = now_ns - self._latest_ns
             if silent_ns < self._timeout_ns:
                 return None
             self._reopen(now_ns)
             raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._index += 1
         return Frame(image, now_ns, self._index - 1)
 
@@ -189,26 +189,26 @@ class DeviceFrames:
 
     def _reopen(self, now_ns: int) -> None:
         self._reader.stop()
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._reader = _Reader(self._open())
 
 
 class _Reader:
-    """A thread that reads frames and keeps the newest. It ends when a read fails."""
+    """A thread that reads frames and keeps the latest. It ends when a read fails."""
 
     def __init__(self, capture: Capture) -> None:
         self._capture = capture
         self._lock = threading.Lock()
-        self._newest: Image | None = None
+        self._latest: Image | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._read, name="camera reader", daemon=True)
         self._thread.start()
 
     def take(self) -> Image | None:
-        """The newest frame since the last call, if any."""
+        """The latest frame since the last call, if any."""
         with self._lock:
-            newest, self._newest = self._newest, None
-        return newest
+            latest, self._latest = self._latest, None
+        return latest
 
     def stop(self) -> None:
         """Ask the thread to end. It releases the device itself, as another thread's release during a read crashes."""
@@ -222,7 +222,7 @@ class _Reader:
                 if not done:
                     break
                 with self._lock:
-                    self._newest = image
+                    self._latest = image
         except cv2.error as error:  # unplugged during a read; the silence is told by the other side
             _log.warning("reading the camera: %s", error.err)
         finally:

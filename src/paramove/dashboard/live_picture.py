@@ -124,7 +124,7 @@ class LivePicture:
         return changed
 
     def image(self) -> bytes | None:
-        """The newest image if there is one that was not given yet, JPEG."""
+        """The latest image if there is one that was not given yet, JPEG."""
         image, self._image = self._image, None
         return image
 

@@ -25,7 +25,7 @@ class _Node:
 
 
 class NodeTable:
-    """Newest status of each node. Times are of the wall's monotonic clock, s."""
+    """Latest status of each node. Times are of the wall's monotonic clock, s."""
 
     def __init__(self) -> None:
         self._nodes: dict[str, _Node] = {}

@@ -176,9 +176,9 @@ class ColourTracker:
     def _stands_still(self, recent: deque[Region]) -> bool:
         if len(recent) < self.STILL_FRAMES:
             return False
-        newest = recent[-1]
+        latest = recent[-1]
         return all(
-            abs(r.u_px - newest.u_px) < self.STILL_PX and abs(r.v_px - newest.v_px) < self.STILL_PX for r in recent
+            abs(r.u_px - latest.u_px) < self.STILL_PX and abs(r.v_px - latest.v_px) < self.STILL_PX for r in recent
         )
 
 

@@ -48,7 +48,7 @@ class Recognizer:
         self._pointing = Pointing(self._options.pointing)
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
-        self._newest_s: float | None = None
+        self._latest_s: float | None = None
         self._watched_s = 0.0
 
     def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
@@ -81,13 +81,13 @@ class Recognizer:
 
     def _step_s(self, captured_s: float) -> float:
         """Time since the image before; 0 for one that is not newer."""
-        newest_s, self._newest_s = self._newest_s, captured_s
-        if newest_s is None:
+        latest_s, self._latest_s = self._latest_s, captured_s
+        if latest_s is None:
             return LONGEST_STEP_S
-        if newest_s - CLOCK_BACK_S < captured_s <= newest_s:
-            self._newest_s = newest_s
+        if latest_s - CLOCK_BACK_S < captured_s <= latest_s:
+            self._latest_s = latest_s
             return 0.0
-        return abs(captured_s - newest_s)
+        return abs(captured_s - latest_s)
 
     def _follow_objects(
         self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float

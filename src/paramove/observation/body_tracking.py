@@ -48,7 +48,7 @@ class BodyTracking:
         self._names = tuple(options.markers)
         self._watch = CameraWatch(cameras)
         self._seen_ns: dict[str, int] = {}
-        self._newest_ns = 0
+        self._latest_ns = 0
 
     @property
     def cameras(self) -> dict[str, CalibratedCamera]:
@@ -83,7 +83,7 @@ class BodyTracking:
 
     def _moment(self, views: Views) -> BodyMoment:
         points = self._tracker.located(views.images)
-        self._newest_ns = views.captured_ns
+        self._latest_ns = views.captured_ns
         for name in self._names:
             self._seen_ns.setdefault(name, views.captured_ns)
             if name in points:
@@ -91,7 +91,7 @@ class BodyTracking:
         return BodyMoment(views.captured_ns, points)
 
     def _unseen(self) -> list[str]:
-        names = [name for name, seen_ns in self._seen_ns.items() if self._newest_ns - seen_ns > UNSEEN_S * 1e9]
+        names = [name for name, seen_ns in self._seen_ns.items() if self._latest_ns - seen_ns > UNSEEN_S * 1e9]
         if not names:
             return []
         return [f"no two cameras see {', '.join(names)}: turn the markers to the cameras, or look at the light"]

@@ -28,12 +28,12 @@ LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 LEAST_PERIOD_S = 0.03
 """A tracker may be faster; windows are not judged more often than this."""
 RESTARTED_S = 1.0
-"""A sample that is so much older than the newest is the first of a tracker that was started again."""
+"""A sample that is so much older than the latest is the first of a tracker that was started again."""
 
 
 @dataclass(frozen=True)
 class WindowBelief:
-    """What the newest window says.
+    """What the latest window says.
 
     Attributes:
         captured_ns: of its last sample.
@@ -64,7 +64,7 @@ class PointingWindow:
         placement: where the person sits, and how large the person is.
 
     Attributes:
-        belief: what the window that ends with the newest pose says; None if there is none without a gap.
+        belief: what the window that ends with the latest pose says; None if there is none without a gap.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class PointingWindow:
         return self._told(captured_ns, sample[-3:])
 
     def ball(self) -> SceneUpdate | None:
-        """A ball where the newest window points; green if it is like pointing, red if it is not (figure 16)."""
+        """A ball where the latest window points; green if it is like pointing, red if it is not (figure 16)."""
         if self.belief is None:
             return None
         message = SceneUpdate()

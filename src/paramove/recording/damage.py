@@ -93,7 +93,7 @@ class Survey:
         notes: Metadata, without those that the writer of recordings makes for itself.
         statistics: Of a file that was finished.
         finished: Whether the file ends as a finished one does.
-        indexed: What the index of the newest chunk has to say of each channel: log time and offset of its messages.
+        indexed: What the index of the latest chunk has to say of each channel: log time and offset of its messages.
         allowed: Bytes to which further chunks may decompress.
     """
 

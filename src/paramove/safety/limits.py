@@ -99,7 +99,7 @@ class MotionLimits:
 
         Args:
             rows: Shape [N, J], rad, N >= 1.
-            before: The rows commanded just before, [B, J], newest last, B >= 1; what lies before them is taken as rest.
+            before: The rows commanded just before, [B, J], latest last, B >= 1; what lies before them is taken as rest.
             rest_at_end: Judge as if the last row were held after the end.
             stopping: Judge by what a controlled stop may use, with rest at the end.
         """
