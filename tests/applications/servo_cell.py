@@ -66,10 +66,10 @@ class ServoCell:
                 self._play(message)
         return self
 
-    def run(self, most: int = 400) -> ServoCell:
+    def run(self, maximum: int = 400) -> ServoCell:
         """Until the tasks are done or have failed."""
         while not (self.task.finished or self.task.failure):
-            assert self._number < most, self.task.sentence
+            assert self._number < maximum, self.task.sentence
             self.tick()
         return self
 

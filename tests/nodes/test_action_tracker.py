@@ -80,7 +80,7 @@ def test_places_are_told_in_the_frame_that_is_asked_for(config):
 def test_what_is_worse_than_asked_for_is_lost_and_points_at_nothing(config):
     """However used the track is to it: nothing is ever better here than what is asked for."""
     times, poses = pointing((0.5, 0.5))
-    strict = config.model_copy(update={"least_log_likelihood": 1e6})
+    strict = config.model_copy(update={"min_log_likelihood": 1e6})
     bus = RecordedBus(heard(drawn(poses, camera(1)), times))
     action_tracker.run(bus, strict)
     estimates = [one.message for one in bus.published if one.topic is topics.ACTION_ESTIMATE]

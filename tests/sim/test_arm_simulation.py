@@ -121,7 +121,7 @@ def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescrip
         launch = load(LAUNCH, "rule_learning", ["sim", "action_space"])
         setup = TrackingSetup.model_validate(launch.file.nodes["action_tracker"].parameters)
         tracker = setup.video_tracker(Path(folder))
-    events = PointingEvents(PointingEventOptions(least_certainty=0.6))
+    events = PointingEvents(PointingEventOptions(min_certainty=0.6))
     simulation.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "blue")
     said = []
     for tick in range(0, 20 * CAMERA_HZ, 2):

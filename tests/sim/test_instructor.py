@@ -204,7 +204,7 @@ def test_helps_a_fallen_object_to_a_free_place() -> None:
     assert len(standing) == 3
     place = story.table.position("yellow")[:2]
     assert places.STRIP_X[0] - 0.001 <= place[0] <= places.STRIP_X[1] + 0.001
-    assert sorted(np.linalg.norm(place - other) for other in standing)[1] >= places.LEAST_GAP - 0.001
+    assert sorted(np.linalg.norm(place - other) for other in standing)[1] >= places.MIN_GAP - 0.001
 
 
 def test_what_is_held_is_put_away_before_a_new_task() -> None:

@@ -26,7 +26,7 @@ STILL_SHARE = 0.01
 """Of the image's width, by which the board may move between two looks to be still; faster ones are blurred."""
 NEW_SHARE = 0.05
 """Of the image's width, by which the corners of a new view differ from those of all before."""
-MOST_VIEWS = 40
+MAX_VIEWS = 40
 """More views cost time and tell nothing new."""
 TABLE_S = 1.0
 """For so long, at the end of a video or before a live camera, the board lies still on the table."""
@@ -183,7 +183,7 @@ class ViewCollector:
     def offer(self, view: BoardView | None) -> bool:
         """The view of the next look, None where no board was found. True if it is kept."""
         before, self._before = self._before, view
-        if view is None or before is None or len(self.views) >= MOST_VIEWS:
+        if view is None or before is None or len(self.views) >= MAX_VIEWS:
             return False
         if _motion(view, before) > STILL_SHARE or any(_motion(view, kept) < NEW_SHARE for kept in self.views):
             return False

@@ -20,7 +20,7 @@ BLIND_S = 0.35
 """Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
 LONGEST_STEP_S = 0.2
 """More time than this between two images is no time of watching."""
-MOST_PX = 1e6
+MAX_PX = 1e6
 CLOCK_BACK_S = 5.0
 """An image older than this is no late one: the clock, or an image's time, was wrong."""
 
@@ -184,7 +184,7 @@ def _in_some_image(seen: TrackedObject) -> bool:
     box = (seen.left_px, seen.top_px, seen.width_px, seen.height_px)
     outline = (number for point in seen.outline for number in (point.u_px, point.v_px))
     numbers = (seen.u_px, seen.v_px, seen.area_px, *box, *outline)
-    return all(abs(number) < MOST_PX for number in numbers)  # NaN is not below
+    return all(abs(number) < MAX_PX for number in numbers)  # NaN is not below
 
 
 def _touch(hand: TrackedObject, place: Sample) -> bool:

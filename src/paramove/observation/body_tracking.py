@@ -104,7 +104,7 @@ class MarkerSetup(BaseModel):
         number: Of an ArUco marker, 60 to 99; `paramove calibrate markers` prints them.
         inset: How deep below the marker's middle the point lies, m.
         hue_deg: Lower and upper hue of a colour, degrees.
-        saturation: Its least saturation, 0 to 1.
+        saturation: Its smallest saturation, 0 to 1.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -137,7 +137,7 @@ class BodyTrackingSetup(BaseModel):
     Attributes:
         cameras: Calibration file; its cameras are camera_1, camera_2, … in their order.
         markers: Name of a point of the arm, as `ArmPose` has it -> what marks it.
-        most_residual_px: A point whose views disagree by more is left out.
+        max_residual_px: A point whose views disagree by more is left out.
         rate_hz: Of the cameras.
     """
 
@@ -148,12 +148,12 @@ class BodyTrackingSetup(BaseModel):
         default={"elbow": MarkerSetup(number=91), "wrist": MarkerSetup(number=92), "index": MarkerSetup(number=93)},
         min_length=1,
     )
-    most_residual_px: float = Field(default=BodyTrackerOptions.most_residual_px, gt=0.0, le=50.0)
+    max_residual_px: float = Field(default=BodyTrackerOptions.max_residual_px, gt=0.0, le=50.0)
     rate_hz: float = Field(default=15.0, gt=0.5, le=240.0)
 
     def body_tracking(self, run_folder: Path = Path()) -> BodyTracking:
         """Reads the calibration. Raises InputError."""
         cameras = measured_cameras(run_folder, self.cameras)
         markers = {name: one.marker(name) for name, one in self.markers.items()}
-        options = BodyTrackerOptions(markers=markers, most_residual_px=self.most_residual_px)
+        options = BodyTrackerOptions(markers=markers, max_residual_px=self.max_residual_px)
         return BodyTracking(cameras, options, 1.0 / self.rate_hz)

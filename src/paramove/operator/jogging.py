@@ -80,7 +80,7 @@ class Jogging:
         """The trajectory of one step, 1 up or -1 down; None while the last is under way or no joint is known.
 
         It begins at the goal of the joint's last step, so that steps add up although the joint sags, and goes from rest
-        to rest with the least jerk.
+        to rest with the smallest jerk.
         """
         if self.is_moving or not self.angles:
             return None

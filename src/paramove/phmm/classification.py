@@ -189,9 +189,9 @@ class MovementClassifier:
                 "beginnings are told apart only by a classifier trained with `fit` on all actions together"
             )
         if not known:
-            least = self._beginnings[0].n_frames
+            minimum = self._beginnings[0].n_frames
             raise ValueError(
-                f"a beginning has at least {least} frames, found {n_frames}: wait for more of the movement"
+                f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement"
             )
         return known[-1]
 

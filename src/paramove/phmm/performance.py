@@ -58,7 +58,7 @@ class Pace:
     def expecting(self, noise: float, sequence: Floats) -> Pace:
         """The same for a sequence with noise of that variance on each coordinate of each frame."""
         seen, own = noisy_pace(sequence, noise), self.root @ self.root.T
-        mean = np.maximum(self.mean, seen.least)
+        mean = np.maximum(self.mean, seen.minimum)
         # As a genuine movement has it: a person who rests is seen to rest as well as noise allows.
         squared = np.exp(2.0 * mean)
         errors = (squared * seen.of_steps + 0.5 * seen.of_steps**2) / (sequence.shape[1] * squared**2)
@@ -197,7 +197,7 @@ class NoisyPace(NamedTuple):
     """`pace_features` of a sequence without its noise, the least that is seen of them, and the noise of its steps."""
 
     features: Floats
-    least: Floats
+    minimum: Floats
     of_steps: Floats
 
 
@@ -214,10 +214,10 @@ def noisy_pace(sequence: Floats, noise: float) -> NoisyPace:
         squared = (np.diff(resample(averages, PACE_PARTS + 1), axis=0) ** 2).mean(axis=1)
         if of_steps.mean() < 0.1 * squared.mean():
             break
-    least = of_steps * np.sqrt(2.0 / sequence.shape[1])
-    without = np.maximum(squared - of_steps, least)
+    minimum = of_steps * np.sqrt(2.0 / sequence.shape[1])
+    without = np.maximum(squared - of_steps, minimum)
     small = 0.02 * np.sqrt(without).mean() + 1e-12
-    return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(least) + small), of_steps)
+    return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(minimum) + small), of_steps)
 
 
 def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:

@@ -37,7 +37,7 @@ from paramove.phmm.regression import RegressedParameters, train_regressed, with_
 from paramove.phmm.ridge import smoothed
 
 Residuals = Literal["independent", "correlated"]
-MOST_STEPS = 40
+MAX_STEPS = 40
 STEP_TOLERANCE = 1e-5
 """Predicted gain in nats below which the search ends."""
 ALIGNMENTS = 3
@@ -255,10 +255,10 @@ class PolynomialPHMM(ParametricHMM):
         return 1.0 + 2.0 * self.search_margin
 
     def _likeliest(self, prepared: search_kernels.Movement) -> tuple[Floats, float, Floats]:
-        """Scaled theta with the greatest likelihood, its logarithm, and the gradient there."""
+        """Scaled theta with the largest likelihood, its logarithm, and the gradient there."""
         bounds = np.full(len(self.monomials_.centre), self._widest)
         best, value, gradient = search_kernels.best_climbed(
-            self.monomials_.starts, -bounds, bounds, MOST_STEPS, STEP_TOLERANCE, prepared
+            self.monomials_.starts, -bounds, bounds, MAX_STEPS, STEP_TOLERANCE, prepared
         )
         return best, float(value), gradient
 

@@ -158,7 +158,7 @@ class MotionLimits:
         if not bad.any():
             return None
         row, joint = (int(i) for i in np.argwhere(bad)[0])
-        most = np.broadcast_to(limit, bad.shape)[row, joint]
-        low, high, most, asked = np.rad2deg([self.lower[joint], self.upper[joint], most, values[row, joint]])
+        maximum = np.broadcast_to(limit, bad.shape)[row, joint]
+        low, high, maximum, asked = np.rad2deg([self.lower[joint], self.upper[joint], maximum, values[row, joint]])
         texts = {"not_finite": "a finite number", "joint_limit": f"{low:.4g} to {high:.4g} deg"}
-        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{most:.4g} {unit}"), unit)
+        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{maximum:.4g} {unit}"), unit)

@@ -177,7 +177,7 @@ def path_of(folder: Path, name: str, kind: str, others: Sequence[str] = ()) -> P
 
 def _read(path: Path) -> Document:
     try:
-        text = read_text(path, "launch file", most_bytes=4 * MAX_CHARACTERS)
+        text = read_text(path, "launch file", max_bytes=4 * MAX_CHARACTERS)
     except InputError as error:
         raise DocumentError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
     return read_mapping(topics.present_names(text), str(path))

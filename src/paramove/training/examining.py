@@ -139,8 +139,8 @@ class Examiner:
         low, high = bounds(model)
         outside = tuple(
             name
-            for name, value, least, most in zip(names, estimate.theta, low, high, strict=True)
-            if not least <= value <= most
+            for name, value, minimum, maximum in zip(names, estimate.theta, low, high, strict=True)
+            if not minimum <= value <= maximum
         )
         known = p_value is None or p_value >= SIGNIFICANCE_LEVEL
         return Recognition(asked, action, known, posterior, estimate, names, p_value, outside, _labelled(asked, names))

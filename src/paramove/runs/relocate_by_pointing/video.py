@@ -35,7 +35,7 @@ FRAMES_PER_S = 10.0
 EVERY = 3
 """So many-th image; at 15 Hz the video is twice as fast as the run."""
 LINGER_FRAMES = 20
-MOST_LETTERS = 104
+MAX_LETTERS = 104
 CAMERA = topics.CAMERA_IMAGES[0].name
 
 
@@ -103,4 +103,4 @@ def _latest(said: list[tuple[int, str]], time_ns: int) -> str:
 def _shown(sentence: str) -> str:
     if not sentence:
         return ""
-    return f"“{sentence if len(sentence) <= MOST_LETTERS else sentence[: MOST_LETTERS - 1] + '…'}”"
+    return f"“{sentence if len(sentence) <= MAX_LETTERS else sentence[: MAX_LETTERS - 1] + '…'}”"
