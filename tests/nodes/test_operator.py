@@ -42,7 +42,7 @@ def test_does_not_arm_unless_told(tmp_path: Path) -> None:
 
 def test_a_new_process_in_the_same_run_does_not_arm_again(tmp_path: Path) -> None:
     disarmed = SafetyState.STATE_DISARMED
-    assert replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED).said == []  # restarted before it asked
+    assert replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED).published == []  # restarted before it asked
     bus = replayed(tmp_path, True, disarmed, disarmed, disarmed)
     assert bus.published == []
     (state,) = bus.states

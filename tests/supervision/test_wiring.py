@@ -41,7 +41,7 @@ def test_topics_with_a_speaker_pass(workspace):
             "2:3",
             "'ear' subscribes to speech, which no node of this launch file publishes",
         ),
-        ("nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor}", "3:3", "'b' and 'a' both say speech"),
+        ("nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor}", "3:3", "'b' and 'a' both publish speech"),
         ("nodes:\n  a: {module: nodes.acter}", "2:7", "there is no module 'nodes.acter'"),
         ("after_run: nodes.jugde\nnodes:\n  a: {module: nodes.actor}", "1:1", "there is no module 'nodes.jugde'"),
         ("nodes:\n  w: {module: nodes.world}", "2:3", "uses truth/state but has no 'truth: true'"),

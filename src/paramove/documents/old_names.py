@@ -37,7 +37,7 @@ def renamed_attribute(old: str, new: str) -> Any:
         warnings.warn(message, DeprecationWarning, stacklevel=2)
         return getattr(instance, new)
 
-    return property(read)
+    return property(read, doc=f"Old name of `{new}`, for one release.")
 
 
 def _renamed(values: Any, old: str, new: str, path: Sequence[str]) -> Any:

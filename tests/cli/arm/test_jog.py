@@ -129,7 +129,7 @@ def jogged(monkeypatch, arm, first):
         handle(jogging, message)
         arm.seen()
 
-    monkeypatch.setattr(Jogging, "hear_status", hear_and_press)
+    monkeypatch.setattr(Jogging, "handle_status", hear_and_press)
     with os.fdopen(read) as source:
         monkeypatch.setattr("paramove.cli.arm.jog.TerminalPerson", lambda: TerminalPerson(source))
         done = CliRunner().invoke(build("arm"), ["arm", "jog", "--step", "3"])
