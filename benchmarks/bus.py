@@ -95,12 +95,12 @@ def hear_raw(folder: Path, messages: int) -> tuple[list[int], int]:
     return latencies, messages - len(latencies)
 
 
-def measure(kind: str, hear: Callable[[Path, int], tuple[list[int], int]], messages: int) -> dict[str, Any]:
+def measure(kind: str, handle: Callable[[Path, int], tuple[list[int], int]], messages: int) -> dict[str, Any]:
     """Starts the speaker in a process of its own and hears it in this one."""
     with tempfile.TemporaryDirectory(prefix="bus-") as folder:
         command = [sys.executable, __file__, "--speak", kind, "--folder", folder, "--messages", str(messages)]
         with subprocess.Popen(command):
-            latencies, lost = hear(Path(folder), messages)
+            latencies, lost = handle(Path(folder), messages)
     return summary(kind, latencies, lost)
 
 

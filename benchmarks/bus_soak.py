@@ -24,7 +24,7 @@ from paramove.bus import Bus, BusSettings, Received, Subscriber, topics
 from paramove.msgs.hoap3_wire_pb2 import StreamBatch
 
 SMALL = topics.WIRE_HOAP3_STREAM
-IMAGES = replace(topics.CAMERA_LIGHT, rate_hz=30)
+IMAGES = replace(topics.CAMERA_IMAGE_RAW, rate_hz=30)
 IMAGE_BYTES = 1_000_000
 IMAGE_EVERY = 33
 """Messages at 1 kHz per image: 30 images a second."""
@@ -68,7 +68,7 @@ def speak(folder: Path, seconds: float, listeners: int) -> None:
             bus.exchange.wait(0.01)
 
 
-def hear(folder: Path, sleeping: bool) -> None:
+def handle(folder: Path, sleeping: bool) -> None:
     """Hears both topics until it knows of as many messages as a line on standard input says, then tells its counts."""
     latencies = {SMALL.name: array("q"), IMAGES.name: array("q")}
     with Bus("sleeper" if sleeping else f"listener_{os.getpid()}", BusSettings(folder=folder), (SMALL, IMAGES)) as bus:
@@ -184,7 +184,7 @@ def main() -> None:
     if arguments.role == "speak":
         speak(arguments.folder, arguments.seconds, arguments.listeners)
     else:
-        hear(arguments.folder, arguments.sleeping)
+        handle(arguments.folder, arguments.sleeping)
 
 
 if __name__ == "__main__":

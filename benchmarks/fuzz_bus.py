@@ -163,7 +163,7 @@ class Fuzzer:
         if len(payload) < 2000:
             str(again)
         if kind is TickDone:
-            to_marks(again.said)
+            to_marks(again.published)
 
 
 def memory_mib() -> float:

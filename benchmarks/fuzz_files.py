@@ -52,7 +52,7 @@ BUSY = 20
 MOST_MIB = 1024.0
 LIMIT_BYTES = 6 * 2**30
 """Of the reading process, so that the machine outlives it."""
-MOST_BYTES = 2**23
+MAX_BYTES = 2**23
 REFUSALS = (InputError, DocumentError, FrameError)
 COUNTS = ("rejected", "read", "traceback", "over 5 s", "over 1 GB")
 FAILURES = COUNTS[2:]
@@ -207,7 +207,7 @@ def _archive(content: bytes, generator: random.Random) -> bytes:
     name = generator.choice([*members])
     way = generator.randrange(7)
     if way == 0:
-        members[name] = mutate(members[name], members[name], generator, MOST_BYTES)
+        members[name] = mutate(members[name], members[name], generator, MAX_BYTES)
     elif way == 1:
         members[name] = re.sub(rb"\d+", lambda _: b"%d" % generator.choice([0, 3, 6000, 10**9]), members[name][:128])
     elif way == 2:
@@ -305,7 +305,7 @@ def _lines_of(words: list[str]) -> Callable[[bytes, random.Random], bytes]:
                 parts[generator.randrange(len(parts))] = generator.choice(words)
                 lines[at] = "".join(parts)
             lines = lines or ["\n"]
-        return "".join(lines).encode("utf-8", "replace")[:MOST_BYTES]
+        return "".join(lines).encode("utf-8", "replace")[:MAX_BYTES]
 
     return change
 
@@ -547,7 +547,7 @@ def damaged(kind: Kind, generator: random.Random) -> bytes:
     if generator.random() < 0.6:
         content = kind.change(content, generator)
     if generator.random() < 0.5 or kind.change is _bytes_of:
-        content = mutate(content, generator.choice(kind.examples), generator, MOST_BYTES)
+        content = mutate(content, generator.choice(kind.examples), generator, MAX_BYTES)
     return content
 
 

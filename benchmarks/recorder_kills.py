@@ -108,7 +108,7 @@ def loaded(folder: Path, seconds: float) -> dict[str, Any]:
     while speaker.recorder.poll() is None:
         speaker.bus.idle(0.05)
     last = speaker.bus.exchange.take([STATUS.name])[-1].message
-    on_the_bus = sum(count.lost + count.refused for count in last.heard)
+    on_the_bus = sum(count.lost + count.refused for count in last.received)
     lost = len(speaker.missing_s(speaker.file))
     speaker.close()
     return {"said": len(speaker.said_s), "lost": lost, "lost_on_the_bus": on_the_bus}

@@ -25,13 +25,13 @@ PERIOD_MS = 1000 / 15
 def measure(ticks: int, camera: bool, video: bool) -> tuple[float, float]:
     """Milliseconds per tick of physics and of rendering while the instructor shows the rules."""
     simulation = Simulation(0, RobotDescription.load(scene.ROBOT_MODEL.parent), camera, video)
-    simulation.instructor.hear(Speech.REQUEST_SHOW_RULES)
+    simulation.instructor.handle(Speech.REQUEST_SHOW_RULES)
     simulation.run_to_tick(1)
-    simulation.light()
+    simulation.image_raw()
     simulation.view()
     simulation.physics_s = simulation.rendering_s = 0.0
     for tick in range(2, ticks + 2):
-        simulation.light()
+        simulation.image_raw()
         simulation.view()
         truth.state(simulation)
         simulation.run_to_tick(tick)

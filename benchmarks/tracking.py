@@ -77,13 +77,13 @@ def filmed() -> Footage:
     return Footage(frames, studio, poses)
 
 
-def timed(work: Callable[[], object], threads: int, seconds: float, least: int = 3) -> tuple[float, float, int]:
+def timed(work: Callable[[], object], threads: int, seconds: float, minimum: int = 3) -> tuple[float, float, int]:
     """Median and shortest time of the work, ms, and how often it ran."""
     clock = time.process_time if threads == 1 else time.perf_counter
     work()
     times: list[float] = []
     end = time.perf_counter() + seconds
-    while len(times) < least or (time.perf_counter() < end and len(times) < 500):
+    while len(times) < minimum or (time.perf_counter() < end and len(times) < 500):
         began = clock()
         work()
         times.append(1e3 * (clock() - began))

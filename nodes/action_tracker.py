@@ -19,6 +19,8 @@ PUBLISHES = (topics.ACTION_ESTIMATE, topics.HUMAN_ARM_POSE, topics.ACTION_OUTLIN
 class Config(NodeConfig, TrackingSetup):
     """See `TrackingSetup`."""
 
+    old_names = (("least_log_likelihood", "min_log_likelihood"),)
+
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes. An image that cannot be used is left out and told."""

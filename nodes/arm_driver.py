@@ -33,13 +33,13 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the robot then comes to rest by the stop ramp that it already has."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     driver = ArmDriver(RobotDescription.load(config.robot), no_program=lambda: launch.why_no_program(bus.settings))
-    hear: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
-    hear |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
-    hear |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
+    handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
+    handle |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
+    handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
     bus.ready(driver.sentence)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[event.topic](event.message, event.captured_ns)
+            handle[event.topic](event.message, event.captured_ns)
             if event.topic not in topics.STOPS:
                 continue  # a stop does not wait for the next period
         output = driver.tick(bus.now_ns)

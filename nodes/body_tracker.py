@@ -18,6 +18,8 @@ PUBLISHES = (topics.HUMAN_ARM_POSE, topics.ACTION_OUTLINE, topics.ACTION_SCENE)
 class Config(NodeConfig, BodyTrackingSetup):
     """See `BodyTrackingSetup`."""
 
+    old_names = (("most_residual_px", "max_residual_px"),)
+
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes. An image that cannot be used is left out and told."""

@@ -1,7 +1,7 @@
-"""Camera: reads frames from a camera, a file or a topic, checks them and says them compressed.
+"""Camera: reads frames from a camera, a file or a topic, checks them and publishes them compressed.
 
-Subscribes  camera/light   foxglove.RawImage          15 Hz   camera_optical   only with source topic:camera/light
-Publishes   camera/image   foxglove.CompressedImage   15 Hz   camera_optical
+Subscribes  camera/image_raw   foxglove.RawImage          15 Hz   camera_optical   with source topic:camera/image_raw
+Publishes   camera/image       foxglove.CompressedImage   15 Hz   camera_optical
 """
 
 from pydantic import Field
@@ -9,12 +9,12 @@ from pydantic import Field
 from paramove.bus import Bus, NodeConfig, Received, main, topics
 from paramove.cameras import EndOfFrames, FrameChecks, FrameError, encode, open_source
 
-SUBSCRIBES = (topics.CAMERA_LIGHT,)
+SUBSCRIBES = (topics.CAMERA_IMAGE_RAW,)
 PUBLISHES = (topics.CAMERA_IMAGE,)
 
 
 class Config(NodeConfig):
-    source: str = "topic:camera/light"  # or file:PATH, device:PATH, folder:PATH@RATE, recording:PATH#TOPIC
+    source: str = "topic:camera/image_raw"  # or file:PATH, device:PATH, folder:PATH@RATE, recording:PATH#TOPIC
     width: int = Field(480, gt=0)
     height: int = Field(360, gt=0)
     jpeg_quality: int = Field(95, ge=1, le=100)
@@ -22,16 +22,16 @@ class Config(NodeConfig):
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes or a video file ends. A bad frame is not said but makes the node degraded."""
+    """Loop until the bus closes or a video file ends. A bad frame is not published and makes the node degraded."""
     source = open_source(config.source, config.width, config.height)
     checks = FrameChecks(config.width, config.height, config.frozen_after)
     bus.ready(f"frames from {config.source}")
     fault = ""
     try:
-        for event in bus.events(topics.CAMERA_LIGHT, tick=True) if source.hears_light else bus.events(tick=True):
-            now_ns, light = (event.captured_ns, event.message) if isinstance(event, Received) else (event.now_ns, None)
+        for event in bus.events(topics.CAMERA_IMAGE_RAW, tick=True) if source.from_topic else bus.events(tick=True):
+            now_ns, raw = (event.captured_ns, event.message) if isinstance(event, Received) else (event.now_ns, None)
             try:
-                frame = source.frame(now_ns, light)
+                frame = source.frame(now_ns, raw)
                 if frame is None:
                     continue
                 bus.publish(topics.CAMERA_IMAGE, encode(checks.passed(frame), config.jpeg_quality), frame.captured_ns)

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import Field
 
 from paramove.bus import Bus, NodeConfig, Received, main, topics
-from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, hear_nodes
+from paramove.dashboard import LivePicture, PageServer, StopButton, Surface, subscribe_to_nodes
 from paramove.robots import RobotDescription
 
 PERCEPTION = (topics.CAMERA_IMAGE, topics.OBJECTS_TRACKED, topics.GESTURES, topics.CALIBRATION_PLANE)
@@ -37,10 +37,10 @@ def run(bus: Bus, config: Config) -> None:
         bus.ready(f"page on port {page.port} of this machine")
         for event in bus.events(tick=True):
             if isinstance(event, Received):
-                picture.hear(event)
-                button.hear(event)
+                picture.handle(event)
+                button.handle(event)
                 continue
-            hear_nodes(bus)
+            subscribe_to_nodes(bus)
             button.look(event.now_ns)
             page.show(picture.changes(event.now_ns, button.section()), picture.image())
             if button.is_over(event.now_ns):

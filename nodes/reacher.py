@@ -31,11 +31,11 @@ def run(bus: Bus, config: Config) -> None:
     bus.starting("training or reading the reaching movement, and planning the tasks")
     reaching = ServoArmReaching(RobotDescription.load(config.robot), config.movement.trained())
     task = ReachTask(reaching, config.tasks, f"reach-{bus.now_ns}")
-    hear = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
+    handle = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
     bus.ready(task.sentence)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[SUBSCRIBES.index(event.topic)](event.message)
+            handle[SUBSCRIBES.index(event.topic)](event.message)
             continue
         output = task.tick(event.now_ns)
         publish_each(bus, PUBLISHES, (output.trajectories, output.speech))

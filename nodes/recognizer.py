@@ -25,7 +25,12 @@ PUBLISHES = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
 class Config(NodeConfig, PointingSetup):
-    old_names = (("motion.patience_s", "motion.timeout_s"),)
+    old_names = (
+        ("motion.patience_s", "motion.timeout_s"),
+        ("pointing_actions.least_certainty", "pointing_actions.min_certainty"),
+        ("pointing_window.least_lead", "pointing_window.min_lead"),
+        ("pointing_window.most_gap_s", "pointing_window.max_gap_s"),
+    )
 
     motion: MotionThresholds = MotionThresholds()
     pointing: PointingThresholds = PointingThresholds()
@@ -38,7 +43,7 @@ def run(bus: Bus, config: Config) -> None:
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")
     for heard in bus.events(*SUBSCRIBES):
-        for topic, message in pointing.hear(heard.topic, heard.message):
+        for topic, message in pointing.handle(heard.topic, heard.message):
             bus.publish(topic, message, heard.captured_ns)
         if heard.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
             continue

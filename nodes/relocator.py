@@ -23,11 +23,11 @@ class Config(NodeConfig, RelocatorOptions):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the object was put at all places, the arm is not armed any more, or the bus closes."""
     relocator = Relocator(config, f"goal-{bus.now_ns}")
-    hear = (relocator.on_gesture, relocator.on_estimate, relocator.on_goal_status, relocator.on_safety)
+    handle = (relocator.on_gesture, relocator.on_estimate, relocator.on_goal_status, relocator.on_safety)
     bus.ready("waiting for the arm")
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[SUBSCRIBES.index(event.topic)](event.message)
+            handle[SUBSCRIBES.index(event.topic)](event.message)
             continue
         output = relocator.tick(event.now_ns * 1e-9)
         publish_each(bus, PUBLISHES, (output.goals, output.stages, output.speech))

@@ -38,11 +38,11 @@ def run(bus: Bus, config: Config) -> None:
     places = config.model_dump(exclude={"surface_x", "surface_y"})
     options = RuleLearnerOptions(**places, surface=Surface(config.surface_x, config.surface_y))
     learner = RuleLearner(options, f"goal-{bus.now_ns}")
-    hear = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
+    handle = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[SUBSCRIBES.index(event.topic)](event.message)
+            handle[SUBSCRIBES.index(event.topic)](event.message)
             continue
         output = learner.tick(event.now_ns * 1e-9)
         publish_each(bus, PUBLISHES, (output.goals, output.calibrations, output.rules, output.stages, output.speech))

@@ -30,14 +30,14 @@ def run(bus: Bus, config: Config) -> None:
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     with config.driven_arm(bus.run_folder, launch) as arm:
         bus.when_readable(arm.readable, lambda: say(bus, arm))
-        hear = {
+        handle = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
             **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
             **dict.fromkeys(topics.STOPS, arm.on_stop),
         }
         for event in bus.events(*SUBSCRIBES, tick=True):
             if not isinstance(event, Tick):
-                hear[event.topic](event.message, event.captured_ns)
+                handle[event.topic](event.message, event.captured_ns)
             bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.sentence)
 
 

@@ -29,7 +29,7 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
     bus.starting("training or reading the reaching movement")
     synthesizer = synthesizer_for(config.robot, config.side, config.movement, config.surface)
-    hear = {
+    handle = {
         topics.RELOCATION_GOAL: synthesizer.on_goal,
         topics.ARM_JOINT_STATES: synthesizer.on_joint_states,
         topics.ARM_TRAJECTORY_STATUS: synthesizer.on_trajectory_status,
@@ -37,7 +37,7 @@ def run(bus: Bus, config: Config) -> None:
     bus.ready(synthesizer.sentence)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
-            hear[event.topic](event.message)
+            handle[event.topic](event.message)
             continue
         output = synthesizer.tick(event.now_ns)
         for trajectory in output.trajectories:

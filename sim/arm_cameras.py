@@ -103,7 +103,7 @@ class ArmCameras:
             found.append(np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8))
         return found
 
-    def lights(self, data: mujoco.MjData, now_ns: int) -> list[RawImage]:
+    def images_raw(self, data: mujoco.MjData, now_ns: int) -> list[RawImage]:
         """The same as messages."""
         found = []
         for camera, image in zip(self._cameras, self.images(data), strict=True):

@@ -59,12 +59,12 @@ class ArmInstructor(Instructor):
             return self._posture
         return self.person.holding(self._fingertip, self._backward, self._elbow_towards)
 
-    def hear(self, request: int, name: str = "") -> None:
+    def handle(self, request: int, name: str = "") -> None:
         """See `Instructor.hear`. Who is asked to point again while withdrawing the arm points again."""
         again = (request, name)
         if self._has_pointed and request == Speech.REQUEST_POINT_AT_OBJECT and again not in self._waiting:
             self._waiting.append(again)
-        super().hear(request, name)
+        super().handle(request, name)
 
     def _point(self, wanted: str) -> Script:
         self._has_pointed = False

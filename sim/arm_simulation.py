@@ -70,19 +70,19 @@ class ArmSimulation(Simulation):
         write_cameras(folder / "cameras.yaml", calibrated(self.cameras, self._stream(CALIBRATION)))
         self.person.write_measures(folder / "person.yaml")
 
-    def light(self) -> RawImage | None:
-        """What falls on the robot's camera; the arm is brought into its posture of this moment first."""
+    def image_raw(self) -> RawImage | None:
+        """The image of the robot's camera; the arm is brought into its present posture first."""
         self.place_arm()
-        return super().light()
+        return super().image_raw()
 
-    def arm_lights(self) -> list[RawImage]:
-        """What falls on the calibrated cameras; nothing without cameras."""
+    def arm_images_raw(self) -> list[RawImage]:
+        """The images of the calibrated cameras; none without cameras."""
         if self._arm_cameras is None:
             return []
         started = time.perf_counter()
-        lights = self._arm_cameras.lights(self.world.data, self.now_ns)
+        images_raw = self._arm_cameras.images_raw(self.world.data, self.now_ns)
         self.rendering_s += time.perf_counter() - started
-        return lights
+        return images_raw
 
     def place_arm(self) -> None:
         """Brings the arm that is seen into the instructor's posture."""

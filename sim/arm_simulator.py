@@ -3,9 +3,9 @@
 Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
             speech              Speech              events
 Publishes   clock               Clock               15 Hz
-            camera/light        foxglove.RawImage   15 Hz   camera_optical
-            camera_1/light,
-            camera_2/light      foxglove.RawImage   15 Hz, or a part of it   camera_1, camera_2
+            camera/image_raw    foxglove.RawImage   15 Hz   camera_optical
+            camera_1/image_raw,
+            camera_2/image_raw  foxglove.RawImage   15 Hz, or a part of it   camera_1, camera_2
             wire/hoap3/state    Hoap3State          15 Hz   joint units
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
@@ -30,8 +30,8 @@ from sim.simulation import Simulation
 SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
 PUBLISHES = (
     topics.CLOCK,
-    topics.CAMERA_LIGHT,
-    *topics.STEREO_LIGHTS,
+    topics.CAMERA_IMAGE_RAW,
+    *topics.STEREO_IMAGES_RAW,
     topics.WIRE_HOAP3_STATE,
     topics.TRUTH_LAYOUT,
     topics.TRUTH_STATE,
@@ -60,8 +60,8 @@ def say_of_arm(bus: Bus, simulation: Simulation, every: int = 1) -> None:
     """What is true of the arm in this tick, and what is seen of it in every so many ticks."""
     assert isinstance(simulation, ArmSimulation)
     seen = simulation.tick % every == 0
-    for topic, light in zip(topics.STEREO_LIGHTS, simulation.arm_lights() if seen else [], strict=False):
-        bus.publish(topic, light, simulation.now_ns)
+    for topic, image_raw in zip(topics.STEREO_IMAGES_RAW, simulation.arm_images_raw() if seen else [], strict=False):
+        bus.publish(topic, image_raw, simulation.now_ns)
     bus.publish(topics.TRUTH_ARM, simulation.truth_arm(), simulation.now_ns)
 
 

@@ -25,7 +25,7 @@ COLOURS = {
 LARGER = {"shoulder": 1.1, "elbow": 1.6, "wrist": 1.45}
 """Radius of the ball over that of the arm."""
 TIP_RADIUS = 0.021
-MOST_SATURATION = 0.2
+MAX_SATURATION = 0.2
 """Of everything else in the room; skin keeps a little more."""
 
 
@@ -41,12 +41,12 @@ def mute(spec: mujoco.MjSpec) -> None:
 
 
 def muted(colours: ArrayLike) -> Floats:
-    """RGB (..., 3) with their brightest channel kept and their saturation cut to `MOST_SATURATION`."""
+    """RGB (..., 3) with their brightest channel kept and their saturation cut to `MAX_SATURATION`."""
     rgb = np.asarray(colours, dtype=np.float64)
-    most = rgb.max(axis=-1, keepdims=True)
-    saturation = (most - rgb.min(axis=-1, keepdims=True)) / np.maximum(most, 1e-9)
-    share = np.minimum(1.0, MOST_SATURATION / np.maximum(saturation, 1e-9))
-    return np.asarray(most + share * (rgb - most))
+    maximum = rgb.max(axis=-1, keepdims=True)
+    saturation = (maximum - rgb.min(axis=-1, keepdims=True)) / np.maximum(maximum, 1e-9)
+    share = np.minimum(1.0, MAX_SATURATION / np.maximum(saturation, 1e-9))
+    return np.asarray(maximum + share * (rgb - maximum))
 
 
 def add_markers(spec: mujoco.MjSpec, sizes: ArmSizes, names: Iterable[str]) -> None:

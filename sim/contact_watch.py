@@ -25,8 +25,8 @@ class ContactRecord:
         unwanted: Contacts begun between the robot and anything but the object it handles, itself included.
         unwanted_pairs: "a - b" -> how often.
         deepest: Largest penetration between robot and objects, m; `deepest_pair` where.
-        touched: Objects that the robot touched in the newest step.
-        present: Pairs of the robot in contact in the newest step.
+        touched: Objects that the robot touched in the latest step.
+        present: Pairs of the robot in contact in the latest step.
     """
 
     unwanted: int = 0

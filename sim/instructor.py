@@ -88,7 +88,7 @@ class Instructor:
         """Whether a request is being answered or waits."""
         return self._step is not None or bool(self._waiting)
 
-    def hear(self, request: int, name: str = "") -> None:
+    def handle(self, request: int, name: str = "") -> None:
         """The robot says something. A request that is being answered or waits already is not taken twice.
 
         Args:

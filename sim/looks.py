@@ -100,15 +100,15 @@ class Looks:
         )
 
 
-def draw_camera(draw: np.random.Generator, elevation_deg: float, most_draws: int = 2000) -> Camera:
+def draw_camera(draw: np.random.Generator, elevation_deg: float, max_draws: int = 2000) -> Camera:
     """A camera near the nominal pose, drawn again until it sees the working area and not the instructor at rest."""
-    for _ in range(most_draws):
+    for _ in range(max_draws):
         moved, turned = draw.uniform(-0.05, 0.05, 3), draw.uniform(-6.0, 6.0, 3)
         scale, k1 = float(draw.uniform(0.9, 1.1)), float(draw.uniform(-0.1, 0.1))
         camera = _camera(elevation_deg, moved, turned, scale, k1)
         if sees_enough(camera):
             return camera
-    raise RuntimeError(f"no camera in {most_draws} draws sees the working area; the nominal view is too narrow")
+    raise RuntimeError(f"no camera in {max_draws} draws sees the working area; the nominal view is too narrow")
 
 
 def sees_enough(camera: Camera) -> bool:

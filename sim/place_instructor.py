@@ -35,14 +35,14 @@ class PlaceInstructor(ArmInstructor):
     _shown = 0
     _stood = np.array(START)
 
-    def hear(self, request: int, name: str = "") -> None:
+    def handle(self, request: int, name: str = "") -> None:
         """See `Instructor.hear`. Who is asked to point again while withdrawing the arm points again."""
         again = (request, name)
         if request == Speech.REQUEST_POINT_AT_PLACE and self._has_pointed and again not in self._waiting:
             self._waiting.append(again)
         if request == Speech.REQUEST_UNSPECIFIED and self._has_pointed and self._place is not None:
             self._stood, self._place = self._place, None  # it is understood: the object will stand there
-        super().hear(request, name)
+        super().handle(request, name)
 
     def _scripts(self) -> dict[int, Callable[[str], Script]]:
         more: dict[int, Callable[[str], Script]] = {

@@ -29,8 +29,8 @@ class PlaceSimulation(ArmSimulation):
         super().__init__(seed, description, camera, video, firmware_log, measures)
         self.world.place(OBJECT, tool_box.standing_centre(*START))
 
-    def light(self) -> RawImage | None:
-        """Nothing; the arm is brought into its posture of this moment for the other cameras."""
+    def image_raw(self) -> RawImage | None:
+        """None; the arm is brought into its present posture for the other cameras."""
         self.place_arm()
         return None
 

@@ -3,8 +3,8 @@
 Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
             speech              Speech              events
 Publishes   clock               Clock               15 Hz
-            camera_1/light,
-            camera_2/light      foxglove.RawImage   15 Hz   camera_1, camera_2
+            camera_1/image_raw,
+            camera_2/image_raw  foxglove.RawImage   15 Hz   camera_1, camera_2
             wire/hoap3/state    Hoap3State          15 Hz   joint units
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
@@ -24,7 +24,7 @@ from sim.place_simulation import PlaceSimulation
 SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
 PUBLISHES = (
     topics.CLOCK,
-    *topics.STEREO_LIGHTS,
+    *topics.STEREO_IMAGES_RAW,
     topics.WIRE_HOAP3_STATE,
     topics.TRUTH_LAYOUT,
     topics.TRUTH_STATE,

@@ -11,7 +11,7 @@ from sim import tool_box
 
 STRIP_X = (0.168, 0.186)
 STRIP_Y = (-0.100, 0.065)
-LEAST_GAP = 0.050  # between the axes of two cylinders
+MIN_GAP = 0.050  # between the axes of two cylinders
 
 APPROACH = 0.100  # hand and wrist lie along this part before an object
 FINGERS_BEYOND = 0.037  # and reaches so far past its axis
@@ -31,7 +31,7 @@ def draw_layout(draw: np.random.Generator, count: int = 3) -> tuple[Floats, int]
     redrawn = 0
     for _ in range(10_000):
         layout = np.column_stack((draw.uniform(*STRIP_X, count), draw.uniform(*STRIP_Y, count)))
-        if _least_gap(layout) < LEAST_GAP:
+        if _min_gap(layout) < MIN_GAP:
             continue
         if hand_has_room(layout):
             return layout, redrawn
@@ -48,8 +48,8 @@ def draw_place(draw: np.random.Generator, standing: Sequence[Floats]) -> Floats:
     for _ in range(200):
         place = np.array((draw.uniform(*STRIP_X), draw.uniform(*STRIP_Y)))
         layout = np.array([*standing, place])
-        gap = _least_gap(layout)
-        if gap >= LEAST_GAP and hand_has_room(layout):
+        gap = _min_gap(layout)
+        if gap >= MIN_GAP and hand_has_room(layout):
             return place
         if gap > best_gap:
             best, best_gap = place, gap
@@ -81,7 +81,7 @@ def hand_has_room(layout: Floats) -> bool:
     return True
 
 
-def _least_gap(layout: Floats) -> float:
+def _min_gap(layout: Floats) -> float:
     if len(layout) < 2:
         return np.inf
     apart = np.linalg.norm(layout[:, None] - layout[None], axis=2)

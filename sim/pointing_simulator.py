@@ -1,8 +1,8 @@
-"""Pointing simulator: the light that a person at a table, who points, throws on calibrated cameras.
+"""Pointing simulator: images that calibrated cameras have of a person at a table, who points.
 
 Publishes   clock                             Clock               15 Hz
-            camera_1/light, camera_2/light,
-            camera_3/light, camera_4/light    foxglove.RawImage   15 Hz   camera_1 … camera_4
+            camera_1/image_raw, camera_2/image_raw,
+            camera_3/image_raw, camera_4/image_raw   foxglove.RawImage   15 Hz   camera_1 … camera_4
             truth/arm                         TruthArm            15 Hz   table; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`.
@@ -19,7 +19,7 @@ from paramove.bus import Bus, LockstepBarrier, NodeConfig, main, topics
 from sim.pointing_world import PointingWorld
 
 SUBSCRIBES = ()
-PUBLISHES = (topics.CLOCK, *topics.CAMERA_LIGHTS, topics.TRUTH_ARM)
+PUBLISHES = (topics.CLOCK, *topics.CAMERA_IMAGES_RAW, topics.TRUTH_ARM)
 
 CAMERA_HZ = 15
 REPORT_S = 5
@@ -62,8 +62,8 @@ def _loop(bus: Bus, config: Config, world: PointingWorld) -> None:
     while not bus.stopped and barrier.tick / CAMERA_HZ <= world.duration_s:
         now_s = barrier.tick / CAMERA_HZ
         now_ns = round(now_s * 1e9)
-        for topic, light in zip(topics.CAMERA_LIGHTS, world.lights(now_s), strict=False):
-            bus.publish(topic, light, now_ns)
+        for topic, image_raw in zip(topics.CAMERA_IMAGES_RAW, world.images_raw(now_s), strict=False):
+            bus.publish(topic, image_raw, now_ns)
         truth = world.truth(now_s)
         bus.publish(topics.TRUTH_ARM, truth, now_ns)
         barrier.advance(now_ns)

@@ -69,9 +69,9 @@ class PointingWorld:
         with (folder / "person.yaml").open("w", encoding="utf-8") as file:
             YAML().dump(measures, file)
 
-    def lights(self, time_s: float) -> list[RawImage]:
-        """What falls on the sensor of each camera, in the order of `views`."""
-        return [self._light(self._studio.film(time_s, view - 1), view, time_s) for view in self._views]
+    def images_raw(self, time_s: float) -> list[RawImage]:
+        """The image of each camera, in the order of `views`."""
+        return [self._image_raw(self._studio.film(time_s, view - 1), view, time_s) for view in self._views]
 
     def truth(self, time_s: float) -> TruthArm:
         """How the arm really is, and where it points."""
@@ -91,7 +91,7 @@ class PointingWorld:
         """Gives the graphics context back."""
         self._studio.close()
 
-    def _light(self, image: Image, view: int, time_s: float) -> RawImage:
+    def _image_raw(self, image: Image, view: int, time_s: float) -> RawImage:
         noise = self._noise.normal(0.0, self._studio.room.noise, image.shape).round().astype(np.int8)
         exposed = cv2.add(image, noise, dtype=cv2.CV_8U)
         height, width = exposed.shape[:2]

@@ -40,11 +40,11 @@ def stages(world: World, instructor: Instructor) -> Iterator[str]:
             world.step(firmware.step(counts, world.joint_positions(), world.joint_velocities()))
 
     yield "start"
-    instructor.hear(Speech.REQUEST_HAND_ME_AN_OBJECT)
+    instructor.handle(Speech.REQUEST_HAND_ME_AN_OBJECT)
     run(lambda: instructor.doing.startswith("holds"))
     run(lambda: False, 1.2)
     yield "hand over"
-    instructor.hear(Speech.REQUEST_SHOW_RULES)
+    instructor.handle(Speech.REQUEST_SHOW_RULES)
     run(lambda: instructor.doing == "turns the box")
     run(lambda: False, 3.0)
     yield "turn the box"
@@ -55,7 +55,7 @@ def stages(world: World, instructor: Instructor) -> Iterator[str]:
     yield "carry"
     run(lambda: world.held_by_instructor is None)
     yield "in its opening"
-    instructor.hear(Speech.REQUEST_POINT_AT_OBJECT)
+    instructor.handle(Speech.REQUEST_POINT_AT_OBJECT)
     run(lambda: instructor.doing.startswith("points"))
     yield "before pointing"
     run(lambda: False, 4.5)

@@ -85,7 +85,7 @@ class Simulation:
 
     @property
     def tick(self) -> int:
-        """Number of the newest tick of 1/15 s."""
+        """Number of the latest tick of 1/15 s."""
         return self.world.steps * CAMERA_HZ // 1000
 
     @property
@@ -96,12 +96,12 @@ class Simulation:
     def write_measures(self, folder: Path) -> None:
         """Writes what people measure before the run: nothing in this world."""
 
-    def hear(self, heard: Received) -> None:
+    def handle(self, heard: Received) -> None:
         """Take in a message of the stream or of what the robot says."""
         if heard.topic is topics.WIRE_HOAP3_STREAM:
             self.stream.offer(heard.message)
         elif heard.topic is topics.SPEECH:
-            self.instructor.hear(heard.message.request, heard.message.object)
+            self.instructor.handle(heard.message.request, heard.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""
@@ -122,8 +122,8 @@ class Simulation:
                 self._firmware_log = None
         self.physics_s += time.perf_counter() - started
 
-    def light(self) -> RawImage | None:
-        """What falls on the camera's sensor now; None without a camera."""
+    def image_raw(self) -> RawImage | None:
+        """The camera's image now; None without a camera."""
         if self._eye is None:
             return None
         started = time.perf_counter()

@@ -1,9 +1,9 @@
-"""Simulator: stands where the hardware stands. It is the light on the camera's sensor and the robot's motors.
+"""Simulator: stands where the hardware stands. It gives the camera's images and moves the robot's motors.
 
 Subscribes  wire/hoap3/stream   StreamBatch         events  joint units
             speech              Speech              events
 Publishes   clock               Clock               15 Hz
-            camera/light        foxglove.RawImage   15 Hz   camera_optical
+            camera/image_raw    foxglove.RawImage   15 Hz   camera_optical
             wire/hoap3/state    Hoap3State          15 Hz   joint units
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
@@ -30,7 +30,7 @@ from sim.world import log_warnings_of_mujoco
 SUBSCRIBES = (topics.WIRE_HOAP3_STREAM, topics.SPEECH)
 PUBLISHES = (
     topics.CLOCK,
-    topics.CAMERA_LIGHT,
+    topics.CAMERA_IMAGE_RAW,
     topics.WIRE_HOAP3_STATE,
     topics.TRUTH_LAYOUT,
     topics.TRUTH_STATE,
@@ -102,7 +102,7 @@ def _loop(bus: Bus, config: Config, simulation: Simulation, say_more: Callable[[
         _say(bus, simulation)
         say_more(bus, simulation)
         for heard in barrier.advance(simulation.now_ns):
-            simulation.hear(heard)
+            simulation.handle(heard)
         if bus.stopped:
             break
         simulation.run_to_tick(barrier.tick)
@@ -130,9 +130,9 @@ def _keep_pace(bus: Bus, due_s: float) -> float:
 
 def _say(bus: Bus, simulation: Simulation) -> None:
     """Everything that the world shows now. A state that is not finite never gets here: the step raises."""
-    light, view = simulation.light(), simulation.view()
-    if light is not None:
-        bus.publish(topics.CAMERA_LIGHT, light)
+    image_raw, view = simulation.image_raw(), simulation.view()
+    if image_raw is not None:
+        bus.publish(topics.CAMERA_IMAGE_RAW, image_raw)
     if view is not None:
         bus.publish(topics.TRUTH_VIEW, view)
     bus.publish(topics.WIRE_HOAP3_STATE, simulation.robot_state())

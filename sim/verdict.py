@@ -50,7 +50,7 @@ class Verdict:
             self._errors_at_rest_mm.append(error_mm)
 
     def of_object(self, name: str) -> dict[str, Any]:
-        """Where the object is in the newest state, and whether the robot put it where it belongs."""
+        """Where the object is in the latest state, and whether the robot put it where it belongs."""
         body = _body(self._recent[-1].objects, name)
         own = self._rules.get(name, "")
         inside = self._opening_of(body)

@@ -107,7 +107,7 @@ class World:
         return self._watch.record
 
     def contact_names(self) -> list[str]:
-        """Pairs that the robot is part of, in the newest step."""
+        """Pairs that the robot is part of, in the latest step."""
         return [self._watch.name_of(pair) for pair in self.contacts.present]
 
     def gripper(self) -> tuple[Floats, Floats]:

@@ -44,7 +44,7 @@ NOT_MET = 3
 FREE_TEXT = frozenset({"sentence", "reason", "refusal"})
 LEFT_OUT = ("status/", "clock")
 LAST_MESSAGES = 50
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {"camera/light": "camera/image_raw"}
 """Topics: name before the change -> name after it."""
 TIMES = re.compile(r"(?<![a-z])(seconds?|minutes?|times?|ms|took|date|commit|versions?)(?![a-z])")
 """Words in the names of numbers that differ from run to run."""

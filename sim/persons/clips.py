@@ -34,7 +34,7 @@ FORMAT_VERSION, NOISE_SEED = 1, 1
 TABLE = ((-0.085, -0.66), (0.72, -0.66), (0.72, 0.72), (-0.085, 0.72))
 """Corners (x, y) of the table in all clips, m, as one measures them with a ruler."""
 NOISE_IMAGES = 4
-MOST_PLACES = 2
+MAX_PLACES = 2
 SEEN, CAMERAS, TRUTH, TRUE_CAMERAS, CODE, MANIFEST = (
     "seen.npz", "cameras.yaml", "truth.npz", "true_cameras.yaml", "code.txt", "manifest.yaml",
 )  # fmt: skip
@@ -266,7 +266,7 @@ def _sizes(numbers: Floats) -> ArmSizes:
 
 
 def _truth_arrays(truth: Truth) -> dict[str, Any]:
-    places = np.full((len(truth.acts), MOST_PLACES, 7), np.nan)
+    places = np.full((len(truth.acts), MAX_PLACES, 7), np.nan)
     for number, act in enumerate(truth.acts):
         columns = (act.theta, act.targets, act.arrives_s[:, None], act.leaves_s[:, None])
         places[number, : len(act.theta)] = np.concatenate(columns, axis=1)

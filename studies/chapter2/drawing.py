@@ -16,7 +16,7 @@ from studies.chapter2.movement import PARAMETER_SHARES, performance, prototype
 from studies.chapter2.training import Moment
 
 RED, BLUE, GREY, GREEN = "#c8372d", "#2f6fc4", "#8b95a1", "#1f7a45"
-LEAST_SHOWN = 0.01
+MIN_SHOWN = 0.01
 """Transitions are shown from this share of the greatest that leads to another state."""
 SIZE = (5.2, 2.5)
 
@@ -45,12 +45,12 @@ def draw_model(axes: Axes, moment: Moment, sequences: list[Floats], bound: float
 
 def _draw_transitions(axes: Axes, moment: Moment) -> None:
     others = moment.transitions * (1.0 - np.eye(len(moment.means)))
-    greatest = others.max()
-    if greatest <= 0.0:
+    maximum = others.max()
+    if maximum <= 0.0:
         return
-    pairs = np.argwhere(others > LEAST_SHOWN * greatest)
+    pairs = np.argwhere(others > MIN_SHOWN * maximum)
     lines = [(moment.means[i], moment.means[j]) for i, j in pairs]
-    widths = [1.6 * others[i, j] / greatest for i, j in pairs]
+    widths = [1.6 * others[i, j] / maximum for i, j in pairs]
     axes.add_collection(LineCollection(lines, colors=BLUE, linewidths=widths, alpha=0.8, zorder=2))
 
 

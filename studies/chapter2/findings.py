@@ -53,7 +53,7 @@ def finding(number: str, experiment: Experiment) -> Finding:
     return _FINDINGS[number](experiment)
 
 
-def _branching(setting: Setting, least: int) -> Callable[[Experiment], Finding]:
+def _branching(setting: Setting, minimum: int) -> Callable[[Experiment], Finding]:
     def told(experiment: Experiment) -> Finding:
         plain, random = experiment.trained[setting], experiment.branched[setting]
         first, found = (branches(one.moments[-1], setting.bound) for one in (plain, random))
@@ -63,7 +63,7 @@ def _branching(setting: Setting, least: int) -> Callable[[Experiment], Finding]:
             f"The likeliest of eight random starts, on the right, has {_counted(found)} and "
             f"{per_frame(random, RESULT):.2f} per frame."
         )
-        return Finding(_verdict(first >= least, found >= least), words)
+        return Finding(_verdict(first >= minimum, found >= minimum), words)
 
     return told
 

@@ -56,7 +56,7 @@ def _true_lines(axes: Axes) -> None:
         axes.plot(*prototype(p, times).T, color="#bcc4cc", lw=2.4)
 
 
-def surfaces(figure: Figure, shown: Mapping[str, Floats], columns: int, most: float) -> None:
+def surfaces(figure: Figure, shown: Mapping[str, Floats], columns: int, maximum: float) -> None:
     """Error at each place of the 7 x 5 raster, cm; v = 0, near the person, is below."""
     rows = -(-len(shown) // columns)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
@@ -64,10 +64,10 @@ def surfaces(figure: Figure, shown: Mapping[str, Floats], columns: int, most: fl
         axes.set_visible(False)
     image = None
     for axes, (name, values) in zip(panels.flat, shown.items(), strict=False):
-        image = axes.imshow(values.T, origin="lower", cmap="YlOrRd", vmin=0.0, vmax=most, aspect="auto")
+        image = axes.imshow(values.T, origin="lower", cmap="YlOrRd", vmin=0.0, vmax=maximum, aspect="auto")
         for column, row in np.ndindex(*values.shape):
             value = values[column, row]
-            colour = "white" if value > 0.7 * most else "#39424e"
+            colour = "white" if value > 0.7 * maximum else "#39424e"
             axes.text(column, row, f"{value:.1f}", ha="center", va="center", fontsize=7, color=colour)
         axes.set_title(f"{name}: {np.nanmean(values):.2f} cm", fontsize=9)
         axes.grid(visible=False)
@@ -121,20 +121,20 @@ def noise(figure: Figure, found: Mapping[str, Mapping[str, Any]]) -> None:
 def learning(figure: Figure, rows: Sequence[Mapping[str, Any]]) -> None:
     """Errors over repetitions at nine places, and over the number of places."""
     names = list(dict.fromkeys(row["name"] for row in rows))
-    most = max(row["repetitions"] for row in rows)
+    maximum = max(row["repetitions"] for row in rows)
     for line, (measure, title) in enumerate((("synthesis", "synthesis, cm"), ("theta", "error of θ, cm"))):
         by_repetitions, by_places = figure.add_subplot(2, 2, 2 * line + 1), figure.add_subplot(2, 2, 2 * line + 2)
         for number, name in enumerate(names):
             own = [row for row in rows if row["name"] == name]
             nine = sorted((row for row in own if row["side"] == 3), key=lambda row: int(row["repetitions"]))
-            full = sorted((row for row in own if row["repetitions"] == most), key=lambda row: int(row["side"]))
+            full = sorted((row for row in own if row["repetitions"] == maximum), key=lambda row: int(row["side"]))
             if nine:
                 _with_interval(
                     by_repetitions, [row["repetitions"] for row in nine], [row[measure] for row in nine], number, name
                 )
             _with_interval(by_places, [row["side"] ** 2 for row in full], [row[measure] for row in full], number, name)
         by_repetitions.set(xlabel="repetitions at each of 9 places", ylabel=title, ylim=(0.0, None))
-        by_places.set(xlabel=f"places with {most} repetitions", ylim=(0.0, None))
+        by_places.set(xlabel=f"places with {maximum} repetitions", ylim=(0.0, None))
         by_places.set_xscale("log")
         by_places.set_xticks([4, 9, 36], ["4", "9", "36"])
         by_places.minorticks_off()

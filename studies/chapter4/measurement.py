@@ -100,9 +100,9 @@ def _unfinished(models: Mapping[str, ParametricHMM], shown: Raster, seed: int, e
 
 
 def score(model: ParametricHMM, x: Floats, log_likelihood: float | None = None) -> float:
-    """How typical a movement is of a model: the likelihood of the thesis (2.2.5), or what the model says itself."""
+    """How well a movement fits a model: the likelihood of the thesis (2.2.5), or minus the outlier score."""
     if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
-        return -float(model.examine(x).strangeness)
+        return -float(model.examine(x).outlier_score)
     return float(model.estimate(x).log_likelihood) if log_likelihood is None else log_likelihood
 
 

@@ -90,7 +90,7 @@ def _pictures(results: Results, summary: dict[str, Any]) -> list[str]:
     line = of_group(results, LINE)[0]
     titles = {one.number: f"{one.states} states" for one in FIGURES}
     synthesis, theta = _surfaces(results, "synthesis_pointing"), _surfaces(results, "theta_pointing")
-    most = max(float(np.nanmax(values)) for values in synthesis.values())
+    maximum = max(float(np.nanmax(values)) for values in synthesis.values())
     rows = -(-len(synthesis) // 4)
     return [
         section(
@@ -104,12 +104,14 @@ def _pictures(results: Results, summary: dict[str, Any]) -> list[str]:
         section(
             "Synthesis error over the region (figure 4.14 a–d)",
             "Pointing, (4.3), cm, mean of all seeds; paths smooth. Below: near the person.",
-            drawing.drawn(partial(drawing.surfaces, shown=synthesis, columns=4, most=most), (11.0, 1.9 * rows + 0.4)),
+            drawing.drawn(
+                partial(drawing.surfaces, shown=synthesis, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)
+            ),
         ),
         section(
             "Error of the recognised place (figure 4.14 e–h)",
             "Pointing, cm, mean of four tests and all seeds.",
-            drawing.drawn(partial(drawing.surfaces, shown=theta, columns=4, most=most), (11.0, 1.9 * rows + 0.4)),
+            drawing.drawn(partial(drawing.surfaces, shown=theta, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)),
         ),
     ]
 
@@ -135,7 +137,7 @@ def _questions(results: Results, summary: dict[str, Any], likeliest: dict[str, A
         ),
         section(
             "What is none of the movements, and how sure a model is",
-            "AUROC: probability that a genuine movement seems more typical than another one. Aborted: half of the "
+            "AUROC: probability that a genuine movement fits the model better than another one. Aborted: half of the "
             "fingertip's way out, back along the same way, then at rest. Stopped: held there. Redirect: to two places.",
             rejection_table(summary),
         ),

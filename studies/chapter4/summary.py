@@ -39,15 +39,15 @@ class Interval(NamedTuple):
     """Mean over seeds, and the interval that holds the true mean with 95 % (Student's t; NaN with one seed).
 
     Attributes:
-        least, most: of single seeds.
+        minimum, maximum: of single seeds.
     """
 
     mean: float
     low: float
     high: float
     seeds: int
-    least: float
-    most: float
+    minimum: float
+    maximum: float
 
 
 def over_seeds(values: Iterable[float], *, share: bool = False) -> Interval:

@@ -84,11 +84,11 @@ def _classification(summary: dict[str, Any], rows: list[dict[str, Any]]) -> list
 
 
 def _coverage(rows: list[dict[str, Any]]) -> list[Target]:
-    least, most = min(rows, key=_mean("covered")), max(rows, key=_mean("covered"))
-    low, high = least["covered"], most["covered"]
+    minimum, maximum = min(rows, key=_mean("covered")), max(rows, key=_mean("covered"))
+    low, high = minimum["covered"], maximum["covered"]
     return [
-        Target("95 % regions cover, least", "≥ 85 %", _percent(low), _case(least), low.mean >= 0.85),
-        Target("95 % regions cover, most", "≤ 99 %", _percent(high), _case(most), high.mean <= 0.99),
+        Target("95 % regions cover, least", "≥ 85 %", _percent(low), _case(minimum), low.mean >= 0.85),
+        Target("95 % regions cover, most", "≤ 99 %", _percent(high), _case(maximum), high.mean <= 0.99),
     ]
 
 
@@ -100,7 +100,7 @@ def _of_seeds(found: Interval, digits: int, scale: float = 1.0) -> str:
     """How single seeds differ: a mean at its bound is met with some of them and missed with others."""
     if found.seeds < 2:
         return ""
-    return f" (seeds: {scale * found.least:.{digits}f} to {scale * found.most:.{digits}f})"
+    return f" (seeds: {scale * found.minimum:.{digits}f} to {scale * found.maximum:.{digits}f})"
 
 
 def _jerk(rows: list[dict[str, Any]]) -> Target:

@@ -29,7 +29,7 @@ AT_TARGET = 45
 CORNERS = ((0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0))
 
 
-def natural_variation(seed: int, most: int = 14) -> dict[str, Any]:
+def natural_variation(seed: int, maximum: int = 14) -> dict[str, Any]:
     """Distances (4.3) of all pairs of `most` pointing movements to the centre and each corner, and the misses, cm.
 
     "prototype": distance of the demonstrator's own movement without any variation from the average of the four tests at
@@ -43,7 +43,7 @@ def natural_variation(seed: int, most: int = 14) -> dict[str, Any]:
             for part in (shown.train["pointing"], shown.test["pointing"])
             for x, own in zip(part.sequences, part.places, strict=True)
             if np.allclose(own, place)
-        ][:most]
+        ][:maximum]
         values[name] = [100.0 * movement_distance(a, b) for a, b in combinations(movements, 2)]
         if name == "centre":
             tips = np.stack([x.reshape(FRAMES, -1, 3)[AT_TARGET, POINT_NAMES.index("index")] for x in movements])

@@ -16,7 +16,7 @@ HUES = {
 }  # fmt: skip
 AXES, AXIS_HUES = ("x", "y", "z"), ("#c8372d", "#1f7a45", "#2f6fc4")
 ACTION_HUES = ("#2f6fc4", "#c8372d", "#1f7a45")
-MOST_SHOWN_CM = 40.0
+MAX_SHOWN_CM = 40.0
 
 
 def name_of(views: tuple[int, ...]) -> str:
@@ -36,7 +36,7 @@ def over_time(figure: Figure, tracks: Sequence[Track]) -> None:
             axes.plot(track.times_s, values, color=hue, lw=width, label=name_of(track.views))
     for axes, title in zip(panels, ("pose, RMS cm", "target of θ, cm", "deviation of θ"), strict=True):
         axes.set_ylabel(title)
-        axes.set_ylim(0.0, min(MOST_SHOWN_CM, axes.get_ylim()[1]))
+        axes.set_ylim(0.0, min(MAX_SHOWN_CM, axes.get_ylim()[1]))
         mark_acts(axes, tracks[0])
     panels[0].legend(ncols=6, fontsize=7, loc="upper right")
     panels[-1].set_xlabel("s")
@@ -97,7 +97,7 @@ def mark_acts(axes: Axes, track: Track) -> None:
             axes.axvline(act.grasp_s, color="#c8372d", lw=0.8)
 
 
-def distributions(figure: Figure, kinds: Mapping[str, Mapping[str, Floats]], title: str, most: float) -> None:
+def distributions(figure: Figure, kinds: Mapping[str, Mapping[str, Floats]], title: str, maximum: float) -> None:
     """Share of the values below a length, for each kind and each set of views; infinite ones never are."""
     panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
     hues = ("#1d2530", "#c8372d", "#7a4fb5", "#a86a00")
@@ -107,7 +107,7 @@ def distributions(figure: Figure, kinds: Mapping[str, Mapping[str, Floats]], tit
             shares = np.arange(1, len(ordered) + 1) / len(ordered)
             axes.step(np.concatenate([[0.0], ordered]), np.concatenate([[0.0], shares]), where="post", color=hue,
                       label=name)  # fmt: skip
-        axes.set(title=kind, xlim=(0.0, most), ylim=(0.0, 1.02), xlabel=title)
+        axes.set(title=kind, xlim=(0.0, maximum), ylim=(0.0, 1.02), xlabel=title)
     panels[0].set_ylabel("share of all")
     panels[-1].legend(fontsize=7, loc="lower right")
 

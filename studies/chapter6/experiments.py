@@ -170,10 +170,10 @@ def _check_complete(clips: Path, chosen: Sequence[tuple[Kind, int]], named: Path
     if not absent:
         return
     kinds = dict.fromkeys(kind.name for kind, _ in absent)
-    most = max(number for _, number in absent) + 1
+    maximum = max(number for _, number in absent) + 1
     words = ["python -m sim.performances", *(f"--kind {name}" for name in kinds)]
-    if any(number + 1 < kind.clips for kind, number in chosen if number == most - 1):
-        words.append(f"--clips {most}")
+    if any(number + 1 < kind.clips for kind, number in chosen if number == maximum - 1):
+        words.append(f"--clips {maximum}")
     if named is not None:
         words.append(f"--out {named}")
     raise ClipsMissingError(

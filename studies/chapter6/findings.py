@@ -85,8 +85,8 @@ def _depth(found: Mapping[str, Any]) -> Finding | None:
         f"so for {sum(right)} of {len(right)} cameras; of the squared error of arms that are not lost, along the line "
         f"of sight lie: {shares}"
     )
-    most = all(one["depth_share_of_kept"] > 1.0 / 3.0 for one in found.values())
-    return Finding("figure 6.16", said, seen, _verdict(all(right) and most, any(right) or most))
+    maximum = all(one["depth_share_of_kept"] > 1.0 / 3.0 for one in found.values())
+    return Finding("figure 6.16", said, seen, _verdict(all(right) and maximum, any(right) or maximum))
 
 
 def _detection(single: Sequence[Track], four: Sequence[Track]) -> Finding | None:

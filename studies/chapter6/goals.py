@@ -19,7 +19,7 @@ from studies.chapter6.summary import (
 )
 from studies.chapter6.vocabularies import BY_OTHERS
 
-LEAST_PERFORMANCES = 100
+MIN_PERFORMANCES = 100
 """As many performances it takes to judge a share of 2 %."""
 FAR = "pointing_far"
 RECORDED = "recorded"
@@ -99,9 +99,9 @@ def counted(number: int, what: str) -> str:
 
 def _lost(what: str, tracks: Sequence[Track]) -> Goal:
     found = accuracy(tracks) if tracks else {"performances": 0}
-    if found["performances"] < LEAST_PERFORMANCES:
+    if found["performances"] < MIN_PERFORMANCES:
         return _unjudged(
-            what, "≤ 2 %", f"only {counted(found['performances'], 'performance')}, {LEAST_PERFORMANCES} expected"
+            what, "≤ 2 %", f"only {counted(found['performances'], 'performance')}, {MIN_PERFORMANCES} expected"
         )
     share = found["lost"] / found["performances"]
     return Goal(what, "≤ 2 %", f"{100 * share:.1f} %", counted(found["performances"], "performance"), share <= 0.02)

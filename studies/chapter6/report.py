@@ -180,8 +180,8 @@ def _kinds(tracks: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
     size = (max(2.0 * len(kinds), 6.0), 2.8)
     told = "Share of detected targets, and of frames, whose error is below a length; what was not detected never is."
     draw = drawing.distributions
-    plots = drawn(partial(draw, kinds=errors, title="target, cm", most=15.0), size)
-    plots += drawn(partial(draw, kinds=hands, title="hand, cm", most=15.0), size)
+    plots = drawn(partial(draw, kinds=errors, title="target, cm", maximum=15.0), size)
+    plots += drawn(partial(draw, kinds=hands, title="hand, cm", maximum=15.0), size)
     parts.append(section("All errors", told, plots))
     for kind in kinds:
         own = typical(chosen(tracks, kinds=[kind]))
@@ -203,8 +203,8 @@ def _errors(tracks: Sequence[Track], *, targets: bool) -> dict[str, Floats]:
 
 def typical(tracks: Sequence[Track]) -> list[Track]:
     """All tracks of the clip whose hand error, with as many views as there are, is the lower median."""
-    most = max(len(track.views) for track in tracks)
-    full = [track for track in tracks if len(track.views) == most]
+    maximum = max(len(track.views) for track in tracks)
+    full = [track for track in tracks if len(track.views) == maximum]
     ordered = sorted(full, key=lambda track: float((track.hand_errors**2).mean()))
     clip = ordered[(len(ordered) - 1) // 2].clip
     return sorted((track for track in tracks if track.clip == clip), key=lambda track: (-len(track.views), track.views))

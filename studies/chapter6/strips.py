@@ -18,7 +18,7 @@ from studies.chapter6.measures import Track
 COLUMNS = 8
 SHOWN_PX = (200, 150)
 BALL_M = 0.028
-LEAST_BALL_PX = 5
+MIN_BALL_PX = 5
 UNCERTAIN = 0.25
 """Deviation of theta from which on the ball is red; it is green at 0."""
 ARM_COLOUR, TEXT_COLOUR = (80, 255, 120), (255, 255, 255)
@@ -72,7 +72,7 @@ def drawn(image: Image, camera: CalibratedCamera, outline: Floats, track: Track,
     height, width = image.shape[:2]
     if np.isfinite(pixel).all() and 0.0 <= pixel[0] < width and 0.0 <= pixel[1] < height:
         away = float(np.linalg.norm(place - camera.position))
-        radius = max(LEAST_BALL_PX, round(float(camera.matrix[0, 0]) * BALL_M / away))
+        radius = max(MIN_BALL_PX, round(float(camera.matrix[0, 0]) * BALL_M / away))
         centre = (round(float(pixel[0])), round(float(pixel[1])))
         cv2.circle(result, centre, radius, certainty_colour(float(track.theta_deviation[number])), -1, cv2.LINE_AA)
         cv2.circle(result, centre, radius, (20, 20, 20), 1, cv2.LINE_AA)

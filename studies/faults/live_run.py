@@ -47,7 +47,7 @@ class LiveRun:
     Attributes:
         events: Of the launcher's log so far, oldest first.
         goals_done: Monotonic times in s at which a goal succeeded.
-        safety: Newest state of the safety gate.
+        safety: Latest state of the safety gate.
     """
 
     def __init__(self, workspace: Path, folder: Path, domain: str, seed: int, pace: float = 1.0) -> None:
@@ -96,7 +96,7 @@ class LiveRun:
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
     def pid_of(self, node: str) -> int | None:
-        """The newest process of a node, or the launcher's."""
+        """The latest process of a node, or the launcher's."""
         if node == LAUNCHER:
             return self.process.pid
         started = [event for event in self.events if event.get("node") == node and event["event"] == "started"]
@@ -115,7 +115,7 @@ class LiveRun:
         if self._exchange is None and (self.bus_folder / "clock").exists():
             self._exchange = Exchange("onlooker", BusSettings(folder=self.bus_folder))
             for topic in _HEARD:
-                self._exchange.hear(topic)
+                self._exchange.subscribe(topic)
         if self._exchange is None:
             time.sleep(wait_s)
             return

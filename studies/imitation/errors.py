@@ -66,7 +66,7 @@ class Errors:
         gripper: Synthesis error of the gripper ‖r − r̂‖ (figures 5.15, 5.16).
         elbow: Synthesis error of the elbow ‖q − q̂‖ by interpolation (blue in figures 5.17, 5.18).
         effective: Effective synthesis error ‖q′ − q̂′‖ of the elbow that is set (red).
-        least_imitation: Imitation error ‖q̂′ − q̂‖ of the reference (black): the best possible with this robot.
+        min_imitation: Imitation error ‖q̂′ − q̂‖ of the reference (black): the best possible with this robot.
         imitation: Imitation error ‖q′ − q̂‖ of the synthesised movement (magenta).
         limited: Whether a joint limit moves the elbow of either movement.
     """
@@ -75,7 +75,7 @@ class Errors:
     gripper: Floats
     elbow: Floats
     effective: Floats
-    least_imitation: Floats
+    min_imitation: Floats
     imitation: Floats
     limited: NDArray[np.bool_]
 
@@ -104,7 +104,7 @@ def errors_of(synthesised: Movement, reference: Movement, *, aligned: bool, exec
         gripper=_mm(gripper[i], person.gripper[j]),
         elbow=_mm(synthesised.proposed.elbow[i], person.elbow[j]),
         effective=_mm(ours.elbow[i], theirs.elbow[j]),
-        least_imitation=_mm(theirs.elbow[j], person.elbow[j]),
+        min_imitation=_mm(theirs.elbow[j], person.elbow[j]),
         imitation=_mm(ours.elbow[i], person.elbow[j]),
         limited=synthesised.limited[i] | reference.limited[j],
     )

@@ -90,7 +90,7 @@ class Experiment:
 
     setup: Setup
     joints: tuple[str, ...]
-    least_reach: float
+    min_reach: float
     lengths: tuple[float, float]
     comparisons: list[Comparison] = field(default_factory=list)
 
@@ -158,14 +158,14 @@ def maxima(comparison: Comparison) -> dict[str, Any]:
         "effective_executed": largest(executed.effective, executed.significant),
         "effective_linear": largest(linear.effective, linear.significant),
         "effective_at_target": largest(plain.effective, at_target),
-        "least_imitation": largest(plain.least_imitation, plain.significant),
+        "least_imitation": largest(plain.min_imitation, plain.significant),
         "imitation": largest(plain.imitation, plain.significant),
         "imitation_aligned": largest(aligned.imitation, aligned.significant),
         "imitation_free": largest(plain.imitation, free),
-        "least_imitation_free": largest(plain.least_imitation, free),
+        "least_imitation_free": largest(plain.min_imitation, free),
         "imitation_executed": largest(executed.imitation, executed.significant),
         "imitation_at_target": largest(plain.imitation, at_target),
-        "imitation_excess": largest(plain.imitation - plain.least_imitation, plain.significant),
+        "imitation_excess": largest(plain.imitation - plain.min_imitation, plain.significant),
         "limited_states": ranges(plain.state[plain.limited & plain.significant]),
     }
 
@@ -199,6 +199,6 @@ def numbers_of(experiment: Experiment) -> dict[str, Any]:
         "significant_states": list(SIGNIFICANT),
         "seeds": list(experiment.setup.seeds),
         "repetitions": experiment.setup.repetitions,
-        "least_reach_mm": 1000.0 * experiment.least_reach,
+        "least_reach_mm": 1000.0 * experiment.min_reach,
         "places": places,
     }

@@ -109,7 +109,7 @@ def _of_effective_error(experiment: Experiment, place: Place) -> list[str]:
     return [
         f"Effective elbow error, {place.name}: {misses(experiment, place, 'effective', 6.0)}. On the way over the edge "
         f"of the table the hand passes {sizes['nearest_gripper']:.0f} mm from the shoulder, nearer than the "
-        f"{1000.0 * experiment.least_reach:.0f} mm at which the robot's elbow is bent fully. There the elbow can go "
+        f"{1000.0 * experiment.min_reach:.0f} mm at which the robot's elbow is bent fully. There the elbow can go "
         "round a circle as wide as the upper arm is long, so that each degree of swivel costs 2 mm."
     ]
 
@@ -117,7 +117,7 @@ def _of_effective_error(experiment: Experiment, place: Place) -> list[str]:
 def _of_imitation_error(experiment: Experiment, place: Place) -> list[str]:
     sizes = proportions(experiment, place)
     errors = [comparison.errors() for comparison in experiment.of(place)]
-    floor = np.median([largest(e.least_imitation, e.significant) for e in errors])
+    floor = np.median([largest(e.min_imitation, e.significant) for e in errors])
     if floor <= 12.5:
         return []
     return [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paramove.documents import Floats, Ints
 
-SYNTHESIS, THETA, CLASSES, BEGINNINGS, TYPICALITY = "synthesis", "theta", "classes", "beginnings", "typicality"
+SYNTHESIS, THETA, CLASSES, BEGINNINGS, OUTLIERS = "synthesis", "theta", "classes", "beginnings", "outliers"
 """What a method can do, as it says itself; what it cannot is a dash in the tables."""
 FRAMES = 100
 """Frames that movements are resampled to wherever a method needs equal lengths."""
@@ -75,7 +75,7 @@ class Method(Protocol):
     can: frozenset[str]
 
     def fit(self, examples: Examples) -> None:
-        """Learn. Of one action where synthesis, theta and typicality are asked; of several for classification."""
+        """Learn. Of one action for synthesis, theta and outliers; of several for classification."""
 
     def synthesize(self, theta: Floats, n: int) -> Floats:
         """The prototype movement for theta. Shape (n, D), m."""
@@ -87,7 +87,7 @@ class Method(Protocol):
         """The action of a movement (T, D); of a beginning where not finished: how long it will be is unknown."""
 
     def score(self, x: Floats) -> float:
-        """How typical a movement (T, D) is of the action learned: the greater the more."""
+        """How well a movement (T, D) fits the action learned: the greater, the better."""
 
 
 class NotAble:
@@ -113,4 +113,4 @@ class NotAble:
 
     def score(self, x: Floats) -> float:
         """Raises NotImplementedError."""
-        raise NotImplementedError(f"{type(self).__name__} cannot tell the typical from the untypical")
+        raise NotImplementedError(f"{type(self).__name__} detects no outliers")

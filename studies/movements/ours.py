@@ -15,9 +15,9 @@ from studies.movements.method import (
     BEGINNINGS,
     CLASSES,
     FRAMES,
+    OUTLIERS,
     SYNTHESIS,
     THETA,
-    TYPICALITY,
     Estimate,
     Examples,
     Method,
@@ -32,7 +32,7 @@ FLOOR_M = 1e-4
 class Models(NotAble):
     """A parametric HMM per action; with several actions they compete."""
 
-    can = frozenset({SYNTHESIS, THETA, TYPICALITY, CLASSES})
+    can = frozenset({SYNTHESIS, THETA, OUTLIERS, CLASSES})
 
     def __init__(self, make: Callable[[], ParametricHMM]) -> None:
         self.make = make
@@ -61,9 +61,9 @@ class Models(NotAble):
         return self.classifier.classify(x, finished=finished).action
 
     def score(self, x: Floats) -> float:
-        """How little strange the movement is; of models that do not know, the log-likelihood at the likeliest theta."""
+        """Minus the outlier score; of models that have none, the log-likelihood at the likeliest theta."""
         if BEGINNINGS in self.can and isinstance(self.model, PolynomialPHMM):
-            return -self.model.examine(x).strangeness
+            return -self.model.examine(x).outlier_score
         return self.model.estimate(x).log_likelihood
 
 

@@ -12,7 +12,7 @@ from studies.movements.method import Estimate, Examples, Method, NotAble
 
 
 class PerAction(NotAble):
-    """One model per action; the most typical one's name is the answer."""
+    """One model per action; the name of the one that fits best is the answer."""
 
     def __init__(self, make: Callable[[], Method], can: frozenset[str]) -> None:
         self.make = make
@@ -40,7 +40,7 @@ class PerAction(NotAble):
         return self._only().score(x)
 
     def classify(self, x: Floats, finished: bool) -> str:
-        """The action whose model finds the movement most typical."""
+        """The action whose model fits the movement best."""
         scores = {action: model.score(x) for action, model in self.models.items()}
         return max(scores, key=lambda action: scores[action])
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.movements.disturbed import aborted, stopped
 from studies.movements.measures import covered, synthesis_errors, theta_error
-from studies.movements.method import BEGINNINGS, CLASSES, FRAMES, SYNTHESIS, THETA, TYPICALITY, Method
+from studies.movements.method import BEGINNINGS, CLASSES, FRAMES, OUTLIERS, SYNTHESIS, THETA, Method
 from studies.movements.tasks import Fold
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
@@ -21,7 +21,7 @@ Numbers = dict[str, list[float]]
 def able(method: Method, fold: Fold) -> bool:
     """Whether a method can do anything of what a fold asks."""
     if not fold.several_actions:
-        return bool(method.can & {SYNTHESIS, THETA, TYPICALITY})
+        return bool(method.can & {SYNTHESIS, THETA, OUTLIERS})
     return (BEGINNINGS if fold.beginnings else CLASSES) in method.can
 
 
@@ -54,7 +54,7 @@ def _single_action(method: Method, fold: Fold, values: Numbers, seconds: dict[st
             inside = covered(estimate, theta)
             if inside is not None:
                 _add(values, {"covered": inside})
-    if TYPICALITY in method.can:
+    if OUTLIERS in method.can:
         rng = np.random.default_rng(0)
         tests = fold.test.sequences
         for name, movements in (

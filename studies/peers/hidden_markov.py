@@ -9,7 +9,7 @@ from scipy.special import logsumexp
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import FRAMES, OUTLIERS, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library
 
 
@@ -44,7 +44,7 @@ def trained_hmm(sequences: list[Floats], n_states: int) -> Any:
 class GaussianHMM(NotAble):
     """One HMM of an action; knows no parameters."""
 
-    can = frozenset({TYPICALITY})
+    can = frozenset({OUTLIERS})
 
     def __init__(self, *, n_states: int = 20) -> None:
         self.n_states = n_states
@@ -61,7 +61,7 @@ class GaussianHMM(NotAble):
 class CellHMMs(NotAble):
     """One HMM per target (group); theta is the mean over the targets' thetas, weighted by likelihood."""
 
-    can = frozenset({THETA, TYPICALITY})
+    can = frozenset({THETA, OUTLIERS})
 
     def __init__(self, *, n_states: int = 20) -> None:
         self.n_states = n_states

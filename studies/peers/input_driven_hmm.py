@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import FRAMES, OUTLIERS, SYNTHESIS, THETA, Estimate, Examples, NotAble
 from studies.peers.hidden_markov import left_right
 from studies.peers.library import library
 from studies.peers.linear_gaussian import QuadraticFeatures
@@ -81,7 +81,7 @@ class InputDrivenHMM(NotAble):
         floor_m: added to the standard deviation of each coordinate after training, m.
     """
 
-    can = frozenset({SYNTHESIS, THETA, TYPICALITY})
+    can = frozenset({SYNTHESIS, THETA, OUTLIERS})
 
     def __init__(self, *, n_states: int = 20, degree: int = 2, floor_m: float = 0.00316) -> None:
         self.n_states, self.degree, self.floor_m = n_states, degree, floor_m

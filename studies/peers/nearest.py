@@ -8,14 +8,14 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import CLASSES, FRAMES, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import CLASSES, FRAMES, OUTLIERS, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library
 
 
 class NearestByWarping(NotAble):
     """The k nearest training movements: majority of their actions, mean of their parameters."""
 
-    can = frozenset({CLASSES, THETA, TYPICALITY})
+    can = frozenset({CLASSES, THETA, OUTLIERS})
 
     def __init__(self, *, neighbours: int = 1, radius: int | None = None) -> None:
         self.neighbours, self.radius = neighbours, radius

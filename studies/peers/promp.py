@@ -8,7 +8,7 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import FRAMES, OUTLIERS, SYNTHESIS, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library
 from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 
@@ -35,7 +35,7 @@ class ContextualProMP(NotAble):
         warped: whether movements are aligned to a reference first.
     """
 
-    can = frozenset({SYNTHESIS, THETA, TYPICALITY})
+    can = frozenset({SYNTHESIS, THETA, OUTLIERS})
 
     def __init__(self, *, weights: int = 15, degree: int = 2, noise_m: float = 0.01, warped: bool = False) -> None:
         self.weights, self.degree, self.noise_m, self.warped = weights, degree, noise_m, warped

@@ -8,7 +8,7 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.hmm import resample
-from studies.movements.method import FRAMES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import FRAMES, OUTLIERS, SYNTHESIS, THETA, Estimate, Examples, NotAble
 from studies.peers.library import library
 from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 
@@ -22,7 +22,7 @@ class AlignedRidge(NotAble):
     or their covariance by Ledoit and Wolf ("full").
     """
 
-    can = frozenset({SYNTHESIS, THETA, TYPICALITY})
+    can = frozenset({SYNTHESIS, THETA, OUTLIERS})
 
     def __init__(
         self,

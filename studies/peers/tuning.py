@@ -12,7 +12,7 @@ from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, SYNTHESIS, THETA, Estimate, Examples, Method, NotAble
 
 INNER_FOLDS = 3
-MOST_ASKED = 24
+MAX_ASKED = 24
 """About as many movements are asked in an inner fold, evenly chosen: more cost time and change few choices."""
 
 
@@ -82,7 +82,7 @@ def inner_folds(examples: Examples) -> list[tuple[Examples, Examples]]:
     for k in range(count):
         left_out = np.isin(examples.groups, groups[k::count])
         asked = np.flatnonzero(left_out)
-        step = max(1, len(asked) // MOST_ASKED)
+        step = max(1, len(asked) // MAX_ASKED)
         folds.append((examples.chosen(~left_out), examples.chosen(asked[::step])))
     return folds
 

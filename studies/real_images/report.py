@@ -19,7 +19,7 @@ from studies.real_images.experiment import JUDGED, Replay
 from studies.real_images.scores import GOAL_PX, RANGES, middle_of_hand
 
 SHOWN_FRAMES = (0, 7, 20, 34, 42, 46, 50, 60)
-MOST_PX = 250.0
+MAX_PX = 250.0
 OURS, THEIRS = "#2f6fc4", "#c8372d"
 WHAT = (
     "A seated person points to the own right and then slides the stretched arm across the body and up. Pose of the "
@@ -85,7 +85,7 @@ def _over_frames(figure: Figure, replays: Sequence[Replay]) -> None:
         for first, last in RANGES.values():
             axes.axvspan(first - 0.5, last + 0.5, color="#dfe4ea", lw=0, zorder=0)
         axes.axhline(GOAL_PX, color=THEIRS, lw=0.8)
-        axes.set(ylim=(0.0, MOST_PX), ylabel="px", title=case.name)
+        axes.set(ylim=(0.0, MAX_PX), ylabel="px", title=case.name)
     figure.axes[-1].set_xlabel("frame")
 
 

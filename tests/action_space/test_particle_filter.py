@@ -64,7 +64,7 @@ def test_tempering_takes_impossible_particles():
 def test_filter_equals_the_exact_posterior(resample_below):
     """Theta and the carried deviation are linear and Gaussian here: the Kalman filter is exact."""
     toy = KalmanToy(seed=2)
-    filter_ = toy.particle_filter(FilterOptions(30_000, resample_below, least_effective=0.0), seed=5)
+    filter_ = toy.particle_filter(FilterOptions(30_000, resample_below, min_effective=0.0), seed=5)
     for elapsed_s, seen in toy.frames(12):
         filter_.resample()
         filter_.predict(elapsed_s)
@@ -84,7 +84,7 @@ def test_filter_equals_the_exact_posterior(resample_below):
 def test_a_wrong_diffusion_is_noticed():
     """The comparison with the Kalman filter can fail: half the diffusion of theta is far outside its tolerance."""
     toy = KalmanToy(seed=2)
-    filter_ = toy.particle_filter(FilterOptions(30_000, 0.5, least_effective=0.0), seed=5, diffusion_factor=0.5)
+    filter_ = toy.particle_filter(FilterOptions(30_000, 0.5, min_effective=0.0), seed=5, diffusion_factor=0.5)
     worst = 0.0
     for elapsed_s, seen in toy.frames(12):
         filter_.resample()
@@ -130,8 +130,8 @@ def test_options_are_checked():
         FilterOptions(n_particles=1)
     with pytest.raises(InputError, match="evidence_rate_hz"):
         FilterOptions(evidence_rate_hz=0.0)
-    with pytest.raises(InputError, match="least_effective"):
-        FilterOptions(least_effective=1.0)
+    with pytest.raises(InputError, match="min_effective"):
+        FilterOptions(min_effective=1.0)
 
 
 def test_exploring_moves_a_share_anywhere_and_keeps_all_weights(pointing):

@@ -51,7 +51,7 @@ def test_diffusion_of_theta_at_8_hz_is_that_of_figure_6_9():
 @pytest.mark.parametrize("rate_hz", [8.0, 20.0, 50.0])
 def test_a_second_is_the_same_at_any_frame_rate(rate_hz):
     still = {"deviation_renewed": 0.0, "mirrored": 0.0, "from_base": 0.0, "from_prior": 0.0}
-    options = PropagationOptions(pace=0.7, theta_share=0.0, theta_least=0.0, **still)
+    options = PropagationOptions(pace=0.7, theta_share=0.0, theta_min=0.0, **still)
     made = propagation(options, duration_s=4.0, bounds=(-50.0, 50.0))
     particles, rng = particles_at(made, 0.5)
     begun = particles.deviation
@@ -93,7 +93,7 @@ def test_a_known_target_stays_known():
 
 def test_a_narrow_posterior_still_diffuses_a_little():
     """It may be narrow at a wrong place."""
-    options = PropagationOptions(theta_floor=0.2, theta_least=0.0, from_prior=0.0, mirrored=0.0, from_base=0.0)
+    options = PropagationOptions(theta_floor=0.2, theta_min=0.0, from_prior=0.0, mirrored=0.0, from_base=0.0)
     made = propagation(options, duration_s=1e9)
     particles, rng = particles_at(made, 0.3)
     spread = made.predicted(particles, 1.0 / 8.0, rng).theta.std(axis=0)
@@ -147,7 +147,7 @@ def test_shares_that_jump_in_a_second_do_not_depend_on_the_frame_rate():
 
 
 def test_an_unknown_theta_is_drawn_anew_and_a_known_one_is_not():
-    options = PropagationOptions(theta=0.0, theta_least=0.0, mirrored=0.0, from_base=0.0, from_prior=0.2)
+    options = PropagationOptions(theta=0.0, theta_min=0.0, mirrored=0.0, from_base=0.0, from_prior=0.2)
     made = propagation(options, duration_s=1e9)
     particles, rng = particles_at(made, 0.3)
     np.testing.assert_allclose(made.predicted(particles, 1.0 / 8.0, rng).theta, 0.5, rtol=1e-12)
@@ -175,7 +175,7 @@ def test_options_are_checked():
 def retargeting(tau, free=True, **others):
     """Theta after one frame at 8 Hz in which only retargeting moves it; the place matters in the second half alone."""
     still = PropagationOptions(
-        theta=0.0, theta_least=0.0, deviation_renewed=0.0, mirrored=0.0, from_base=0.0, from_prior=0.0, **others
+        theta=0.0, theta_min=0.0, deviation_renewed=0.0, mirrored=0.0, from_base=0.0, from_prior=0.0, **others
     )
     action = toy_action(duration_s=1e9, bounds=(-0.2, 1.2))
     action.__dict__["place_dependence"] = np.array([[0.0, 0.0, 0.0, 1.0, 1.0]])

@@ -49,7 +49,7 @@ def test_a_new_track_learns_what_is_usual_first():
 
 
 def test_an_absolute_level_needs_no_learning():
-    options = HealthOptions(least_log_likelihood=-20.0)
+    options = HealthOptions(min_log_likelihood=-20.0)
     assert followed(levels(8.0, (2.0, -50.0)), 8.0, options)[1].any()
 
 

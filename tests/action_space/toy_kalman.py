@@ -37,7 +37,7 @@ class KalmanToy:
 
     def particle_filter(self, options, seed, diffusion_factor=1.0):
         propagation = PropagationOptions(
-            pace=0.0, theta=DIFFUSION * diffusion_factor, theta_decay=0.0, theta_share=0.0, theta_least=0.0,
+            pace=0.0, theta=DIFFUSION * diffusion_factor, theta_decay=0.0, theta_share=0.0, theta_min=0.0,
             deviation_memory_s=MEMORY_S, deviation_renewed=0.0, mirrored=0.0, from_base=0.0, from_prior=0.0
         )  # fmt: skip
         made = ParticleFilter(Propagation(Vocabulary([self.action]), Grammar.loop("toy"), propagation), options, seed)

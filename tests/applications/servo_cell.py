@@ -66,10 +66,10 @@ class ServoCell:
                 self._play(message)
         return self
 
-    def run(self, most: int = 400) -> ServoCell:
+    def run(self, maximum: int = 400) -> ServoCell:
         """Until the tasks are done or have failed."""
         while not (self.task.finished or self.task.failure):
-            assert self._number < most, self.task.sentence
+            assert self._number < maximum, self.task.sentence
             self.tick()
         return self
 
@@ -83,7 +83,7 @@ class ServoCell:
         if TrajectoryStatus.STATE_SUCCEEDED in self.answers:
             self.angles = np.array(message.points[-1].position_rad)
 
-    def _hear(self, topic: topics.Topic, message: Any, hear: Any) -> None:
+    def _hear(self, topic: topics.Topic, message: Any, handle: Any) -> None:
         now_ns = self._number * PERIOD_NS
         self.events.append(Received(topic, message, now_ns, now_ns, self._number))
-        hear(message)
+        handle(message)

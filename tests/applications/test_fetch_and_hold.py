@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from paramove.applications.relocator_options import RelocatorOptions
-from paramove.motion.clear_plans import LEAST_CLEARANCE, ClearPlans
+from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory
 from tests.motion.fake_driver import FAILED, OFFER, PLACE, REFUSED, SUCCEEDED, Cell, FakeDriver, goal
@@ -81,7 +81,7 @@ def test_a_held_object_goes_over_what_stands_in_the_way() -> None:
     straight = planner().hold(start, place)
     over = ClearPlans(planner(), check).hold(start, place, standing)
     near, far = (check.smallest(one.angles, middle, one.holding, every=6).distance for one in (straight, over))
-    assert near < 0.0 < LEAST_CLEARANCE <= far
+    assert near < 0.0 < MIN_CLEARANCE <= far
     np.testing.assert_allclose(over.gripper[-1], place, rtol=0, atol=1e-6)
     assert over.holding.all()
 

@@ -19,7 +19,7 @@ def said(**joints: float) -> JointStates:
 def heard(angles: list[float], other: float = 0.5) -> SettledJoints:
     settled = SettledJoints(("a", "b"))
     for number, angle in enumerate(angles):
-        settled.hear(said(b=other, a=angle, c=9.0), number * PERIOD_NS)
+        settled.handle(said(b=other, a=angle, c=9.0), number * PERIOD_NS)
     return settled
 
 
@@ -38,6 +38,6 @@ def test_tells_nothing_too_early_while_moving_or_when_stale() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_what_is_no_angle_counts_for_nothing(bad: float) -> None:
     settled = heard([0.2] * 8)
-    settled.hear(said(a=bad, b=0.5), 8 * PERIOD_NS)
-    settled.hear(said(a=0.7), 8 * PERIOD_NS)
+    settled.handle(said(a=bad, b=0.5), 8 * PERIOD_NS)
+    settled.handle(said(a=0.7), 8 * PERIOD_NS)
     np.testing.assert_allclose(settled.settled(8 * PERIOD_NS), [0.2, 0.5], rtol=0, atol=1e-12)

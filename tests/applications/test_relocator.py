@@ -201,7 +201,7 @@ def test_a_goal_that_nobody_hears_is_sent_again():
     assert [goal.id for goal in said] == ["run-1", "run-1"]
 
 
-@pytest.mark.parametrize("wrong", [{"places": 0}, {"least_certainty": 1.5}, {"ask_again_s": 0}, {"corners": []}])
+@pytest.mark.parametrize("wrong", [{"places": 0}, {"min_certainty": 1.5}, {"ask_again_s": 0}, {"corners": []}])
 def test_parameters_that_make_no_sense_are_refused(wrong):
     with pytest.raises(ValidationError):
         RelocatorOptions(**wrong)

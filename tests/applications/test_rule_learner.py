@@ -467,13 +467,13 @@ def test_an_arm_that_was_never_armed_is_waited_for() -> None:
 def test_a_refusal_while_calibrating_is_no_loop(refused: str, words: str) -> None:
     """A person is asked for help, and the same is tried again only after a while."""
     story = Story()
-    hear = story._hear
+    handle = story._hear
 
     def refusing(goal: RelocationGoal) -> None:
         if goal.kind == RelocationGoal.Kind.Value(f"KIND_{refused}"):
             story._say(goal.id, REFUSED, "too far")
         else:
-            hear(goal)
+            handle(goal)
 
     story._hear = refusing
     story.answers[Speech.REQUEST_HELP] = lambda _: None
@@ -481,5 +481,5 @@ def test_a_refusal_while_calibrating_is_no_loop(refused: str, words: str) -> Non
     assert words in story.sentences()
     assert 1 <= story.requests().count("HELP") <= 3
     assert kinds(story).count(refused) <= 3
-    story._hear = hear
+    story._hear = handle
     assert story.run(), story.learner.sentence

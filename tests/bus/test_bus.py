@@ -91,7 +91,7 @@ def test_ticks_come_without_messages(listener: Bus) -> None:
 
 
 def test_an_unknown_topic_is_refused_with_what_to_do(speaker: Bus, listener: Bus) -> None:
-    with pytest.raises(KeyError, match=r"recognizer does not say speech.*Add the topic to PUBLISHES"):
+    with pytest.raises(KeyError, match=r"recognizer does not publish speech; add the topic to PUBLISHES"):
         speaker.publish(topics.SPEECH, topics.SPEECH.type())
     with pytest.raises(KeyError, match="add the topic to SUBSCRIBES"):
         next(listener.events(topics.SPEECH))
@@ -103,7 +103,7 @@ def test_status_is_said_at_once_and_carries_exact_counts(speaker: Bus, listener:
     status = topics.status("recognizer")
     heard = next(item for item in listener.events(status) if item.message.state == NodeStatus.STATE_READY)
     assert (heard.message.sentence, heard.message.pid) == ("recognising", os.getpid())
-    assert {count.topic: count.messages for count in heard.message.said}["gestures"] == 1
+    assert {count.topic: count.messages for count in heard.message.published}["gestures"] == 1
 
 
 def test_status_is_said_every_second_while_waiting(speaker: Bus, listener: Bus, wait: Wait) -> None:

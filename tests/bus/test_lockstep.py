@@ -155,7 +155,7 @@ def test_a_stopped_process_makes_time_wait_and_is_named(
 def test_only_the_bus_that_says_the_clock_sets_the_time(folder: Path) -> None:
     with (
         Bus("node", BusSettings(folder=folder, clock="simulated")) as bus,
-        pytest.raises(RuntimeError, match="does not say clock"),
+        pytest.raises(RuntimeError, match="does not publish clock"),
     ):
         bus.keep_time(1)
     with _simulator(folder, ()) as bus:

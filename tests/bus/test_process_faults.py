@@ -148,8 +148,8 @@ def test_an_endpoint_is_not_stolen_even_if_its_socket_file_was_removed(context: 
     publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
     socket_path(folder, "gestures").unlink()
     result = subprocess.run([sys.executable, "-c", _STEALS, str(folder)], capture_output=True, text=True, timeout=60)
-    assert "gestures is already said by pid" in result.stdout
-    assert "(recognizer); a topic has one speaker" in result.stdout
+    assert "gestures is already published by pid" in result.stdout
+    assert "(recognizer); a topic has one publisher" in result.stdout
     with pytest.raises(TopicTakenError):
         Publisher(context, folder, topics.GESTURES, "thief")
     publisher.close()

@@ -110,7 +110,7 @@ def test_a_restarted_publisher_is_no_loss(folder: Path, context: Context, wait: 
 
 def test_a_second_publisher_is_refused_and_told_who_was_first(context: Context, folder: Path, wait: Wait) -> None:
     publisher = Publisher(context, folder, topics.GESTURES, "recognizer")
-    with pytest.raises(TopicTakenError, match=rf"gestures is already said by pid {os.getpid()} \(recognizer\)"):
+    with pytest.raises(TopicTakenError, match=rf"gestures is already published by pid {os.getpid()} \(recognizer\)"):
         Publisher(context, folder, topics.GESTURES, "impostor")
     subscriber = Subscriber(context, folder, topics.GESTURES)
     _connect(publisher, subscriber, wait)

@@ -140,10 +140,10 @@ def test_it_loses_its_own_messages_only_and_counts_them_exactly(
 def test_images_for_a_stopped_listener_do_not_pile_up_in_the_speaker(
     context: Context, folder: Path, listen: Listen, wait: Wait
 ) -> None:
-    publisher = Publisher(context, folder, topics.CAMERA_LIGHT, "simulator")
-    listener = listen(topics.CAMERA_LIGHT, 10**9)
+    publisher = Publisher(context, folder, topics.CAMERA_IMAGE_RAW, "simulator")
+    listener = listen(topics.CAMERA_IMAGE_RAW, 10**9)
     wait(listener.has_told, publisher.serve)
-    image = topics.CAMERA_LIGHT.type(data=b"\1" * 1_000_000)
+    image = topics.CAMERA_IMAGE_RAW.type(data=b"\1" * 1_000_000)
     publisher.publish(image, 0, 0)
     listener.stop()
     before = psutil.Process().memory_info().rss

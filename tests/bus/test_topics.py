@@ -17,7 +17,7 @@ def test_names_are_unique_and_well_formed() -> None:
     assert all(name == name.lower() and " " not in name and "." not in name for name in names)
 
 
-def test_truth_and_raw_light_are_never_recorded() -> None:
+def test_truth_is_never_recorded() -> None:
     assert {topic.name for topic in topics.TOPICS if topic.truth} == {
         "truth/layout",
         "truth/state",
@@ -61,3 +61,12 @@ def test_only_topics_whose_rate_is_of_the_bus_clock_have_a_budget() -> None:
     without = {topic.name for topic in topics.TOPICS if topic.rate_hz and not topic.budget_hz}
     assert without == {"clock"}
     assert topics.status("camera").budget_hz is None
+
+
+@pytest.mark.filterwarnings("ignore:topics.*LIGHT:FutureWarning")
+def test_a_renamed_topic_is_known_by_its_name_before() -> None:
+    assert topics.by_name("camera_2/light") is topics.CAMERA_IMAGES_RAW[1]
+    assert topics.CAMERA_LIGHT is topics.CAMERA_IMAGE_RAW
+    assert topics.CAMERA_LIGHTS is topics.CAMERA_IMAGES_RAW
+    with pytest.raises(AttributeError, match="CAMERA_DARK"):
+        topics.CAMERA_DARK  # noqa: B018

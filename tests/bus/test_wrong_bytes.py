@@ -189,6 +189,6 @@ def test_two_speakers_seen_on_the_wire_raise_an_alarm(gestures: Pair, caplog: py
     gestures.speaker.epoch = 1
     gestures.speaker.say(GOOD)
     gestures.refused(Reason.EPOCH)
-    assert re.search("two speakers: epoch 1 speaks on after epoch 2 .* End the other process", caplog.text)
+    assert re.search("two publishers: epoch 1 still publishes after epoch 2 .* End the other process", caplog.text)
     gestures.speaker.epoch = 2
     assert gestures.hears_the_next(GOOD)

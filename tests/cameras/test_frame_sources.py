@@ -140,9 +140,9 @@ def test_an_ordinary_file_is_no_camera(tmp_path: Path) -> None:
 
 
 def test_a_topic_gives_frames_with_messages_only() -> None:
-    source = open_source("topic:camera/light", 480, 360)
+    source = open_source("topic:camera/image_raw", 480, 360)
     assert isinstance(source, TopicFrames)
-    assert source.hears_light
+    assert source.from_topic
     assert source.frame(0) is None
     source.close()
 
@@ -238,7 +238,7 @@ def test_a_topic_that_falls_silent_is_told_until_it_speaks_again() -> None:
     raw = RawImage(encoding="bgr8", width=2, height=2, step=6, data=bytes(12))
     assert source.frame(0, raw) is not None
     assert source.frame(SECOND) is None
-    with pytest.raises(FrameError, match="no image on camera/light"):
+    with pytest.raises(FrameError, match="no image on camera/image_raw"):
         source.frame(SECOND + 1)
     assert source.frame(2 * SECOND, raw) is not None
     assert source.frame(2 * SECOND + 1) is None

@@ -72,12 +72,12 @@ def test_without_a_bus_the_commands_say_so(run: Run) -> None:
 
 def test_list_shows_who_says_what(run: Run, speaking: Path) -> None:
     rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
-    assert rows["gestures"]["said by"] == f"pid {os.getpid()} (recognizer)"
-    assert rows["camera/image"]["said by"] == "silent"
+    assert rows["gestures"]["publisher"] == f"pid {os.getpid()} (recognizer)"
+    assert rows["camera/image"]["publisher"] == rows["camera/image"]["said by"] == "none"
     assert rows["status/recognizer"]["type"] == "paramove.msgs.NodeStatus"
     assert not any(name.startswith("truth/") for name in rows)
     text = run("topic", "list").output.splitlines()
-    assert text[0].split() == ["topic", "type", "rate_hz", "profile", "recorded", "said", "by"]
+    assert text[0].split() == ["topic", "type", "rate_hz", "profile", "recorded", "publisher"]
     assert any(line.startswith("gestures ") and "(recognizer)" in line for line in text)
 
 
@@ -86,7 +86,7 @@ def test_info_shows_what_was_said(run: Run, speaking: Path) -> None:
     assert (row["alive"], row["answers"], row["said so far"]) == (True, True, 1)
     lines = [line.split() for line in run("topic", "info", "calibration/plane").output.splitlines()]
     assert ["frame", "right_shoulder"] in lines
-    assert ["said", "by", "silent"] in lines
+    assert ["publisher", "none"] in lines
     wrong = run("topic", "info", "camera/imgae")
     assert wrong.exit_code == 2
     assert "camera/image" in wrong.output
@@ -103,7 +103,7 @@ def test_echo_prints_messages_and_ends(run: Run, speaking: Path) -> None:
 def test_echo_of_a_silent_topic_ends_and_says_so(run: Run, speaking: Path) -> None:
     result = run("topic", "echo", "speech", "--seconds", "0.2")
     assert result.exit_code == 1
-    assert "speech: silent, nobody says it within 0.2 s" in result.output
+    assert "speech: no publisher within 0.2 s" in result.output
 
 
 def test_hz_measures_rate_and_size(run: Run, speaking: Path) -> None:
@@ -111,11 +111,11 @@ def test_hz_measures_rate_and_size(run: Run, speaking: Path) -> None:
     assert set(rows) == {"gestures", "rules", "status/recognizer"}
     gestures = rows["gestures"]
     assert 5 < gestures["rate_hz"] < 20
-    assert (gestures["lost"], gestures["refused"], gestures["state"]) == (0, 0, "said")
+    assert (gestures["lost"], gestures["refused"], gestures["state"]) == (0, 0, "published")
     assert gestures["mean_bytes"] == Gesture(object="red").ByteSize()
     assert rows["rules"]["messages"] == 1
     silent = json.loads(run("topic", "hz", "speech", "--seconds", "0.1", "--json").output)[0]
-    assert (silent["state"], silent["messages"]) == ("silent", 0)
+    assert (silent["state"], silent["messages"]) == ("no publisher", 0)
 
 
 def test_a_dead_and_a_busy_speaker_are_shown_as_such(run: Run, speaking: Path) -> None:
@@ -135,10 +135,10 @@ def test_a_dead_and_a_busy_speaker_are_shown_as_such(run: Run, speaking: Path) -
         started[0].kill()
         started[0].wait()
         rows = {row["topic"]: row for row in json.loads(run("topic", "list", "--json").output)}
-        assert rows["speech"]["said by"] == "silent"
-        assert rows["clock"]["said by"] == f"pid {started[1].pid} (busy)"
+        assert rows["speech"]["publisher"] == "none"
+        assert rows["clock"]["publisher"] == f"pid {started[1].pid} (busy)"
         hz = json.loads(run("topic", "hz", "clock", "--seconds", "0.2", "--json").output)[0]
-        assert hz["state"] == "does not answer"
+        assert hz["state"] == "not responding"
         nodes = {row["node"]: row for row in json.loads(run("node", "list", "--seconds", "0.5", "--json").output)}
         assert set(nodes) == {"recognizer", "busy"}
         assert nodes["busy"]["state"] == "busy"
@@ -161,7 +161,7 @@ def test_long_bytes_and_enums_are_readable() -> None:
     gesture = Gesture(kind=Gesture.KIND_MOVED, x=float("nan"))
     gesture.captured.FromNanoseconds(2_000_000_003)
     assert readable(gesture) == {"captured": {"seconds": 2, "nanos": 3}, "kind": "KIND_MOVED", "x": "nan"}
-    assert readable(topics.CLOCK.type(said=[{"topic": "a"}])) == {"said": [{"topic": "a"}]}
+    assert readable(topics.CLOCK.type(published=[{"topic": "a"}])) == {"published": [{"topic": "a"}]}
 
 
 def test_only_the_called_command_is_imported() -> None:

@@ -100,11 +100,11 @@ def messages() -> list[tuple[Topic, Any]]:
         ),
         (topics.ARM_JOINT_STATES, joints),
         (topics.ARM_SAFETY, safety()),
-        (topics.status("camera"), status("camera", sentence="frames from topic:camera/light")),
+        (topics.status("camera"), status("camera", sentence="frames from topic:camera/image_raw")),
         (
             topics.status("recognizer"),
             status(
-                "recognizer", NodeStatus.STATE_DEGRADED, "calibration refused", heard=[TopicCount(topic="x", lost=3)]
+                "recognizer", NodeStatus.STATE_DEGRADED, "calibration refused", received=[TopicCount(topic="x", lost=3)]
             ),
         ),
     ]

@@ -30,7 +30,7 @@ NOW_NS = 2_000_000_000
 def picture(*said: tuple[Topic, Any]) -> LivePicture:
     made = LivePicture(HOAP3, "a title", Surface(), wall_s=lambda: 10.0)
     for message in scene.heard(list(said)):
-        made.hear(message)
+        made.handle(message)
     return made
 
 
@@ -185,9 +185,9 @@ def test_the_robots_gripper_is_where_its_kinematics_say() -> None:
 
 def test_nodes_and_their_restarts() -> None:
     table = NodeTable()
-    table.hear(scene.status("camera", processed=10, processing_seconds=0.1), 1.0)
-    table.hear(scene.status("camera", processed=30, processing_seconds=0.3), 2.0)
-    table.hear(scene.status("arm_driver", NodeStatus.STATE_FAILED, "it broke"), 2.0)
+    table.handle(scene.status("camera", processed=10, processing_seconds=0.1), 1.0)
+    table.handle(scene.status("camera", processed=30, processing_seconds=0.3), 2.0)
+    table.handle(scene.status("arm_driver", NodeStatus.STATE_FAILED, "it broke"), 2.0)
     driver, camera = table.section(5.2)
     assert (camera["ms"], camera["restarts"], camera["silent_s"]) == (10.0, 0, 3)
     assert (driver["name"], driver["state"], driver["sentence"], driver["ms"]) == (
@@ -196,6 +196,6 @@ def test_nodes_and_their_restarts() -> None:
         "it broke",
         None,
     )
-    table.hear(scene.status("camera", processed=2, pid=8), 6.0)
+    table.handle(scene.status("camera", processed=2, pid=8), 6.0)
     assert table.section(6.0)[1]["restarts"] == 1
     assert table.section(6.0)[1]["ms"] == 10.0

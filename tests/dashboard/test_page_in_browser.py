@@ -66,8 +66,8 @@ class Run:
         with self._lock:
             self._number += 1
             for heard in scene.heard(list(said), self._number * 1_000_000_000):
-                self.picture.hear(heard)
-                self.button.hear(heard)
+                self.picture.handle(heard)
+                self.button.handle(heard)
             self._show()
 
     def _show(self) -> None:
@@ -149,7 +149,7 @@ def test_all_that_a_person_wants_to_know_is_on_the_page(run: Run, browser: Brows
         "in an opening",
         "2 of 3 learned",
         "calibration refused",
-        "frames from topic:camera/light",
+        "frames from topic:camera/image_raw",
     ):
         assert words in text, words
     assert browser.run("document.querySelector('#stages .now').textContent") == "Apply"

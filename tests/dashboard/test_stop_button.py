@@ -28,7 +28,7 @@ class Rig:
 
     def gate(self, state: SafetyState.State, code: str | None, at_ns: int) -> None:
         faults = [SafetyFault(code=code, sentence=SENTENCE)] if code else []
-        self.button.hear(Received(topics.ARM_SAFETY, SafetyState(state=state, faults=faults), at_ns, at_ns, 1))
+        self.button.handle(Received(topics.ARM_SAFETY, SafetyState(state=state, faults=faults), at_ns, at_ns, 1))
 
 
 def test_not_pressed_says_nothing() -> None:

@@ -59,7 +59,7 @@ class Hands:
                 select.select([], [], [], 0.005)  # nobody turns a joint in no time: it is believed after a while
             _, angles = measured
             self.now_ns += PERIOD_NS
-            teacher.hear(self.now_ns, angles)
+            teacher.handle(self.now_ns, angles)
 
     def teach(self, teacher, target):
         self.lead(teacher, way(target)[:1])

@@ -75,7 +75,7 @@ def test_a_slow_drift_before_the_movement_is_not_its_begin():
 
 def test_what_never_moves_is_refused_with_its_speed():
     still = replace(movement(source="a.mcap"), positions=0.1 * movement().positions)
-    with pytest.raises(DemonstrationError, match=r"a.mcap: index never exceeds 15 cm/s \(its greatest speed is 8"):
+    with pytest.raises(DemonstrationError, match=r"a.mcap: index never exceeds 15 cm/s \(its largest speed is 8"):
         timing.onset(still)
     with pytest.raises(DemonstrationError, match="there is no point 'thumb'; there are sternum, shoulder"):
         timing.onset(movement(), "thumb")

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ConfigDict, ValidationError
 
-from paramove.documents import OldNames
+from paramove.documents import OldNames, renamed_attribute
 
 
 class Waiting(OldNames):
@@ -28,6 +28,15 @@ def test_an_old_name_within_a_field(caplog):
     assert Waiting.model_validate({"limits": {"patience_s": 3.0}}).limits == {"timeout_s": 3.0}
     assert "limits.patience_s is called limits.timeout_s" in caplog.text
     assert Waiting.model_validate({"limits": {}}).limits == {}
+
+
+def test_an_attribute_is_read_by_its_old_name_with_a_warning():
+    class Examined:
+        p_value = 0.5
+        typicality = renamed_attribute("typicality", "p_value")
+
+    with pytest.warns(DeprecationWarning, match=r"Examined\.typicality is called p_value"):
+        assert Examined().typicality == 0.5
 
 
 def test_both_at_once_are_refused():

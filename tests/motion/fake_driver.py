@@ -105,7 +105,7 @@ class FakeDriver:
     def at_base(self) -> bool:
         return bool(np.abs(self.angles - HOAP3.base_pose[JOINTS]).max() < np.deg2rad(2.0))
 
-    def hear(self, trajectory: JointTrajectory) -> Iterator[TrajectoryStatus]:
+    def handle(self, trajectory: JointTrajectory) -> Iterator[TrajectoryStatus]:
         trajectory = JointTrajectory.FromString(trajectory.SerializeToString())
         self.heard.append(trajectory)
         if self.deaf:
@@ -209,7 +209,7 @@ class Cell:
         self.events.append(Tick(len(self.events), self.now_ns))
         output = self.synthesizer.tick(self.now_ns)
         self.statuses.extend(output.statuses)
-        answers = [status for trajectory in output.trajectories for status in self.driver.hear(trajectory)]
+        answers = [status for trajectory in output.trajectories for status in self.driver.handle(trajectory)]
         answers.extend(self.driver.step())
         self.feel()
         for answer in answers:

@@ -218,11 +218,11 @@ def test_what_cannot_be_reached_is_refused_with_the_reason(gripper: tuple[float,
 
 
 def test_reach_is_that_of_the_arm_with_its_elbow_at_the_limits() -> None:
-    least, greatest = solver().reach
+    minimum, maximum = solver().reach
     q = np.tile(np.deg2rad([90.0, -30.0, 0.0, 0.0, 0.0]), (2, 1))
     q[:, 3] = [LOWER[3], 0.0]
     distance = np.linalg.norm(ARM.kinematics.forward(q).gripper, axis=1)
-    np.testing.assert_allclose([least, greatest], distance, rtol=0, atol=2e-3)  # 0.3 deg of margin, offset aside
+    np.testing.assert_allclose([minimum, maximum], distance, rtol=0, atol=2e-3)  # 0.3 deg of margin, offset aside
     np.testing.assert_allclose(solver().length, 0.243, rtol=0, atol=1e-12)
 
 
@@ -250,15 +250,15 @@ def test_the_closed_form_says_by_how_much_it_breaks_limits(seed: int) -> None:
 
 
 def test_points_too_near_are_moved_straight_outward_and_others_stay() -> None:
-    least, margin, width = solver().reach[0], 0.002, 0.012
+    minimum, margin, width = solver().reach[0], 0.002, 0.012
     line = np.array([0.6, -0.48, -0.64])
     distances = np.linspace(0.08, 0.24, 60)
     moved = solver().moved_outward(distances[:, None] * line, margin, width)
     found = np.linalg.norm(moved, axis=1)
     np.testing.assert_allclose(moved, found[:, None] * line, rtol=0, atol=1e-12)
-    assert found.min() >= least + margin - 1e-12
+    assert found.min() >= minimum + margin - 1e-12
     assert (np.diff(found) >= -1e-12).all()
-    far = distances >= least + margin + width
+    far = distances >= minimum + margin + width
     np.testing.assert_allclose(found[far], distances[far], rtol=0, atol=1e-12)
 
 

@@ -38,7 +38,7 @@ class PlayedArm:
         self._dofs = [model.joint(name).dofadr[0] for name in plan.joints]
         self._motors = [model.actuator(name).id for name in plan.joints]
         stall = model.actuator_ctrlrange[self._motors, 1]
-        self._most = stall * [*np.ones(len(stall) - 1), GRIPPER_SHARE]
+        self._maximum = stall * [*np.ones(len(stall) - 1), GRIPPER_SHARE]
         self._stiffness, self._damping = STIFFNESS * stall, DAMPING * stall
         self.largest_miss = np.zeros(len(stall) - 1)
 
@@ -51,7 +51,7 @@ class PlayedArm:
             for step in range(steps):
                 away = here + step / steps * (there - here) - data.qpos[self._qpos]
                 torque = self._stiffness * away + self._damping * (speed - data.qvel[self._dofs])
-                data.ctrl[self._motors] = np.clip(torque, -self._most, self._most)
+                data.ctrl[self._motors] = np.clip(torque, -self._maximum, self._maximum)
                 mujoco.mj_step(model, data)
             self.largest_miss = np.maximum(self.largest_miss, np.abs(there - data.qpos[self._qpos])[:-1])
 

@@ -254,4 +254,4 @@ def test_only_so_many_goals_are_remembered() -> None:
     cell = Cell()
     for number in range(REMEMBERED_GOALS + 5):
         cell.do(goal(RelocationGoal.KIND_REST, f"rest-{number}"))
-    assert len(cell.synthesizer._newest) == REMEMBERED_GOALS
+    assert len(cell.synthesizer._latest) == REMEMBERED_GOALS

@@ -14,6 +14,14 @@ from tests.msgs.released import FOLDER, classes_of, is_repeated, present_schemas
 
 RELEASES = sorted(path for path in FOLDER.iterdir() if path.is_dir())
 MESSAGES = [(path.parent.name, path) for release in RELEASES for path in sorted(release.glob("*.*.binpb"))]
+RENAMED = {
+    ("paramove.msgs.Clock", "said"): "published",
+    ("paramove.msgs.TickDone", "said"): "published",
+    ("paramove.msgs.NodeStatus", "said"): "published",
+    ("paramove.msgs.NodeStatus", "heard"): "received",
+    ("paramove.msgs.Motor", "heard"): "responding",
+}
+"""Fields with another name and the same number, type and meaning, which are all that travels: message and old name."""
 PRESENT = {str(kind.DESCRIPTOR.full_name): kind for kind in present_types()}
 
 
@@ -22,14 +30,20 @@ def released_class(version: str, name: str) -> Any:
     return classes_of(descriptor_pb2.FileDescriptorSet.FromString(content))[name]
 
 
+def name_of(field: Any) -> str:
+    """The name that a field of any release has now."""
+    return RENAMED.get((field.containing_type.full_name, field.name), str(field.name))
+
+
 def values(message: Any) -> dict[str, Any]:
     """Field by name -> value, within all levels; of fields that are set."""
     found: dict[str, Any] = {}
     for field, value in message.ListFields():
+        name = name_of(field)
         if field.message_type is None:
-            found[field.name] = list(value) if is_repeated(field) else value
+            found[name] = list(value) if is_repeated(field) else value
         else:
-            found[field.name] = [values(part) for part in value] if is_repeated(field) else values(value)
+            found[name] = [values(part) for part in value] if is_repeated(field) else values(value)
     return found
 
 
@@ -46,7 +60,7 @@ def types_within(descriptor: Any, seen: set[str] | None = None) -> Iterator[Any]
 def meaning(field: Any) -> tuple[Any, ...]:
     """What both sides must agree on: enum and 32-bit integer are one on the wire, but not to a reader."""
     inner = field.message_type or field.enum_type
-    return field.name, field.type, is_repeated(field), inner.full_name if inner else ""
+    return name_of(field), field.type, is_repeated(field), inner.full_name if inner else ""
 
 
 def incompatible(old: Any, new: Any) -> list[str]:

@@ -27,7 +27,7 @@ class Outcome:
     gestures: list[Any]
 
 
-def light(image: Image, time_ns: int) -> RawImage:
+def image_raw(image: Image, time_ns: int) -> RawImage:
     height, width = image.shape[:2]
     message = RawImage(encoding="bgr8", width=width, height=height, step=3 * width, data=image.tobytes())
     message.timestamp.FromNanoseconds(time_ns)
@@ -47,23 +47,27 @@ def through_the_chain(
     states, images = [], []
     height, width = next(image for image in streams[0] if image is not None).shape[:2]
     for stream, topic in zip(streams, topics.CAMERA_IMAGES, strict=False):
-        lights = []
+        images_raw = []
         for image, time_s in zip(stream, times_s, strict=True):
             time_ns = round(time_s * 1e9) + 1
             if image is not None:
-                lights.append(Received(topics.CAMERA_LIGHT, light(image, time_ns), time_ns, time_ns, len(lights) + 1))
-        bus = RecordedBus(lights)
+                images_raw.append(
+                    Received(topics.CAMERA_IMAGE_RAW, image_raw(image, time_ns), time_ns, time_ns, len(images_raw) + 1)
+                )
+        bus = RecordedBus(images_raw)
         camera.run(bus, camera.Config(width=width, height=height))
         states.append(bus.states)
-        images += heard(bus.said, topic)
+        images += heard(bus.published, topic)
     images.sort(key=lambda one: one.captured_ns)
     end_ns = round(times_s[-1] * 1e9) + 1
-    nobody = Received(topics.CAMERA_LIGHT, RawImage(), end_ns, end_ns, 1)  # time goes on when no camera gives images
+    nobody = Received(
+        topics.CAMERA_IMAGE_RAW, RawImage(), end_ns, end_ns, 1
+    )  # time goes on when no camera gives images
     tracking = RecordedBus(with_ticks([*images, nobody]))
     action_tracker.run(tracking, config)
-    estimates = [one for one in tracking.said if one.topic is topics.ACTION_ESTIMATE]
+    estimates = [one for one in tracking.published if one.topic is topics.ACTION_ESTIMATE]
     recognizing = RecordedBus(heard(estimates, topics.ACTION_ESTIMATE))
     recognizer.run(recognizing, recognizer.Config())
     return Outcome(
-        states, tracking.states, [one.message for one in estimates], [one.message for one in recognizing.said]
+        states, tracking.states, [one.message for one in estimates], [one.message for one in recognizing.published]
     )

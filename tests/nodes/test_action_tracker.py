@@ -30,20 +30,20 @@ def test_says_estimate_pose_outline_and_ball_of_each_image(config):
     times, poses = pointing((0.5, 0.5))
     bus = RecordedBus(heard(drawn(poses, camera(1)), times))
     action_tracker.run(bus, config)
-    assert [one.topic for one in bus.said[:4]] == list(action_tracker.PUBLISHES)
-    assert len(bus.said) == 4 * len(times)
-    estimates = [one.message for one in bus.said[::4]]
+    assert [one.topic for one in bus.published[:4]] == list(action_tracker.PUBLISHES)
+    assert len(bus.published) == 4 * len(times)
+    estimates = [one.message for one in bus.published[::4]]
     assert estimates[0].actions[0].action == "pointing"
     assert sum(action.probability for action in estimates[10].actions) == pytest.approx(1.0)
     assert sum(estimates[10].progress) == pytest.approx(1.0)
     assert estimates[-1].HasField("target")
     found = estimates[-1].target.location
     assert np.hypot(*(np.array([found.x, found.y]) - table_place((0.5, 0.5))[:2])) < 0.12  # one camera: depth is weak
-    pose = bus.said[1].message
+    pose = bus.published[1].message
     assert [point.name for point in pose.points] == ["shoulder", "elbow", "index"]
-    outline = bus.said[2].message.points[0].points
+    outline = bus.published[2].message.points[0].points
     assert len(outline) > 20
-    ball = bus.said[3].message.entities[0].spheres[0]
+    ball = bus.published[3].message.entities[0].spheres[0]
     assert ball.color.r > 0.5  # nothing is known yet
     assert [state for state, _ in bus.states] == ["ready"]
 
@@ -66,8 +66,8 @@ def test_places_are_told_in_the_frame_that_is_asked_for(config):
         placed = config.model_copy(update={"table_place": TablePlace(frame=name, **place)})
         bus = RecordedBus(heard(images, times[:6]))
         action_tracker.run(bus, placed)
-        said[name] = [one.message for one in bus.said if one.topic is topics.ACTION_ESTIMATE]
-        assert bus.said[3].message.entities[0].frame_id == name
+        said[name] = [one.message for one in bus.published if one.topic is topics.ACTION_ESTIMATE]
+        assert bus.published[3].message.entities[0].frame_id == name
     for table, shoulder in zip(said["table"], said["right_shoulder"], strict=True):
         assert (table.frame, shoulder.frame) == ("table", "right_shoulder")
         for there, here in ((table.hand, shoulder.hand), (table.pointed, shoulder.pointed)):
@@ -80,10 +80,10 @@ def test_places_are_told_in_the_frame_that_is_asked_for(config):
 def test_what_is_worse_than_asked_for_is_lost_and_points_at_nothing(config):
     """However used the track is to it: nothing is ever better here than what is asked for."""
     times, poses = pointing((0.5, 0.5))
-    strict = config.model_copy(update={"least_log_likelihood": 1e6})
+    strict = config.model_copy(update={"min_log_likelihood": 1e6})
     bus = RecordedBus(heard(drawn(poses, camera(1)), times))
     action_tracker.run(bus, strict)
-    estimates = [one.message for one in bus.said if one.topic is topics.ACTION_ESTIMATE]
+    estimates = [one.message for one in bus.published if one.topic is topics.ACTION_ESTIMATE]
     assert all(estimate.lost for estimate in estimates[20:])
     assert not any(estimate.HasField("target") for estimate in estimates)
     assert [state for state, _ in bus.states] == ["ready", "degraded"]
@@ -93,4 +93,4 @@ def test_a_camera_that_is_not_calibrated_is_passed_over(config):
     times, poses = pointing()
     bus = RecordedBus(heard(drawn(poses[:3], camera(1)), times[:3], topics.CAMERA_IMAGES[2]))
     action_tracker.run(bus, config)
-    assert bus.said == []
+    assert bus.published == []

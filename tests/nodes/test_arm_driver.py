@@ -34,28 +34,28 @@ def replayed(ticks: int, more: dict[int, list], until_state: int | None = None) 
 
 
 def states(bus: RecordedBus) -> list[int]:
-    return [said.message.state for said in bus.said_on(topics.ARM_SAFETY)]
+    return [said.message.state for said in bus.published_on(topics.ARM_SAFETY)]
 
 
 def test_says_joints_and_safety_once_a_tick() -> None:
     bus = replayed(20, {})
-    joints = bus.said_on(topics.ARM_JOINT_STATES)
+    joints = bus.published_on(topics.ARM_JOINT_STATES)
     assert len(joints) == len(states(bus)) == 20
     assert [said.captured_ns for said in joints] == [number * TICK_NS for number in range(1, 21)]
     found = {joint.name: joint.position for joint in joints[-1].message.joints}
     assert set(found) == set(HOAP3.joint_names)
     assert_allclose([found[name] for name in HOAP3.joint_names], HOAP3.base_pose, rtol=0, atol=np.deg2rad(0.8))
     assert set(states(bus)[1:]) == {SafetyState.STATE_DISARMED}
-    assert bus.said_on(topics.WIRE_HOAP3_STREAM) == []
-    assert {said.topic for said in bus.said} <= set(arm_driver.PUBLISHES)
+    assert bus.published_on(topics.WIRE_HOAP3_STREAM) == []
+    assert {said.topic for said in bus.published} <= set(arm_driver.PUBLISHES)
 
 
 def test_a_disarmed_driver_refuses_trajectories_and_streams_nothing() -> None:
     bus = replayed(20, {10: [(topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0))]})
-    (status,) = (said.message for said in bus.said_on(topics.ARM_TRAJECTORY_STATUS))
+    (status,) = (said.message for said in bus.published_on(topics.ARM_TRAJECTORY_STATUS))
     assert status.state == TrajectoryStatus.STATE_REFUSED
     assert "disarmed" in status.reason
-    assert bus.said_on(topics.WIRE_HOAP3_STREAM) == []
+    assert bus.published_on(topics.WIRE_HOAP3_STREAM) == []
 
 
 def test_armed_by_a_word_it_streams_batches_that_end_in_a_stop_ramp() -> None:
@@ -69,11 +69,11 @@ def test_armed_by_a_word_it_streams_batches_that_end_in_a_stop_ramp() -> None:
     )
     assert states(bus)[3] == SafetyState.STATE_DISARMED
     assert states(bus)[5] == SafetyState.STATE_ARMED
-    batches = [said.message for said in bus.said_on(topics.WIRE_HOAP3_STREAM)]
+    batches = [said.message for said in bus.published_on(topics.WIRE_HOAP3_STREAM)]
     assert batches
     assert batches[0].stop_ramp_frames > 0
     assert len(batches[0].frames) % (2 * HOAP3.n_joints) == 0
-    first = bus.said_on(topics.ARM_TRAJECTORY_STATUS)[0].message
+    first = bus.published_on(topics.ARM_TRAJECTORY_STATUS)[0].message
     assert (first.trajectory_id, first.state) == ("one", TrajectoryStatus.STATE_ACCEPTED)
 
 

@@ -115,12 +115,12 @@ def _picture(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).integers(40, 200, (36, 48, 3), dtype=np.uint8)
 
 
-def _light(seed: int) -> RawImage:
+def _image_raw(seed: int) -> RawImage:
     return RawImage(encoding="bgr8", width=48, height=36, step=144, data=_picture(seed).tobytes())
 
 
 def of_camera() -> list[Event]:
-    return timed((topics.CAMERA_LIGHT, _light(seed)) for seed in range(60))
+    return timed((topics.CAMERA_IMAGE_RAW, _image_raw(seed)) for seed in range(60))
 
 
 def of_colour_tracker() -> list[Event]:
@@ -296,7 +296,7 @@ def test_no_message_makes_a_node_fall_over(node: str, protected: bool, tmp_path:
     except Exception as error:
         raise AssertionError(f"after {bus.fault}: {type(error).__name__}: {error}") from error
     assert bus.fault == faulty[-1][0]
-    assert bus.said or not module.PUBLISHES
+    assert bus.published or not module.PUBLISHES
     numbers = [fault for fault, _ in faulty if "=nan" in fault]
     assert all(fault in bus.left_out for fault in numbers) or not protected
 

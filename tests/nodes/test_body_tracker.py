@@ -48,21 +48,21 @@ def run(cameras, events, **parameters):
 
 
 def poses(bus):
-    said = [one.message for one in bus.said if one.topic is topics.HUMAN_ARM_POSE]
+    said = [one.message for one in bus.published if one.topic is topics.HUMAN_ARM_POSE]
     return [{point.name: (point.x, point.y, point.z) for point in one.points} for one in said]
 
 
 def test_says_pose_outline_and_scene_of_each_moment(cameras, images):
     bus = run(cameras, moments(images, 3))
-    assert [one.topic for one in bus.said] == list(body_tracker.PUBLISHES) * 3
+    assert [one.topic for one in bus.published] == list(body_tracker.PUBLISHES) * 3
     found = poses(bus)[-1]
     assert list(found) == ["elbow", "wrist", "index"]
     for name, place in found.items():
         np.testing.assert_allclose(place, ARM[name], rtol=0, atol=0.004)
-    outline = bus.said[1].message
+    outline = bus.published[1].message
     seen = np.array([(point.x, point.y) for point in outline.points[0].points])
     np.testing.assert_allclose(seen[0], EYES[0].project(ARM["elbow"]), rtol=0, atol=2.0)
-    assert len(bus.said[2].message.entities[0].lines[0].points) == 3
+    assert len(bus.published[2].message.entities[0].lines[0].points) == 3
     assert bus.states == [("ready", "looking for elbow, wrist, index with camera_1, camera_2")]
 
 

@@ -23,10 +23,10 @@ def _picture(seed: int, width: int = 480, height: int = 360) -> np.ndarray:
     return cv2.resize(small, (width, height), interpolation=cv2.INTER_CUBIC)
 
 
-def _light(image: np.ndarray) -> tuple[Any, RawImage]:
+def _image_raw(image: np.ndarray) -> tuple[Any, RawImage]:
     height, width = image.shape[:2]
     raw = RawImage(encoding="bgr8", width=width, height=height, step=3 * width, data=image.tobytes())
-    return topics.CAMERA_LIGHT, raw
+    return topics.CAMERA_IMAGE_RAW, raw
 
 
 def test_says_each_frame_of_a_video_file_once(tmp_path: Path) -> None:
@@ -39,8 +39,8 @@ def test_says_each_frame_of_a_video_file_once(tmp_path: Path) -> None:
     bus = bus_with_ticks(30)
     camera.run(bus, camera.Config(source=f"file:{path}"))
     assert bus.now_ns < 30 * PERIOD_NS  # it ended with the file
-    assert len(bus.said) == 6
-    for said, picture in zip(bus.said, pictures, strict=True):
+    assert len(bus.published) == 6
+    for said, picture in zip(bus.published, pictures, strict=True):
         assert said.topic is topics.CAMERA_IMAGE
         assert said.message.frame_id == "camera_optical"
         assert said.message.timestamp.ToNanoseconds() == said.captured_ns
@@ -55,24 +55,24 @@ def test_leaves_out_frames_of_a_faster_file(tmp_path: Path) -> None:
     writer.release()
     bus = bus_with_ticks(30)
     camera.run(bus, camera.Config(source=f"file:{path}"))
-    assert len(bus.said) == 6
+    assert len(bus.published) == 6
 
 
 def test_compresses_the_light_of_a_topic_and_recovers_from_bad_frames() -> None:
     black = np.zeros((360, 480, 3), np.uint8)
     wrong_size = _picture(1, 360, 240)
-    bus = bus_that_heard([_light(image) for image in (_picture(1), black, wrong_size, _picture(2))])
+    bus = bus_that_heard([_image_raw(image) for image in (_picture(1), black, wrong_size, _picture(2))])
     camera.run(bus, camera.Config())
-    assert [said.captured_ns // PERIOD_NS for said in bus.said] == [1, 4]
+    assert [said.captured_ns // PERIOD_NS for said in bus.published] == [1, 4]
     assert [state for state, _ in bus.states] == ["ready", "degraded", "degraded", "ready"]
     assert "black" in bus.states[1][1]
     assert "360 x 240 px, 480 x 360 expected" in bus.states[2][1]
 
 
 def test_a_frozen_picture_is_said_no_more() -> None:
-    bus = bus_that_heard([_light(_picture(1))] * 20)
+    bus = bus_that_heard([_image_raw(_picture(1))] * 20)
     camera.run(bus, camera.Config(frozen_after=10))
-    assert len(bus.said) == 9
+    assert len(bus.published) == 9
     assert "frozen" in bus.states[-1][1]
 
 
@@ -81,7 +81,10 @@ def test_a_frozen_picture_is_said_no_more() -> None:
     [
         ("file:/nowhere/clip.avi", "no video file .*/nowhere/clip.avi"),
         ("device:/dev/no-such-camera", "no camera /dev/no-such-camera; found"),
-        ("socket:1", "topic:camera/light, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC expected"),
+        (
+            "socket:1",
+            "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC expected",
+        ),
         ("topic:camera/image", "expected"),
     ],
 )
@@ -100,29 +103,29 @@ def _bus_of(*events: Any) -> RecordedBus:
 
 
 def test_silence_of_the_light_is_told_after_a_second_and_once() -> None:
-    topic, light = _light(_picture(1))
-    events: list[Any] = [Received(topic, light, PERIOD_NS, PERIOD_NS, 1)]
+    topic, image_raw = _image_raw(_picture(1))
+    events: list[Any] = [Received(topic, image_raw, PERIOD_NS, PERIOD_NS, 1)]
     events += [Tick(n, n * PERIOD_NS) for n in range(1, 40)]
-    events.append(Received(topic, _light(_picture(2))[1], 40 * PERIOD_NS, 40 * PERIOD_NS, 2))
+    events.append(Received(topic, _image_raw(_picture(2))[1], 40 * PERIOD_NS, 40 * PERIOD_NS, 2))
     bus = _bus_of(*events)
     camera.run(bus, camera.Config())
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
-    assert "no image on camera/light for more than 1 s" in bus.states[1][1]
-    assert len(bus.said) == 2
+    assert "no image on camera/image_raw for more than 1 s" in bus.states[1][1]
+    assert len(bus.published) == 2
 
 
 def test_the_same_fault_is_told_once() -> None:
     black = np.zeros((360, 480, 3), np.uint8)
-    bus = bus_that_heard([_light(image) for image in (_picture(1), *[black] * 4, _picture(2), black)])
+    bus = bus_that_heard([_image_raw(image) for image in (_picture(1), *[black] * 4, _picture(2), black)])
     camera.run(bus, camera.Config())
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready", "degraded"]
 
 
 @pytest.mark.parametrize("message", [RawImage(), RawImage(encoding="bgr8", width=480, height=360, data=b"short")])
 def test_light_that_is_no_picture_is_left_out(message: RawImage) -> None:
-    bus = bus_that_heard([(topics.CAMERA_LIGHT, message), _light(_picture(1))])
+    bus = bus_that_heard([(topics.CAMERA_IMAGE_RAW, message), _image_raw(_picture(1))])
     camera.run(bus, camera.Config())
-    assert len(bus.said) == 1
+    assert len(bus.published) == 1
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
 
 
@@ -131,7 +134,7 @@ def test_the_end_of_a_file_that_is_cut_off_is_told(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     bus = bus_with_ticks(60)
     camera.run(bus, camera.Config(source=f"file:{path}"))
-    assert 0 < len(bus.said) < 40
+    assert 0 < len(bus.published) < 40
     assert bus.states[-1][0] == "ready"
     assert re.search("has ended after [0-9]+ frames", bus.states[-1][1])
 

@@ -17,9 +17,9 @@ def _drawn() -> CompressedImage:
 def test_says_what_each_image_shows() -> None:
     bus = bus_that_heard([(topics.CAMERA_IMAGE, _drawn())] * 3)
     colour_tracker.run(bus, colour_tracker.Config())
-    assert [said.topic for said in bus.said] == [topics.OBJECTS_TRACKED] * 3
-    tracked = bus.said[1].message
-    assert tracked.captured.ToNanoseconds() == bus.said[1].captured_ns
+    assert [said.topic for said in bus.published] == [topics.OBJECTS_TRACKED] * 3
+    tracked = bus.published[1].message
+    assert tracked.captured.ToNanoseconds() == bus.published[1].captured_ns
     assert [(o.name, round(o.u_px), round(o.v_px)) for o in tracked.objects] == [("yellow", 106, 114)]
 
 
@@ -27,7 +27,7 @@ def test_a_corrupt_image_is_left_out_and_told() -> None:
     broken = CompressedImage(format="jpeg", data=b"\xff\xd8 not a picture")
     bus = bus_that_heard([(topics.CAMERA_IMAGE, image) for image in (_drawn(), broken, _drawn())])
     colour_tracker.run(bus, colour_tracker.Config())
-    assert len(bus.said) == 2
+    assert len(bus.published) == 2
     assert [state for state, _ in bus.states] == ["ready", "degraded", "ready"]
     assert "('jpeg', 16 bytes)" in bus.states[1][1]
 
@@ -36,4 +36,4 @@ def test_colours_come_from_the_parameters() -> None:
     config = colour_tracker.Config.model_validate({"colours": [{"name": "amber", "hue_deg": [40, 80]}]})
     bus = bus_that_heard([(topics.CAMERA_IMAGE, _drawn())])
     colour_tracker.run(bus, config)
-    assert [found.name for found in bus.said[0].message.objects] == ["amber"]
+    assert [found.name for found in bus.published[0].message.objects] == ["amber"]

@@ -32,7 +32,7 @@ def test_hears_nothing_of_the_truth_and_says_nothing_but_the_stop() -> None:
 def test_a_replay_shows_all_and_says_nothing(tmp_path: Path) -> None:
     bus = RecordedBus(with_ticks(scene.heard(scene.messages())), run_folder=tmp_path)
     dashboard.run(bus, CONFIG)
-    assert bus.said == []
+    assert bus.published == []
     assert [state for state, _ in bus.states] == ["ready"]
     assert not (tmp_path / NAME).exists()
 

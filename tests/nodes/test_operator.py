@@ -27,7 +27,7 @@ def test_arms_once_and_never_again(tmp_path: Path) -> None:
     bus = replayed(
         tmp_path, True, SafetyState.STATE_DISCONNECTED, disarmed, armed, armed, SafetyState.STATE_HOLD, disarmed
     )
-    (word,) = bus.said
+    (word,) = bus.published
     assert word.topic is topics.OPERATOR_ARM_AT_START
     assert word.message.armed
     assert word.message.captured.ToNanoseconds() == word.published_ns == 2 * SECOND
@@ -36,15 +36,15 @@ def test_arms_once_and_never_again(tmp_path: Path) -> None:
 
 def test_does_not_arm_unless_told(tmp_path: Path) -> None:
     bus = replayed(tmp_path, False, SafetyState.STATE_DISARMED, SafetyState.STATE_DISARMED)
-    assert bus.said == []
+    assert bus.published == []
     assert bus.states == [("ready", "does not arm")]
 
 
 def test_a_new_process_in_the_same_run_does_not_arm_again(tmp_path: Path) -> None:
     disarmed = SafetyState.STATE_DISARMED
-    assert replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED).said == []  # restarted before it asked
+    assert replayed(tmp_path, True, SafetyState.STATE_DISCONNECTED).published == []  # restarted before it asked
     bus = replayed(tmp_path, True, disarmed, disarmed, disarmed)
-    assert bus.said == []
+    assert bus.published == []
     (state,) = bus.states
     assert state[0] == "ready"
     assert "only a person arms" in state[1]

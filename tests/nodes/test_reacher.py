@@ -35,8 +35,8 @@ def test_replays_both_tasks(config: Any) -> None:
     cell = ServoCell().run()
     bus = RecordedBus(cell.events)
     reacher.run(bus, config())
-    assert [said.message for said in bus.said_on(topics.ARM_TRAJECTORY)] == cell.sent
-    assert [said.message for said in bus.said_on(topics.SPEECH)] == cell.speech
+    assert [said.message for said in bus.published_on(topics.ARM_TRAJECTORY)] == cell.sent
+    assert [said.message for said in bus.published_on(topics.SPEECH)] == cell.speech
     assert bus.states[-1][0] == "ready"
 
 

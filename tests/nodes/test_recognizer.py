@@ -16,8 +16,8 @@ def test_says_gestures_with_places_once_calibrated() -> None:
     recorded += [(topics.OBJECTS_TRACKED, image_of((n + 2) * PERIOD_NS, standing("blue", 200, 150))) for n in range(12)]
     bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config())
-    assert len(bus.said) == 1
-    said = bus.said[0]
+    assert len(bus.published) == 1
+    said = bus.published[0]
     gesture = said.message
     assert said.topic is topics.GESTURES
     assert (gesture.kind, gesture.object, gesture.located) == (Gesture.KIND_APPEARED, "blue", True)
@@ -31,17 +31,17 @@ def test_a_bad_calibration_is_refused_and_the_node_goes_on() -> None:
     bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config())
     assert bus.states[-1][0] == "degraded"
-    assert [said.message.located for said in bus.said] == [False]
+    assert [said.message.located for said in bus.published] == [False]
 
 
 def test_says_where_arm_poses_point_and_shows_it() -> None:
     recorded = [(topics.HUMAN_ARM_POSE, pose) for pose in poses(performed("pointing", [(0.4, 0.5)]))]
     bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config(pointing_from="poses"))
-    (said,) = [one for one in bus.said if one.topic is topics.GESTURES]
+    (said,) = [one for one in bus.published if one.topic is topics.GESTURES]
     assert said.message.kind == Gesture.KIND_POINTED_AT
     assert_allclose((said.message.x, said.message.y), table_place((0.4, 0.5))[:2], rtol=0, atol=0.04)
-    balls = [one.message for one in bus.said if one.topic is topics.GESTURES_SCENE]
+    balls = [one.message for one in bus.published if one.topic is topics.GESTURES_SCENE]
     assert len(balls) > 20
     assert all(len(ball.entities[0].spheres) == 1 for ball in balls)
 
@@ -50,4 +50,4 @@ def test_arm_poses_say_nothing_unless_asked() -> None:
     recorded = [(topics.HUMAN_ARM_POSE, pose) for pose in poses(performed("pointing", [(0.4, 0.5)]))]
     bus = bus_that_heard(recorded)
     recognizer.run(bus, recognizer.Config())
-    assert bus.said == []
+    assert bus.published == []

@@ -34,7 +34,7 @@ def test_keeps_every_message_with_its_times(tmp_path: Path) -> None:
     recorder.run(bus, recorder.Config())
     found = [(r.topic, r.message, r.log_ns, r.publish_ns, r.sequence) for r in read(tmp_path / "recording.mcap")]
     assert found == [(h.topic.name, h.message, h.captured_ns, h.published_ns, h.sequence) for h in HEARD]
-    assert bus.said == []
+    assert bus.published == []
     assert bus.states == [("ready", "recording to recording.mcap")]
 
 

@@ -21,8 +21,8 @@ def test_replays_the_whole_story():
         (topics.APPLICATION_STAGE, story.stages),
         (topics.SPEECH, story.speech),
     ):
-        assert [said.message for said in bus.said_on(topic)] == expected, topic.name
-    assert {said.topic for said in bus.said} <= set(relocator.PUBLISHES)
+        assert [said.message for said in bus.published_on(topic)] == expected, topic.name
+    assert {said.topic for said in bus.published} <= set(relocator.PUBLISHES)
     assert bus.states[-1][0] == "ready"
 
 

@@ -27,8 +27,8 @@ def test_replays_the_whole_story(story: Story) -> None:
         (topics.CALIBRATION_PLANE, story.calibrations),
         (topics.APPLICATION_STAGE, story.stages),
     ):
-        assert [said.message for said in bus.said_on(topic)] == expected, topic.name
-    assert {said.topic for said in bus.said} <= set(rule_learner.PUBLISHES)
+        assert [said.message for said in bus.published_on(topic)] == expected, topic.name
+    assert {said.topic for said in bus.published} <= set(rule_learner.PUBLISHES)
     assert bus.states[0] == ("ready", "waiting for the arm")
     assert bus.states[-1][0] == "ready"
 
@@ -41,7 +41,7 @@ def test_ends_when_everything_is_put_away(story: Story) -> None:
     bus = RecordedBus(more.events)
     rule_learner.run(bus, rule_learner.Config())
     assert bus.now_ns == story.now_ns
-    assert bus.said_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_DONE
+    assert bus.published_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_DONE
 
 
 def test_silence_is_no_end() -> None:
@@ -50,7 +50,7 @@ def test_silence_is_no_end() -> None:
     story.run(30.0)
     bus = RecordedBus(story.events)
     rule_learner.run(bus, rule_learner.Config())
-    assert bus.said_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_CALIBRATE
+    assert bus.published_on(topics.APPLICATION_STAGE)[-1].message.stage == ApplicationStage.STAGE_CALIBRATE
 
 
 def test_defaults_are_the_places_of_the_demo() -> None:

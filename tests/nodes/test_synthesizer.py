@@ -36,15 +36,15 @@ def test_replays_a_relocation(config: synthesizer.Config) -> None:
         "goal g: begins",
         "goal g: approach",
     ]
-    statuses = [said.message for said in bus.said_on(topics.RELOCATION_STATUS)]
+    statuses = [said.message for said in bus.published_on(topics.RELOCATION_STATUS)]
     assert statuses == cell.statuses
     assert statuses[-1].state == RelocationStatus.STATE_REFUSED
-    trajectories = [said.message for said in bus.said_on(topics.ARM_TRAJECTORY)]
+    trajectories = [said.message for said in bus.published_on(topics.ARM_TRAJECTORY)]
     assert [one.id for one in trajectories] == [one.id for one in cell.driver.heard] == ["g/1", "g/2"]
     for one, other in zip(trajectories, cell.driver.heard, strict=True):
         assert one.phases == other.phases
         np.testing.assert_allclose(one.points[-1].position_rad, other.points[-1].position_rad, rtol=0, atol=1e-9)
-    assert {said.topic for said in bus.said} <= set(synthesizer.PUBLISHES)
+    assert {said.topic for said in bus.published} <= set(synthesizer.PUBLISHES)
 
 
 def test_without_goals_it_says_nothing(config: synthesizer.Config) -> None:
@@ -53,7 +53,7 @@ def test_without_goals_it_says_nothing(config: synthesizer.Config) -> None:
         cell.tick()
     bus = RecordedBus(cell.events)
     synthesizer.run(bus, config)
-    assert bus.said == []
+    assert bus.published == []
 
 
 def test_trains_its_movement_once_and_keeps_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

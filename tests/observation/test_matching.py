@@ -106,12 +106,12 @@ def test_the_incremental_objective_is_the_full_one(edges):
         full, shifts = Objective(contour, number, edges), new_shifts(number + 1)
         assert len(full.starts) == number
         total = begin(edges.distances.reshape(-1), edges.stride, number, UNIT, contour, shifts)
-        least, greatest = (values.sum() for values in full.gradients(np.zeros(number)))
-        assert least - 1e-3 <= total / 255.0 <= greatest + 1e-3
+        minimum, maximum = (values.sum() for values in full.gradients(np.zeros(number)))
+        assert minimum - 1e-3 <= total / 255.0 <= maximum + 1e-3
         energy = match(edges.distances.reshape(-1), edges.stride, number, points, UNIT, contour, shifts)
-        least, greatest = full(shifts.shift[:number].astype(float))
-        assert least - 1e-5 <= energy <= greatest + 1e-5
-        assert greatest - least < 0.5
+        minimum, maximum = full(shifts.shift[:number].astype(float))
+        assert minimum - 1e-5 <= energy <= maximum + 1e-5
+        assert maximum - minimum < 0.5
         assert energy > full(np.zeros(number))[1]
 
 

@@ -62,8 +62,8 @@ def test_both_ways_to_read_give_the_sums_of_the_definition(sums, lanes):
         step = np.float32(0.5 ** rng.integers(5))
         four = found(images, lanes, slot, left, here, right, step)
         bounds = [b for move in (step, -step) for b in expected(images, lanes, slot, left, here, right, move)]
-        for value, (least, greatest) in zip(four, bounds, strict=True):
-            assert least <= value <= greatest
+        for value, (minimum, maximum) in zip(four, bounds, strict=True):
+            assert minimum <= value <= maximum
 
 
 def test_one_of_the_two_is_used():

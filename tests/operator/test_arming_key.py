@@ -13,7 +13,7 @@ def gate(state, *sentences):
 
 def hearing(state, *sentences):
     key = ArmingKey()
-    key.hear(gate(state, *sentences))
+    key.handle(gate(state, *sentences))
     return key
 
 
@@ -22,9 +22,9 @@ def test_a_gate_that_hears_is_told_once_and_its_answer_is_shown(state):
     key = hearing(state, "stopped by a person")
     key.press(1.0)
     assert [key.tick(1.0), key.tick(1.1)] == [True, False]
-    key.hear(gate(state, "stopped by a person"))
+    key.handle(gate(state, "stopped by a person"))
     assert key.sentence == "looking at the servos"
-    key.hear(gate("ARMED"))
+    key.handle(gate("ARMED"))
     assert (key.sentence, key.state, key.tick(9.0)) == ("armed", "armed", False)
 
 
@@ -33,7 +33,7 @@ def test_pressed_while_the_arm_stops_it_is_heard_once_the_arm_rests():
     key.press(1.0)
     assert not key.tick(1.0)
     assert key.sentence == "the arm still stops: it is armed once it rests"
-    key.hear(gate("HOLD", "stopped by a person"))
+    key.handle(gate("HOLD", "stopped by a person"))
     assert key.tick(1.0 + WAITS_S)
 
 
@@ -42,7 +42,7 @@ def test_nobody_is_armed_by_a_key_that_was_pressed_long_ago():
     key.press(1.0)
     assert not key.tick(1.1 + WAITS_S)
     assert key.sentence == "not armed: the arm has not come to rest within 1 s; press a again once it does"
-    key.hear(gate("HOLD", "stopped by a person"))
+    key.handle(gate("HOLD", "stopped by a person"))
     assert not key.tick(2.5)
 
 
@@ -50,7 +50,7 @@ def test_a_stop_that_is_pressed_afterwards_counts_more():
     key = hearing("STOPPING")
     key.press(1.0)
     key.cancel()
-    key.hear(gate("HOLD"))
+    key.handle(gate("HOLD"))
     assert not key.tick(1.1)
 
 
@@ -61,12 +61,12 @@ def test_a_key_after_a_stop_arms_although_the_gate_was_last_heard_armed():
     answer.captured.FromNanoseconds(2)
     key.cancel()
     key.stopped(answer)
-    key.hear(before)
+    key.handle(before)
     key.press(1.0)
     assert not key.tick(1.0)
     rests = gate("HOLD", "stopped by a person")
     rests.captured.FromNanoseconds(3)
-    key.hear(rests)
+    key.handle(rests)
     assert key.tick(1.1)
 
 
@@ -90,7 +90,7 @@ def test_a_refusal_is_told_with_every_reason():
     key = hearing("HOLD", "stopped by a person")
     key.press(1.0)
     assert key.tick(1.0)
-    key.hear(gate("HOLD", "servo 12 is silent", "servo 13 is hot"))
+    key.handle(gate("HOLD", "servo 12 is silent", "servo 13 is hot"))
     assert key.sentence == "not armed: servo 12 is silent; servo 13 is hot"
 
 
@@ -102,12 +102,12 @@ def test_the_same_refusal_again_and_no_answer_at_all_are_told_after_a_while(sent
     key = hearing("DISARMED", *sentences)
     key.press(1.0)
     assert key.tick(1.0)
-    key.hear(gate("DISARMED", *sentences))
+    key.handle(gate("DISARMED", *sentences))
     key.tick(1.1 + ANSWER_S)
     assert key.sentence == told
 
 
 def test_why_the_gate_has_stopped_the_arm_is_told_without_a_key():
     key = hearing("ARMED")
-    key.hear(gate("HOLD", "servo 12 is hot"))
+    key.handle(gate("HOLD", "servo 12 is hot"))
     assert key.sentence == "servo 12 is hot"

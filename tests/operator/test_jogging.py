@@ -27,7 +27,7 @@ def told(message, state, reason=""):
 @pytest.fixture
 def jogging():
     jogging = Jogging("jog", STEP)
-    jogging.hear_states(states({"pan": 0.1, "lift": -0.2}))
+    jogging.handle_states(states({"pan": 0.1, "lift": -0.2}))
     return jogging
 
 
@@ -37,7 +37,7 @@ def test_every_step_keeps_to_the_limits(name, degrees):
     robot = RobotDescription.load(ROBOTS / name)
     limits, step = robot.motion_limits, float(np.deg2rad(degrees))
     jogging = Jogging("jog", step)
-    jogging.hear_states(states(dict(zip(robot.joint_names, robot.base_pose, strict=True))))
+    jogging.handle_states(states(dict(zip(robot.joint_names, robot.base_pose, strict=True))))
     for place, joint in enumerate(robot.joint_names):
         jogging.choose(place)
         up = robot.base_pose[place] + step < robot.soft_upper[place]
@@ -47,7 +47,7 @@ def test_every_step_keeps_to_the_limits(name, degrees):
             limits, 0.01,
         )  # fmt: skip
         assert abs(path.rows[-1] - robot.base_pose)[place] == pytest.approx(step)
-        jogging.hear_status(told(message, TrajectoryStatus.STATE_SUCCEEDED))
+        jogging.handle_status(told(message, TrajectoryStatus.STATE_SUCCEEDED))
 
 
 def test_a_step_of_a_driver_that_is_gone_is_waited_for_no_longer(jogging):
@@ -63,10 +63,10 @@ def test_one_step_at_a_time(jogging):
     first = jogging.step(1, 0)
     assert jogging.is_moving
     assert jogging.step(1, 0) is None
-    jogging.hear_status(TrajectoryStatus(trajectory_id="another", state=TrajectoryStatus.STATE_SUCCEEDED))
-    jogging.hear_status(told(first, TrajectoryStatus.STATE_EXECUTING))
+    jogging.handle_status(TrajectoryStatus(trajectory_id="another", state=TrajectoryStatus.STATE_SUCCEEDED))
+    jogging.handle_status(told(first, TrajectoryStatus.STATE_EXECUTING))
     assert jogging.step(1, 0) is None
-    jogging.hear_status(told(first, TrajectoryStatus.STATE_SUCCEEDED))
+    jogging.handle_status(told(first, TrajectoryStatus.STATE_SUCCEEDED))
     second = jogging.step(-1, 0)
     assert second.id != first.id
 
@@ -74,16 +74,16 @@ def test_one_step_at_a_time(jogging):
 def test_steps_add_up_although_the_joint_sags(jogging):
     for _ in range(3):
         message = jogging.step(1, 0)
-        jogging.hear_status(told(message, TrajectoryStatus.STATE_SUCCEEDED))
-        jogging.hear_states(states({"pan": 0.05, "lift": -0.2}))
+        jogging.handle_status(told(message, TrajectoryStatus.STATE_SUCCEEDED))
+        jogging.handle_states(states({"pan": 0.05, "lift": -0.2}))
     assert message.points[-1].position_rad[0] == pytest.approx(0.1 + 3 * STEP)
 
 
 def test_after_a_refusal_it_begins_where_the_joint_is(jogging):
     message = jogging.step(1, 0)
-    jogging.hear_status(told(message, TrajectoryStatus.STATE_REFUSED, "trajectory refused (joint_limit)"))
+    jogging.handle_status(told(message, TrajectoryStatus.STATE_REFUSED, "trajectory refused (joint_limit)"))
     assert jogging.sentence == "trajectory refused (joint_limit)"
-    jogging.hear_states(states({"pan": 0.3, "lift": -0.2}))
+    jogging.handle_states(states({"pan": 0.3, "lift": -0.2}))
     assert jogging.step(-1, 0).points[0].position_rad[0] == pytest.approx(0.3)
 
 

@@ -50,7 +50,7 @@ def test_every_movement_of_a_tiny_training_set_has_a_distance(count: int, n_grou
     assert found.distances.shape == found.groups.shape == (count,)
     assert np.isfinite(found.distances).all()
     assert (found.distances >= 0.0).all()
-    assert np.isfinite(found.log_typicality(1e12))
+    assert np.isfinite(found.log_p_value(1e12))
 
 
 def test_what_was_learned_comes_back_and_old_files_have_no_groups() -> None:
@@ -60,7 +60,7 @@ def test_what_was_learned_comes_back_and_old_files_have_no_groups() -> None:
     arrays = {f"own_{name}": value for name, value in regression.arrays().items()}
     again = CorrelatedRegression.from_arrays(arrays, "own_", monomials)
     assert np.array_equal(again.groups, regression.groups)
-    assert again.log_typicality(9.0) == regression.log_typicality(9.0)
+    assert again.log_p_value(9.0) == regression.log_p_value(9.0)
     with pytest.raises(ValueError, match=r"expected own_groups of shape \(12,\), found \(3,\)"):
         CorrelatedRegression.from_arrays({**arrays, "own_groups": np.zeros(3)}, "own_", monomials)
     del arrays["own_groups"]

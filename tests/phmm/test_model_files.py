@@ -241,7 +241,7 @@ def test_sizes_are_checked_before_memory_is_taken(file: Path, monkeypatch: pytes
     zeros = "{'descr': '<f8', 'fortran_order': False, 'shape': (400000,), }"
     _replaced(file, "learned_means.npy", _npy(zeros, bytes(3_200_000)), zipfile.ZIP_DEFLATED)
     assert file.stat().st_size < 20_000
-    monkeypatch.setattr(storage, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(storage, "MAX_BYTES", 2**20)
     assert "expected at most 500 arrays of 1 MB together, found 10 of 3 MB" in refused(file)
 
 

@@ -182,13 +182,13 @@ def test_noise_makes_no_genuine_movement_strange_and_no_stopped_one_genuine(
     genuine = unseen(30, 3)[0]
     stopped = [np.concatenate([x[:20], np.repeat(x[20:21], 20, axis=0)]) for x in genuine]
     share = [
-        np.mean([model.examine(x + NOISE * rng.standard_normal(x.shape)).typicality < 0.01 for x in movements])
+        np.mean([model.examine(x + NOISE * rng.standard_normal(x.shape)).p_value < 0.01 for x in movements])
         for movements in (genuine, stopped)
     ]
     assert share[0] <= 0.1
     assert share[1] >= 0.95
     begun = genuine[0][:30] + NOISE * rng.standard_normal((30, 3))
-    assert model.examine(begun, finished=False).typicality > 0.01
+    assert model.examine(begun, finished=False).p_value > 0.01
 
 
 @every_kind

@@ -1,4 +1,4 @@
-"""What is learned about whole performances: strangeness and typicality, of tiny and shuffled training sets too."""
+"""What is learned about whole demonstrations: outlier scores and p-values, of tiny and shuffled training sets too."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def test_distances_of_parts_and_of_pace_belong_to_the_same_movement() -> None:
         assert performances.pace.distances.argmax() == hasty
 
 
-def test_typicality_does_not_depend_on_the_order_of_the_training() -> None:
+def test_the_p_value_does_not_depend_on_the_order_of_the_training() -> None:
     sequences, theta = shown(0)
     groups = np.arange(36) % 5
     order = np.random.default_rng(0).permutation(36)
     model = untrained(QuadraticPHMM).fit(sequences, theta, groups)
     other = untrained(QuadraticPHMM).fit([sequences[k] for k in order], theta[order], groups[order])
-    for strangeness in (0.7, 1.3, 2.0, 5.0):
+    for outlier_score in (0.7, 1.3, 2.0, 5.0):
         assert_allclose(
-            other.performances_.log_typicality(strangeness),
-            model.performances_.log_typicality(strangeness),
+            other.performances_.log_p_value(outlier_score),
+            model.performances_.log_p_value(outlier_score),
             rtol=1e-3,
         )
 
@@ -58,15 +58,15 @@ def test_tiny_training_sets_examine_and_come_back_from_files(
     again = ParametricHMM.load(tmp_path / "model.npz")
     for finished, sequence in ((True, x), (False, x[:20])):
         found = model.examine(sequence, finished=finished)
-        assert 0.0 <= found.typicality <= 1.0
-        assert np.isfinite(found.log_typicality)
-        assert np.isfinite(found.strangeness)
+        assert 0.0 <= found.p_value <= 1.0
+        assert np.isfinite(found.log_p_value)
+        assert np.isfinite(found.outlier_score)
         assert again.examine(sequence, finished=finished)[1:] == found[1:]
 
 
 def test_a_stranger_movement_is_less_typical() -> None:
     performances = trained(QuadraticPHMM).performances_
-    found = [performances.log_typicality(strangeness) for strangeness in (0.0, 0.5, 1.3, 3.0, 100.0, 1e12)]
+    found = [performances.log_p_value(outlier_score) for outlier_score in (0.0, 0.5, 1.3, 3.0, 100.0, 1e12)]
     assert (np.diff(found) < 0.0).all()
     assert np.isfinite(found).all()
     assert found[2] > np.log(0.05) > np.log(0.001) > found[4]

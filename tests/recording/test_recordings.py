@@ -45,6 +45,15 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     assert isinstance(next(read(path)), Recorded)
 
 
+def test_a_topic_is_read_by_its_present_name_and_found_by_both(tmp_path: Path) -> None:
+    path = tmp_path / "old.mcap"
+    message = topics.CAMERA_IMAGE_RAW.type(width=1)
+    with RecordingWriter(path, "a test") as recording:
+        recording.write("camera_1/light", message, 1, 2, 3)
+    for only in ([], ["camera_1/light"], ["camera_1/image_raw"]):
+        assert found_in(path, only=only) == [("camera_1/image_raw", message, 1, 2, 3)]
+
+
 def test_only_some_topics(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     written = recordings.write(path, 50)

@@ -53,7 +53,7 @@ class Story:
         sights = Sights(self.table, {})
         assert all(sights.stands(colour) for colour in tool_box.COLOURS)
         self.instructor._arranged = True
-        self.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, name)
+        self.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, name)
         for _ in range(60 * 30):
             self.instructor.advance(TICK_S)
             self.postures.append(self.instructor.posture)
@@ -149,14 +149,14 @@ def test_calibrated_cameras_see_the_objects_about_where_they_are() -> None:
 def test_who_is_asked_again_while_withdrawing_points_again() -> None:
     story = Story(2)
     story.instructor._arranged = True
-    story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "")
+    story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
     asked = False
     for _ in range(60 * 40):
         story.instructor.advance(TICK_S)
         if story.instructor.at_target and not asked:
             asked = True
-            story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "")
-            story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "")
+            story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
+            story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
         if asked and not story.instructor.busy:
             break
     assert story.instructor.pointings == 2
@@ -165,11 +165,11 @@ def test_who_is_asked_again_while_withdrawing_points_again() -> None:
 def test_a_request_before_the_finger_has_arrived_is_the_one_being_answered() -> None:
     story = Story(2)
     story.instructor._arranged = True
-    story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "")
+    story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
     for _ in range(60 * 40):
         story.instructor.advance(TICK_S)
         if not story.instructor.at_target and story.instructor.pointings < 1:
-            story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "")
+            story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "")
         if not story.instructor.busy:
             break
     assert story.instructor.pointings == 1

@@ -48,8 +48,8 @@ def lay_table(simulation: Simulation) -> None:
     simulation.instructor._arranged = True
 
 
-def picture(light) -> np.ndarray:
-    return np.frombuffer(light.data, np.uint8).reshape(light.height, light.width, 3)
+def picture(image_raw) -> np.ndarray:
+    return np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
 
 
 def test_everything_but_the_arm_is_as_without_it(description: RobotDescription) -> None:
@@ -69,14 +69,14 @@ def test_everything_but_the_arm_is_as_without_it(description: RobotDescription) 
 
 def test_the_hand_is_seen_where_the_instructor_holds_it(seeing: ArmSimulation) -> None:
     seeing.run_to_tick(3)
-    assert seeing.light() is not None
-    lights = seeing.arm_lights()
-    assert [light.frame_id for light in lights] == ["camera_1", "camera_2"]
+    assert seeing.image_raw() is not None
+    images_raw = seeing.arm_images_raw()
+    assert [image_raw.frame_id for image_raw in images_raw] == ["camera_1", "camera_2"]
     posture = seeing.instructor.posture
     hand = np.linalg.inv(seeing.world_from_table) @ [*(posture[TIP] + seeing.world.world_from_shoulder), 1.0]
-    for light, camera in zip(lights, seeing.cameras, strict=True):
+    for image_raw, camera in zip(images_raw, seeing.cameras, strict=True):
         u, v = camera.project(hand[:3]).round().astype(int)
-        red, green, blue = picture(light)[v - 12 : v + 13, u - 12 : u + 13].reshape(-1, 3).astype(int).T
+        red, green, blue = picture(image_raw)[v - 12 : v + 13, u - 12 : u + 13].reshape(-1, 3).astype(int).T
         magenta = (red > green + 40) & (blue > green + 20)
         assert magenta.sum() > 15
 
@@ -84,9 +84,9 @@ def test_the_hand_is_seen_where_the_instructor_holds_it(seeing: ArmSimulation) -
 def test_the_robots_own_camera_sees_the_same_hand_and_no_object_in_the_sleeve(seeing: ArmSimulation) -> None:
     tracker = ColourTracker()
     seeing.run_to_tick(4)
-    light = seeing.light()
-    assert light is not None
-    found = tracker.update(picture(light)[:, :, ::-1], 0)
+    image_raw = seeing.image_raw()
+    assert image_raw is not None
+    found = tracker.update(picture(image_raw)[:, :, ::-1], 0)
     assert {seen.name for seen in found.objects} <= {"magenta", "hand"}
 
 
@@ -122,14 +122,14 @@ def test_a_tracker_tells_the_object_that_is_pointed_at(description: RobotDescrip
         launch = load(Workspace.at(LAUNCH.parent), "rule_learning", ["sim", "action_space"])
         setup = TrackingSetup.model_validate(launch.file.nodes["action_tracker"].parameters)
         tracker = setup.video_tracker(Path(folder))
-    events = PointingEvents(PointingEventOptions(least_certainty=0.6))
-    simulation.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, "blue")
+    events = PointingEvents(PointingEventOptions(min_certainty=0.6))
+    simulation.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, "blue")
     said = []
     for tick in range(0, 20 * CAMERA_HZ, 2):
         simulation.run_to_tick(tick)
         simulation.place_arm()
-        for light in simulation.arm_lights():
-            for moment in tracker.see(light.frame_id, simulation.now_ns, picture(light)):
+        for image_raw in simulation.arm_images_raw():
+            for moment in tracker.see(image_raw.frame_id, simulation.now_ns, picture(image_raw)):
                 estimate = estimate_message(moment, tracker.parameter_names, setup.particles, setup.table_place)
                 gesture = events.update(estimate)
                 said += [gesture] if gesture is not None else []
@@ -153,8 +153,8 @@ def test_images_of_the_arm_come_as_often_as_asked_for() -> None:
             config = arm_simulator.Config(seed=1, robot=ROBOT, max_duration_s=0.6, pace=1000.0, arm_image_every=2)
             arm_simulator.run(bus, config)
             said = {name: publisher.sequence for name, publisher in bus.exchange.publishers.items()}
-        assert said["camera/light"] == said["truth/arm"] == said["clock"] == 9
-        assert said["camera_1/light"] == said["camera_2/light"] == 5
+        assert said["camera/image_raw"] == said["truth/arm"] == said["clock"] == 9
+        assert said["camera_1/image_raw"] == said["camera_2/image_raw"] == 5
         assert said[topics.TRUTH_LAYOUT.name] == 1
         assert (folder / "person.yaml").is_file()
 

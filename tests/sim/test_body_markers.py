@@ -23,8 +23,8 @@ def test_a_body_tracker_finds_the_joints_of_a_person_who_points(seed, tmp_path):
         missed = {name: [] for name in MARKERS}
         for time_s in np.arange(0.0, world.duration_s, 0.4):
             truth = {point.name: (point.x, point.y, point.z) for point in world.truth(float(time_s)).points}
-            for number, light in enumerate(world.lights(float(time_s)), start=1):
-                rgb = np.frombuffer(light.data, np.uint8).reshape(light.height, light.width, 3)
+            for number, image_raw in enumerate(world.images_raw(float(time_s)), start=1):
+                rgb = np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
                 image = np.ascontiguousarray(rgb[:, :, ::-1])
                 for moment in tracking.see(f"camera_{number}", round(time_s * 1e9), image):
                     for name, point in moment.points.items():

@@ -33,7 +33,7 @@ def test_there_is_a_port_and_a_control_socket_while_it_runs(tmp_path):
     assert bus.seen == [{"by-id", port, "control"}] * 3
     assert not (tmp_path / port).exists()
     assert bus.states[0] == ("ready", f"open_manipulator_x at {tmp_path / port}; 0 packets, nothing wrong")
-    said = bus.said_on(topics.TRUTH_STATE)
+    said = bus.published_on(topics.TRUTH_STATE)
     assert [word.message.time_ns for word in said] == [PERIOD_NS, 2 * PERIOD_NS, 3 * PERIOD_NS]
     assert len(said[0].message.joint_positions) == 5
 

@@ -29,7 +29,7 @@ class Story:
         self.time_s = 0.0
 
     def ask(self, request: int, name: str = "") -> None:
-        self.instructor.hear(request, name)
+        self.instructor.handle(request, name)
 
     def run(self, until: Callable[[], bool] | None = None, longest_s: float = 300.0) -> float:
         """Lets time pass until the condition holds, or until the instructor has nothing to do; returns how long."""
@@ -204,7 +204,7 @@ def test_helps_a_fallen_object_to_a_free_place() -> None:
     assert len(standing) == 3
     place = story.table.position("yellow")[:2]
     assert places.STRIP_X[0] - 0.001 <= place[0] <= places.STRIP_X[1] + 0.001
-    assert sorted(np.linalg.norm(place - other) for other in standing)[1] >= places.LEAST_GAP - 0.001
+    assert sorted(np.linalg.norm(place - other) for other in standing)[1] >= places.MIN_GAP - 0.001
 
 
 def test_what_is_held_is_put_away_before_a_new_task() -> None:
@@ -252,7 +252,7 @@ def test_with_physics_a_cylinder_is_carried_into_its_opening(world: World) -> No
     instructor = Instructor(world, world_rules := Looks.draw(0).rules, looks.streams(0))
     description = world.description
     firmware, counts = Firmware(description), description.units.to_counts(description.base_pose)
-    instructor.hear(Speech.REQUEST_SHOW_RULE_AGAIN, "green")
+    instructor.handle(Speech.REQUEST_SHOW_RULE_AGAIN, "green")
     while instructor.busy and world.time_s < 20:
         instructor.advance(0.001)
         world.step(firmware.step(counts, world.joint_positions(), world.joint_velocities()))

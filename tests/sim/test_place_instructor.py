@@ -57,7 +57,7 @@ class Story:
 def test_points_at_free_places_that_the_robot_reaches(seed):
     story, before = Story(seed), np.array(START)
     for _ in range(3):
-        story.instructor.hear(PLACE, OBJECT)
+        story.instructor.handle(PLACE, OBJECT)
         x, y, z = story.until_there()
         assert OPTIONS.area.contains((x, y), 0.003)
         assert z == pytest.approx(tool_box.SURFACE_Z + POINTED_ABOVE_PLANE)
@@ -65,7 +65,7 @@ def test_points_at_free_places_that_the_robot_reaches(seed):
         assert np.hypot(x - before[0], y - before[1]) >= ANOTHER_PLACE
         assert where_people_point(np.array([x, y]))
         assert np.linalg.norm(story.table.fingertip - [x, y, z]) < 0.012
-        story.instructor.hear(Speech.REQUEST_UNSPECIFIED)
+        story.instructor.handle(Speech.REQUEST_UNSPECIFIED)
         story.until_done()
         before = np.array([x, y])
     assert story.instructor.pointings == 3
@@ -73,10 +73,10 @@ def test_points_at_free_places_that_the_robot_reaches(seed):
 
 def test_who_is_not_understood_points_once_more_at_the_same_place_then_at_another():
     story = Story(1)
-    story.instructor.hear(PLACE, OBJECT)
+    story.instructor.handle(PLACE, OBJECT)
     places = [story.until_there()]
     for _ in range(2):
-        story.instructor.hear(PLACE, OBJECT)  # still at the place, or on the way back
+        story.instructor.handle(PLACE, OBJECT)  # still at the place, or on the way back
         story.until(lambda: not story.instructor.at_target)
         places.append(story.until_there())
     assert np.array_equal(places[0], places[1])
@@ -85,9 +85,9 @@ def test_who_is_not_understood_points_once_more_at_the_same_place_then_at_anothe
 
 def test_a_request_that_is_repeated_before_the_hand_arrives_is_one():
     story = Story(2)
-    story.instructor.hear(PLACE, OBJECT)
+    story.instructor.handle(PLACE, OBJECT)
     story.instructor.advance(0.5)
-    story.instructor.hear(PLACE, OBJECT)
+    story.instructor.handle(PLACE, OBJECT)
     story.until_done()
     assert story.instructor.pointings == 1
 
@@ -95,7 +95,7 @@ def test_a_request_that_is_repeated_before_the_hand_arrives_is_one():
 def test_points_at_the_object_where_it_stands():
     story = Story(4)
     story.table.positions[OBJECT] = tool_box.standing_centre(*START)
-    story.instructor.hear(Speech.REQUEST_POINT_AT_OBJECT, OBJECT)
+    story.instructor.handle(Speech.REQUEST_POINT_AT_OBJECT, OBJECT)
     x, y, z = story.until_there()
     assert (x, y) == pytest.approx(START)
     assert z > tool_box.SURFACE_Z + 2 * tool_box.CYLINDER_HALF_HEIGHT
@@ -106,7 +106,7 @@ def test_points_at_the_object_where_it_stands():
 def test_helps_by_standing_the_object_at_its_start():
     story = Story(3)
     story.table.positions[OBJECT] = tool_box.standing_centre(0.18, 0.05)
-    story.instructor.hear(Speech.REQUEST_HELP, OBJECT)
+    story.instructor.handle(Speech.REQUEST_HELP, OBJECT)
     story.until_done()
     np.testing.assert_allclose(story.table.position(OBJECT)[:2], START, rtol=0, atol=0.002)
     assert OPTIONS.start == START
@@ -117,7 +117,7 @@ def test_the_arm_hangs_between_two_pointings_and_never_jumps(seed):
     story, postures = Story(seed), []
     story.instructor.advance(1.0)
     for _ in range(2):
-        story.instructor.hear(PLACE, OBJECT)
+        story.instructor.handle(PLACE, OBJECT)
         story.until(lambda: postures.append(story.instructor.posture) or not story.instructor.busy)
         hanging = postures[-1]
         assert hanging[TIP, 2] < tool_box.SURFACE_Z

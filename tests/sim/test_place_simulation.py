@@ -20,7 +20,7 @@ def test_the_object_stands_at_its_start_and_is_stood_there_again_by_the_person()
     simulation.run_to_tick(15)
     np.testing.assert_allclose(world.position(OBJECT), tool_box.standing_centre(*START), rtol=0, atol=1e-4)
     world.place(OBJECT, tool_box.standing_centre(0.18, 0.05))
-    simulation.instructor.hear(Speech.REQUEST_HELP, OBJECT)
+    simulation.instructor.handle(Speech.REQUEST_HELP, OBJECT)
     tick = 15
     while simulation.instructor.busy and tick < 15 * 40:
         tick += 1

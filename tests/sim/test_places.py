@@ -21,7 +21,7 @@ def test_layouts_leave_gaps_and_room_for_the_hand() -> None:
     for _ in range(100):
         layout, _ = places.draw_layout(draw)
         apart = np.linalg.norm(layout[:, None] - layout[None], axis=2)[~np.eye(3, dtype=bool)]
-        assert apart.min() >= places.LEAST_GAP
+        assert apart.min() >= places.MIN_GAP
         assert (layout[:, 0] >= places.STRIP_X[0]).all()
         assert (layout[:, 0] <= places.STRIP_X[1]).all()
         assert places.hand_has_room(layout)
@@ -45,4 +45,4 @@ def test_another_place_keeps_clear_of_what_stands() -> None:
     standing = [np.array((0.185, -0.07)), np.array((0.180, 0.05))]
     for _ in range(20):
         place = places.draw_place(draw, standing)
-        assert min(np.linalg.norm(place - other) for other in standing) >= places.LEAST_GAP
+        assert min(np.linalg.norm(place - other) for other in standing) >= places.MIN_GAP

@@ -39,7 +39,7 @@ def test_the_same_seed_and_words_give_the_same_truth(description: RobotDescripti
     runs = []
     for _ in range(2):
         simulation = Simulation(9, description, camera=False)
-        simulation.hear(_heard(topics.SPEECH, Speech(request=Speech.REQUEST_HAND_ME_AN_OBJECT)))
+        simulation.handle(_heard(topics.SPEECH, Speech(request=Speech.REQUEST_HAND_ME_AN_OBJECT)))
         for tick in range(1, 25):
             simulation.run_to_tick(tick)
         runs.append(truth.state(simulation).SerializeToString(deterministic=True))
@@ -53,7 +53,7 @@ def test_robot_plays_the_stream_and_reports_it(description: RobotDescription) ->
     share = np.clip(np.arange(400) / 300, 0, 1)
     rows[:, wrist] -= np.deg2rad(30) * share**3 * (10 - 15 * share + 6 * share**2)
     batch = StreamWriter(description, epoch=7).batch(0, rows, ramp_rows=100)
-    simulation.hear(_heard(topics.WIRE_HOAP3_STREAM, batch))
+    simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch))
     assert not simulation.stream.refusal
     simulation.run_to_tick(3)
     state = simulation.robot_state()
@@ -72,7 +72,7 @@ def test_a_bad_batch_is_refused_and_reported(description: RobotDescription) -> N
     rows = np.repeat(description.base_pose[None], 50, axis=0)
     rows[20:, description.index("right_elbow")] += np.deg2rad(5.0)  # a jump
     rows[20:, description.index("right_elbow")] -= np.deg2rad(10.0)
-    simulation.hear(_heard(topics.WIRE_HOAP3_STREAM, StreamWriter(description, epoch=7).batch(0, rows, 10)))
+    simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, StreamWriter(description, epoch=7).batch(0, rows, 10)))
     state = simulation.robot_state()
     assert state.refused_batches == 1
     assert "right_elbow" in state.refusal
@@ -104,10 +104,10 @@ def test_camera_shows_each_colour_where_it_stands(seeing: Simulation) -> None:
     for colour, place in places.items():
         world.place(colour, tool_box.standing_centre(*place))
     world.step(np.zeros(world.description.n_joints))
-    light = seeing.light()
-    assert light is not None
-    assert (light.width, light.height, light.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
-    image = np.frombuffer(light.data, np.uint8).reshape(light.height, light.width, 3)
+    image_raw = seeing.image_raw()
+    assert image_raw is not None
+    assert (image_raw.width, image_raw.height, image_raw.encoding) == (looks.WIDTH_PX, looks.HEIGHT_PX, "rgb8")
+    image = np.frombuffer(image_raw.data, np.uint8).reshape(image_raw.height, image_raw.width, 3)
     found = {item.name: item for item in ColourTracker().update(np.ascontiguousarray(image[:, :, ::-1])).objects}
     assert set(found) == set(places)
     for colour in places:

@@ -43,7 +43,7 @@ def test_runs_to_its_longest_duration_and_says_every_topic_at_15_hz(folder: Path
         said = {name: publisher.sequence for name, publisher in bus.exchange.publishers.items()}
     assert said["clock"] == said["truth/state"] == said["wire/hoap3/state"] == 15
     assert said["truth/layout"] == 1
-    assert said["camera/light"] == said["truth/view"] == 0
+    assert said["camera/image_raw"] == said["truth/view"] == 0
     assert bus.now_ns == 934_000_000  # of the newest beat
 
 

@@ -38,12 +38,12 @@ def edge(found, topic):
 
 
 def test_edges_are_those_of_the_nodes(sim):
-    assert edge(sim, "camera/image").said_by == ("camera",)
-    assert set(edge(sim, "camera/image").heard_by) == {"colour_tracker", "recorder"}
+    assert edge(sim, "camera/image").publishers == ("camera",)
+    assert set(edge(sim, "camera/image").subscribers) == {"colour_tracker", "recorder"}
     assert edge(sim, "camera/image").label == "camera/image 15 Hz"
     assert edge(sim, "gestures").label == "gestures"
     assert sim.collectors == {"recorder"}
-    assert sim.all_hear == {"clock"}
+    assert sim.to_all == {"clock"}
 
 
 def test_data_flows_onwards(sim):
@@ -54,18 +54,18 @@ def test_data_flows_onwards(sim):
         assert sorted(chain, key=order.index) == chain
 
 
-def test_what_is_heard_and_unsaid_is_marked(sim):
-    assert {found.topic for found in sim.unsaid} == {
+def test_a_topic_without_publisher_is_marked(sim):
+    assert {found.topic for found in sim.unpublished} == {
         "operator/arm",
         "operator/stop",
         "operator/estop",
         "action/estimate",
         "human/arm_pose",
     }
-    assert "operator/stop           <- nobody (!)" in as_text(sim)
-    assert "Heard, but said by nobody:" in as_text(sim)
-    assert "operator/stop: said by nobody" in as_mermaid(sim)
-    assert "said by nobody</text>" in as_svg(sim)
+    assert "operator/stop           <- no publisher (!)" in as_text(sim)
+    assert "Subscribed, no publisher:" in as_text(sim)
+    assert "operator/stop: no publisher" in as_mermaid(sim)
+    assert "no publisher</text>" in as_svg(sim)
 
 
 def test_text_fits_a_terminal_and_tells_every_topic(sim):
@@ -73,7 +73,7 @@ def test_text_fits_a_terminal_and_tells_every_topic(sim):
     assert max(map(len, text.splitlines())) <= 100
     for found in sim.edges:
         assert found.topic in text
-    assert "recorder  (nodes.recorder)\n  hears  22 of 27 topics" in text
+    assert "recorder  (nodes.recorder)\n  subscribes  22 of 27 topics" in text
 
 
 MERMAID = re.compile(
@@ -100,7 +100,7 @@ def test_svg_shows_every_topic_and_no_text_covers_another(overlay):
     space = "{http://www.w3.org/2000/svg}"
     texts = [text for text in root.iter(f"{space}text") if text.get("class") == "topic"]
     written = ["".join(text.itertext()) for text in texts]
-    drawn = [edge for edge in found.edges if edge.topic not in found.all_hear and edge.heard_by]
+    drawn = [edge for edge in found.edges if edge.topic not in found.to_all and edge.subscribers]
     assert {edge.label for edge in drawn} <= set(written)
     boxes = [
         (float(text.get("x")), float(text.get("y")), LETTER_PX * len(label))
@@ -168,5 +168,5 @@ def test_running_nodes_are_drawn_with_measured_rates():
         made[0].stop()
         thread.join(60)
     assert found.nodes == {"recognizer": "ready"}
-    assert [edge.topic for edge in found.unsaid] == ["objects/tracked"]
+    assert [edge.topic for edge in found.unpublished] == ["objects/tracked"]
     assert "domain default: 1 nodes, 2 topics" in text

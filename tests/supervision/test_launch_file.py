@@ -63,6 +63,21 @@ def test_seed_goes_where_the_file_says(folder):
     assert load(folder, "good", seed=7).file.nodes["world"].parameters == {"seed": 7}
 
 
+def test_topics_are_read_by_the_names_that_they_had_before(folder):
+    remaps = "{camera/light: camera_2/light, own/camera/light: a}"
+    overlay = f"nodes: {{camera: {{remaps: {remaps}, optional_topics: [camera/light]}}}}"
+    (folder / "overlays" / "old.yaml").write_text(overlay)
+    with pytest.warns(FutureWarning) as warned:
+        launch = load(folder, "good", ["old"], ["camera.source=topic:camera/light"])
+    assert launch.file.nodes["camera"].remaps == {"camera/image_raw": "camera_2/image_raw", "own/camera/light": "a"}
+    assert launch.file.nodes["camera"].optional_topics == ["camera/image_raw"]
+    assert launch.file.nodes["camera"].parameters["source"] == "topic:camera/image_raw"
+    assert sorted({str(one.message).split(";")[0] for one in warned}) == [
+        "topic camera/light is called camera/image_raw now",
+        "topic camera_2/light is called camera_2/image_raw now",
+    ]
+
+
 def test_headless_sets_what_the_file_says_and_settings_win(folder):
     (folder / "seen.yaml").write_text(
         "headless: {a.video: false, a.size: 1}\nnodes: {a: {module: m, parameters: {video: true}}}"

@@ -7,7 +7,7 @@ import pytest
 from paramove.bus import topics
 from paramove.documents.positions import DocumentError
 from paramove.supervision.interfaces import InterfaceError, read_interface
-from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
 from paramove.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
@@ -31,7 +31,7 @@ def test_topics_with_a_speaker_pass(workspace):
     interfaces = checked(workspace, "nodes: {robot: {module: nodes.actor}, ear: {module: nodes.listener}}")
     assert interfaces["ear"].subscribes == (topics.SPEECH,)
     assert interfaces["ear"].parameters == ("loudness", "language")
-    assert clock_speaker(interfaces) is None
+    assert clock_publisher(interfaces) is None
 
 
 @pytest.mark.parametrize(
@@ -40,9 +40,9 @@ def test_topics_with_a_speaker_pass(workspace):
         (
             "nodes:\n  ear: {module: nodes.listener}",
             "2:3",
-            "'ear' hears speech, which no node of this launch file says",
+            "'ear' subscribes to speech, which no node of this launch file publishes",
         ),
-        ("nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor}", "3:3", "'b' and 'a' both say speech"),
+        ("nodes:\n  a: {module: nodes.actor}\n  b: {module: nodes.actor}", "3:3", "'b' and 'a' both publish speech"),
         ("nodes:\n  a: {module: nodes.acter}", "2:7", "there is no module 'nodes.acter'"),
         ("after_run: nodes.jugde\nnodes:\n  a: {module: nodes.actor}", "1:1", "there is no module 'nodes.jugde'"),
         ("nodes:\n  w: {module: nodes.world}", "2:3", "uses truth/state but has no 'truth: true'"),
@@ -88,7 +88,7 @@ def test_optional_topic_needs_no_speaker(workspace):
     ("source", "subscribes"),
     [
         ("_TWO = (topics.SPEECH, topics.CLOCK)\nSUBSCRIBES = _TWO + (topics.RULES,)", ["speech", "clock", "rules"]),
-        ("SUBSCRIBES = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/light", "rules"]),
+        ("SUBSCRIBES = (*topics.TOPICS[:2], topics.RULES)", ["clock", "camera/image_raw", "rules"]),
         ("SUBSCRIBES = tuple(t for t in topics.TOPICS if t.name == 'rules')", ["rules"]),
         ("SUBSCRIBES = topics.TOPICS", [topic.name for topic in topics.TOPICS]),
     ],

@@ -61,7 +61,7 @@ def tau_histogram(action: Ints, tau: Floats, weights: Floats, n_actions: int, n_
 
 
 def best_pose(poses: Floats, weights: Floats) -> Floats:
-    """Pose of the particle with the greatest weight (6.16). Shape (D,)."""
+    """Pose of the particle with the largest weight (6.16). Shape (D,)."""
     return np.asarray(poses[int(weights.argmax())])
 
 

@@ -65,8 +65,8 @@ AT_TABLE = TablePlace()
 
 def certainty(deviation: ArrayLike) -> float:
     """0 to 1 of a target with these deviations along x, y, z in m."""
-    greatest = float(np.max(np.asarray(deviation, dtype=np.float64)))
-    return float(np.clip(1.0 - greatest / UNCERTAIN_M, 0.0, 1.0))
+    maximum = float(np.max(np.asarray(deviation, dtype=np.float64)))
+    return float(np.clip(1.0 - maximum / UNCERTAIN_M, 0.0, 1.0))
 
 
 def ball_colour(certain: float) -> tuple[float, float, float]:

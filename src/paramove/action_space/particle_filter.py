@@ -24,7 +24,7 @@ class FilterOptions:
         n_particles: 400 in the thesis.
         resample_below: particles are resampled when their effective number is below this share of them; otherwise they
             keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
-        least_effective: if a likelihood leaves fewer effective particles than this share, it is flattened until it
+        min_effective: if a likelihood leaves fewer effective particles than this share, it is flattened until it
             leaves so many: with several views it is sharper than 400 particles are dense. 0 never flattens.
         evidence_rate_hz: frames that follow each other faster are not independent (the same shadow misleads all of
             them): together they count as so many a second. inf takes each frame for all, as the thesis does.
@@ -32,17 +32,17 @@ class FilterOptions:
 
     n_particles: int = 400
     resample_below: float = 0.5
-    least_effective: float = 0.1
+    min_effective: float = 0.1
     evidence_rate_hz: float = 20.0
 
     def __post_init__(self) -> None:
         """Raises InputError for numbers that are none of these."""
         if self.n_particles < 2:
             raise InputError(f"n_particles is at least 2, found {self.n_particles}")
-        if not (0.0 <= self.resample_below <= 1.0 and 0.0 <= self.least_effective < 1.0):
+        if not (0.0 <= self.resample_below <= 1.0 and 0.0 <= self.min_effective < 1.0):
             raise InputError(
-                "resample_below lies between 0 and 1 and least_effective below 1, found "
-                f"{self.resample_below}, {self.least_effective}"
+                "resample_below lies between 0 and 1 and min_effective below 1, found "
+                f"{self.resample_below}, {self.min_effective}"
             )
         if not self.evidence_rate_hz > 0.0:
             raise InputError(f"evidence_rate_hz is positive, found {self.evidence_rate_hz}")
@@ -50,7 +50,7 @@ class FilterOptions:
     @classmethod
     def thesis(cls) -> FilterOptions:
         """Selection in every frame, likelihoods as they are."""
-        return cls(resample_below=1.0, least_effective=0.0, evidence_rate_hz=float("inf"))
+        return cls(resample_below=1.0, min_effective=0.0, evidence_rate_hz=float("inf"))
 
     def independence(self, elapsed_s: float) -> float:
         """Exponent of the likelihood of a frame that comes so long after the one before; 1 for the first."""
@@ -62,7 +62,7 @@ class Measurement:
     """What measuring did.
 
     Attributes:
-        best: greatest log-likelihood of a particle, nats.
+        best: largest log-likelihood of a particle, nats.
         evidence: ln p(I_t | I_1 ... I_{t-1}), nats.
         temper: exponent by which the likelihood was flattened; 1 if it was not.
         effective: effective number of particles afterwards.
@@ -96,7 +96,7 @@ class ParticleFilter:
     def measure(self, log_likelihoods: Floats, independence: float = 1.0) -> Measurement:
         """Weights the particles by the likelihood of the pose of each (6.7), to the power `independence`."""
         particles = self.particles
-        wanted = self.options.least_effective * len(particles)
+        wanted = self.options.min_effective * len(particles)
         flattened = independence * log_likelihoods
         temper = tempering(particles.weights, flattened, wanted)
         with np.errstate(divide="ignore"):
@@ -153,8 +153,8 @@ def effective_number(weights: Floats) -> float:
 
 def log_sum(values: Floats) -> float:
     """ln sum exp."""
-    greatest = float(values.max())
-    return greatest + float(np.log(np.exp(values - greatest).sum()))
+    maximum = float(values.max())
+    return maximum + float(np.log(np.exp(values - maximum).sum()))
 
 
 def tempering(weights: Floats, log_likelihoods: Floats, wanted: float) -> float:

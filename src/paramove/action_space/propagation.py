@@ -31,7 +31,7 @@ class PropagationOptions:
         theta_share: if positive, no diffusion of theta is larger than this share of its deviation in the posterior, so
             that a target that is known stays known. 0 leaves this out.
         theta_floor: but no smaller than this share of sigma(tau): a posterior may be narrow at a wrong place.
-        theta_least: deviation of components that the grammar hands over, and the least of all others.
+        theta_min: deviation of components that the grammar hands over, and the least of all others.
         deviation_memory_s: time in which the deviation of a performance from its mean changes; 0 draws it anew in every
             frame, as the thesis does.
         deviation_renewed: share of particles whose deviation is drawn anew all the same.
@@ -49,7 +49,7 @@ class PropagationOptions:
     theta_decay: float = 2.0 * float(np.log(4.0))
     theta_share: float = 0.5
     theta_floor: float = 0.2
-    theta_least: float = 0.01
+    theta_min: float = 0.01
     deviation_memory_s: float = 0.8
     deviation_renewed: float = 0.1
     mirrored: float = 0.02
@@ -73,7 +73,7 @@ class PropagationOptions:
         """Propagation as in 6.4.4, with a fresh deviation in every frame and nothing added."""
         return cls(
             theta_share=0.0,
-            theta_least=0.0,
+            theta_min=0.0,
             deviation_memory_s=0.0,
             deviation_renewed=0.0,
             mirrored=0.0,
@@ -175,7 +175,7 @@ class Propagation:
         if options.theta_share > 0.0:
             capped = np.minimum(sigma, options.theta_share * known[self.actions[step]])
             sigma = np.maximum(capped, options.theta_floor * sigma)
-        sigma = np.where(self._free[step], np.maximum(sigma, options.theta_least), options.theta_least)
+        sigma = np.where(self._free[step], np.maximum(sigma, options.theta_min), options.theta_min)
         theta += np.sqrt(frames) * sigma * rng.standard_normal(theta.shape)
         low, high = self._bounds[step].T
         theta[:] = reflected(theta, low[:, None], high[:, None])

@@ -13,7 +13,7 @@ from paramove.action_space.vocabulary import PLACE_SIZE, ActionModel, Vocabulary
 from paramove.documents import Floats, Ints
 
 CONTACT = 0.8
-"""Share of the greatest dependence of the hand on a place from which on the hand is at that place."""
+"""Share of the largest dependence of the hand on a place from which on the hand is at that place."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from paramove.documents import InputError, read_document
 from paramove.observation import ArmObserver, ArmSizes
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
-LEAST_GROWN = 0.8
+MIN_GROWN = 0.8
 """Arm length of grown people over the demonstrator's, at least."""
 SYNTHETIC = ("pointing", "reaching")
 
@@ -86,7 +86,7 @@ class TrackingSetup(BaseModel):
             arm poses over (u, v).
         grammar: File; without one, any of the actions follows any.
         particles: Hypotheses.
-        least_log_likelihood: Of the best hypothesis, nats; below it for half a second the arm is lost, however used the
+        min_log_likelihood: Of the best hypothesis, nats; below it for half a second the arm is lost, however used the
             track is to it. For cameras that see the arm now and then only; None: lost only where it was better before.
         rate_hz: Of the cameras.
         seed: Of the filter.
@@ -101,7 +101,7 @@ class TrackingSetup(BaseModel):
     actions: tuple[str, ...] = Field(default=("pointing",), min_length=1)
     grammar: Path | None = None
     particles: int = Field(default=400, ge=50, le=20_000)
-    least_log_likelihood: float | None = None
+    min_log_likelihood: float | None = None
     rate_hz: float = Field(default=15.0, gt=0.5, le=240.0)
     seed: int = Field(default=0, ge=0)
 
@@ -114,7 +114,7 @@ class TrackingSetup(BaseModel):
         options = TrackerOptions(
             filter=FilterOptions(n_particles=self.particles),
             detection=_detection(person.placement.scale),
-            health=HealthOptions(least_log_likelihood=self.least_log_likelihood),
+            health=HealthOptions(min_log_likelihood=self.min_log_likelihood),
         )
         tracker = ActionTracker(vocabulary, grammar, person.placement, options, self.seed)
         observer = ArmObserver(person.sizes, cameras, table=self.table)
@@ -125,7 +125,7 @@ class TrackingSetup(BaseModel):
 
 def _detection(scale: float) -> DetectionOptions:
     """How far and fast a hand goes between targets, of an arm so long; grown people's are all measured alike."""
-    return DetectionOptions() if scale > LEAST_GROWN else DetectionOptions().scaled(scale)
+    return DetectionOptions() if scale > MIN_GROWN else DetectionOptions().scaled(scale)
 
 
 def _action(name: str) -> ActionModel:

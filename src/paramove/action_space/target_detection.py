@@ -16,27 +16,27 @@ class DetectionOptions:
     """When a target counts as reached.
 
     Attributes:
-        most_deviation: of theta, (6.15); 0.2 in the thesis.
-        least_contact: posterior probability that the progress is one at which the hand is where theta says.
+        max_deviation: of theta, (6.15); 0.2 in the thesis.
+        min_contact: posterior probability that the progress is one at which the hand is where theta says.
         window_s: over which the hand's velocity is measured; at least three frames.
-        approach_speed: m/s, the hand goes somewhere. A slower one does so once it has gone `least_travel_m`.
+        approach_speed: m/s, the hand goes somewhere. A slower one does so once it has gone `min_travel_m`.
         still_speed: m/s, that of a hand that rests, as it is measured.
-        stop_share: the hand has arrived when its speed along the approach is below this share of the greatest: 0 in the
+        stop_share: the hand has arrived when its speed along the approach is below this share of the largest: 0 in the
             thesis, but the measured speed of a hand that rests need not cross 0.
         turning_s: time over which the direction of the approach follows a curved path.
-        least_travel_m: a hand that did not go as far since it arrived is still at the same target, and targets are so
+        min_travel_m: a hand that did not go as far since it arrived is still at the same target, and targets are so
             far apart unless it went `returned_m` between them.
         returned_m: as far a hand goes that points at one place twice.
     """
 
-    most_deviation: float = 0.2
-    least_contact: float = 0.5
+    max_deviation: float = 0.2
+    min_contact: float = 0.5
     window_s: float = 0.16
     approach_speed: float = 0.25
     still_speed: float = 0.06
     stop_share: float = 0.12
     turning_s: float = 0.15
-    least_travel_m: float = 0.08
+    min_travel_m: float = 0.08
     returned_m: float = 0.25
 
     def __post_init__(self) -> None:
@@ -49,7 +49,7 @@ class DetectionOptions:
 
     def scaled(self, factor: float) -> DetectionOptions:
         """The same for movements that are so much larger and take as long."""
-        lengths = ("approach_speed", "still_speed", "least_travel_m", "returned_m")
+        lengths = ("approach_speed", "still_speed", "min_travel_m", "returned_m")
         return replace(self, **{name: factor * getattr(self, name) for name in lengths})
 
 
@@ -106,7 +106,7 @@ class HandMotion:
         return self.along < 0.0 or (self.along < still and self.speed < 2.0 * still)
 
     def begin_approach(self) -> None:
-        """The approach that begins now has a greatest speed and a direction of its own."""
+        """The approach that begins now has a largest speed and a direction of its own."""
         self.peak = self.along = self.speed
         self._approach = self._velocity()
 
@@ -146,7 +146,7 @@ class TargetDetector:
         """
         self.passed(time_s, hand)
         options = self.options
-        certain = contact >= options.least_contact and theta.deviation < options.most_deviation
+        certain = contact >= options.min_contact and theta.deviation < options.max_deviation
         if self._arrived_s is not None and certain:
             self._take(self._arrived_s, action, theta, place)
         return self.latest
@@ -157,7 +157,7 @@ class TargetDetector:
         motion.update(time_s, hand)
         if self._rested_at is not None:
             self._travelled_m = max(self._travelled_m, float(np.linalg.norm(hand - self._rested_at)))
-        far = self._travelled_m >= self.options.least_travel_m
+        far = self._travelled_m >= self.options.min_travel_m
         if not self._approaching and (motion.speed > self.options.approach_speed or far):
             self._approaching, self._arrived_s = True, None
             motion.begin_approach()
@@ -172,7 +172,7 @@ class TargetDetector:
 
     def _arrive(self, time_s: float, hand: Floats) -> None:
         self._approaching, self._arrived_s = False, time_s
-        if self._rested_at is None or self._travelled_m >= self.options.least_travel_m:
+        if self._rested_at is None or self._travelled_m >= self.options.min_travel_m:
             self._came_m = np.inf if self._rested_at is None else self._travelled_m
             self._rested_at, self._weight = hand, 0.0
         elif self._weight > 0.0 and self.latest is not None:
@@ -202,4 +202,4 @@ class TargetDetector:
         """Whether a place at which the hand just arrived is the latest target, which it left only a little."""
         if self.latest is None or self._came_m >= self.options.returned_m:
             return False
-        return float(np.linalg.norm(place - self.latest.place)) < self.options.least_travel_m
+        return float(np.linalg.norm(place - self.latest.place)) < self.options.min_travel_m

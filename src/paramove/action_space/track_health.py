@@ -10,7 +10,7 @@ from paramove.documents import InputError
 from paramove.observation import Presence
 
 KEPT_SHARE = 0.9
-"""Of the greatest change: while the arm is lost it must fall below that."""
+"""Of the largest change: while the arm is lost it must fall below that."""
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,14 @@ class HealthOptions:
         rise: share of `memory_s` in which it becomes better: a while before a contrasting background raises no demands
             on what follows, and an arm that is gone must not hide in how much better a swift one was.
         drop_deviations: the best log-likelihood is far below the usual beyond so many usual deviations downwards.
-        least_drop, most_drop: nats, of the likelihood flattened as it usually is; but not within the one, and in any
+        min_drop, max_drop: nats, of the likelihood flattened as it usually is; but not within the one, and in any
             case beyond the other.
-        least_log_likelihood: nats; far below in any case. None: not known.
+        min_log_likelihood: nats; far below in any case. None: not known.
         lost_after_s: lost when it is far below for so long.
         found_after_s: found when it is not for so long.
         found_share: of what is allowed; while the arm is lost it must come back so near.
-        least_there: of -1 to 1, see `Presence`; less means that but the background is seen where the arm should be.
-        most_changed: times the arm's area; more means that somebody left or came, or that a camera was moved.
+        min_there: of -1 to 1, see `Presence`; less means that but the background is seen where the arm should be.
+        max_changed: times the arm's area; more means that somebody left or came, or that a camera was moved.
         absent_after_s: lost when one of both is so for so long.
     """
 
@@ -38,20 +38,20 @@ class HealthOptions:
     memory_s: float = 4.0
     rise: float = 0.3
     drop_deviations: float = 3.0
-    least_drop: float = 3.0
-    most_drop: float = 5.0
-    least_log_likelihood: float | None = None
+    min_drop: float = 3.0
+    max_drop: float = 5.0
+    min_log_likelihood: float | None = None
     lost_after_s: float = 0.5
     found_after_s: float = 0.3
     found_share: float = 0.5
-    least_there: float = -0.3
-    most_changed: float = 2.5
+    min_there: float = -0.3
+    max_changed: float = 2.5
     absent_after_s: float = 0.1
 
     def __post_init__(self) -> None:
         """Raises InputError for times and drops that are not positive."""
         for name in vars(self):
-            if name in ("least_log_likelihood", "least_there"):
+            if name in ("min_log_likelihood", "min_there"):
                 continue
             if not 0.0 < getattr(self, name) < np.inf:
                 raise InputError(f"{name} is positive and finite, found {getattr(self, name)}")
@@ -91,9 +91,9 @@ class TrackHealth:
         self._absent_s = self._absent_s + elapsed_s if self.absence else 0.0
         settled = self._learned_s >= self.options.settle_s
         self.shortfall = self._temper * (self._usual - best) if settled else 0.0
-        least = self.options.least_log_likelihood
+        minimum = self.options.min_log_likelihood
         allowed = self._allowed() * (self.options.found_share if self.lost else 1.0)
-        bad = bool(self.absence) or (settled and self.shortfall > allowed) or (least is not None and best < least)
+        bad = bool(self.absence) or (settled and self.shortfall > allowed) or (minimum is not None and best < minimum)
         self._bad_s = self._bad_s + elapsed_s if bad else 0.0
         self._good_s = 0.0 if bad else self._good_s + elapsed_s
         if not bad and not self.lost:
@@ -106,17 +106,17 @@ class TrackHealth:
             self.lost_since_s = None
 
     def _absence(self, presence: Presence) -> str:
-        most = self.options.most_changed * (KEPT_SHARE if self.lost else 1.0)
-        if presence.changed > most:
+        maximum = self.options.max_changed * (KEPT_SHARE if self.lost else 1.0)
+        if presence.changed > maximum:
             return (
                 f"the images have changed in {presence.changed:.1f} times the arm's area: somebody came or left, or a "
                 "camera was moved"
             )
-        return "there is but the background where it should be" if presence.there < self.options.least_there else ""
+        return "there is but the background where it should be" if presence.there < self.options.min_there else ""
 
     def _allowed(self) -> float:
         usual = self.options.drop_deviations * self._temper * float(np.sqrt(self._variance))
-        return min(max(self.options.least_drop, usual), self.options.most_drop)
+        return min(max(self.options.min_drop, usual), self.options.max_drop)
 
     def _learn(self, elapsed_s: float, best: float, temper: float) -> None:
         """Mean and spread downwards over the latest `memory_s`, all of the track while it is shorter."""

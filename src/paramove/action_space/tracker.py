@@ -29,7 +29,7 @@ from paramove.action_space.vocabulary import Vocabulary
 from paramove.documents import Floats, InputError, Ints
 from paramove.observation import HAND, Presence
 
-LEAST_CONCENTRATION = 0.8
+MIN_CONCENTRATION = 0.8
 """Length of the mean of the progress as a direction, 0 (spread over all of the action) to 1."""
 JUMP = 0.25
 """Of the progress, beyond what the time between two frames explains."""
@@ -299,7 +299,7 @@ class ProgressJumps:
         to its beginning.
         """
         mean = weights @ np.exp(2j * np.pi * tau) / max(float(weights.sum()), 1e-300)
-        if abs(mean) < LEAST_CONCENTRATION:
+        if abs(mean) < MIN_CONCENTRATION:
             return
         now = float(np.angle(mean)) / (2.0 * np.pi)
         if self._last is not None and self._last[0] == action:

@@ -12,7 +12,7 @@ from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
 from paramove.documents import Floats, Image
 from paramove.observation import ArmObserver
 
-LEAST_SHARPNESS = 3.0
+MIN_SHARPNESS = 3.0
 """Grey levels per px that the strongest edges of an image reach; noise in the dark stays below 2, a lit scene is above
 10."""
 
@@ -167,7 +167,7 @@ class VideoTracker:
     def _look(self, images: Sequence[Image | None]) -> list[str]:
         """Gives the observer the images in which there are edges; sentences about the others."""
         self._observer.look(images)
-        dark = self._observer.sharpness < LEAST_SHARPNESS  # NaN, for a missing view, is not below
+        dark = self._observer.sharpness < MIN_SHARPNESS  # NaN, for a missing view, is not below
         if not dark.any():
             return []
         self._observer.look([None if bad else image for bad, image in zip(dark, images, strict=True)])

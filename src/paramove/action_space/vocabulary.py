@@ -21,7 +21,7 @@ POSE_SIZES = (3 * len(POSE_POINTS), 3 * len(BENT_POSE_POINTS))
 THETA_BOUNDS = (-0.2, 1.2)
 PLACE_SIZE = 2
 """Components of one place (u, v); theta is one or more places, the last of which is where the hand goes."""
-LEAST_APART = 0.15
+MIN_APART = 0.15
 """Of the progress: nearer moments are alike because they are near, not because one mirrors the other."""
 ALIKE = 0.10
 """m, root mean square over the three points of a pose: poses as near as that may be taken for each other."""
@@ -54,7 +54,7 @@ class ActionModel:
             or 12.
         duration_s: mean duration T_a.
         parameter_names: one for each of the P components of theta, two components a place.
-        bounds: theta stays within, (least, greatest) for every component.
+        bounds: theta stays within, (minimum, maximum) for every component.
         target: where the hand goes for theta (..., P), (..., 3), m, in the frame of the model.
         kept_variance: share of the variance of a pose that its deviation carries; the fewer components, the better
             few particles cover them. 1.0 keeps all, as (6.3).
@@ -153,7 +153,7 @@ class ActionModel:
             self.pose_size / 3
         )
         number = np.arange(n_states)
-        apart[np.abs(number[:, None] - number) < LEAST_APART * n_states] = np.inf
+        apart[np.abs(number[:, None] - number) < MIN_APART * n_states] = np.inf
         nearest = apart.argmin(axis=1)
         return np.asarray(np.where(apart.min(axis=1) <= ALIKE, nearest / max(n_states - 1, 1), -1.0))
 

@@ -134,7 +134,7 @@ class ReachTask:
 
     def on_joint_states(self, message: JointStates) -> None:
         """Hear the measured joints."""
-        self._joints.hear(message, self._now_ns)
+        self._joints.handle(message, self._now_ns)
 
     def on_safety(self, message: SafetyState) -> None:
         """Hear the safety gate's state."""
@@ -269,7 +269,7 @@ class SettledJoints:
         joints: Names, in the order that is wanted.
 
     Attributes:
-        missing: Of these names, those that the newest message did not have.
+        missing: Of these names, those that the latest message did not have.
     """
 
     def __init__(self, joints: Sequence[str]) -> None:
@@ -277,7 +277,7 @@ class SettledJoints:
         self._heard: deque[tuple[int, Floats]] = deque()
         self.missing: tuple[str, ...] = ()
 
-    def hear(self, message: JointStates, now_ns: int) -> None:
+    def handle(self, message: JointStates, now_ns: int) -> None:
         """Take in measured joints; a message in which one is missing, or no angle, counts for nothing."""
         measured = {joint.name: joint.position for joint in message.joints}
         self.missing = tuple(name for name in self._joints if name not in measured)
@@ -289,7 +289,7 @@ class SettledJoints:
             self._heard.popleft()
 
     def settled(self, now_ns: int) -> Floats | None:
-        """The newest angles [J], rad, if the joints have rested for a while and are heard; else None."""
+        """The latest angles [J], rad, if the joints have rested for a while and are heard; else None."""
         if not self._heard or now_ns - self._heard[-1][0] > STALE_NS or now_ns - self._heard[0][0] < REST_NS:
             return None
         if np.ptp([angles for _, angles in self._heard], axis=0).max() > REST_TOLERANCE:

@@ -188,7 +188,7 @@ class Relocator:
     def _pointed_at_object(self, gesture: Gesture) -> None:
         offset = (gesture.x - self._object_at[0], gesture.y - self._object_at[1])
         doubt = self._doubt(gesture)
-        if not doubt and not math.hypot(*offset) <= self._options.most_offset:  # NaN is not below either
+        if not doubt and not math.hypot(*offset) <= self._options.max_offset:  # NaN is not below either
             doubt = f"You point at {cm((gesture.x, gesture.y))}, but the object stands at {cm(self._object_at)}."
         if doubt:
             self._ask_to_align(f"{doubt} ")
@@ -202,10 +202,10 @@ class Relocator:
         o = self._options
         if gesture.frame != o.frame:
             return f"You point at a place in the frame {gesture.frame!r}; I only know places in {o.frame!r}."
-        if not gesture.confidence >= o.least_certainty:  # NaN is not at least anything
+        if not gesture.confidence >= o.min_certainty:  # NaN is not at least anything
             return (
                 f"I am not sure where you point: certain to {100 * gesture.confidence:.0f} %, "
-                f"{100 * o.least_certainty:.0f} % are needed."
+                f"{100 * o.min_certainty:.0f} % are needed."
             )
         return ""
 
@@ -215,7 +215,7 @@ class Relocator:
         if not o.area.contains(place):
             first, last = (cm(corner) for corner in zip(o.area_x, o.area_y, strict=True))
             return f"You point at {cm(place)}, which I do not reach: my working area goes from {first} to {last}."
-        near = [other for other in o.standing if math.dist(other, place) < o.least_gap]
+        near = [other for other in o.standing if math.dist(other, place) < o.min_gap]
         if near:
             return f"You point at {cm(place)}, but something stands there, at {cm(near[0])}."
         return ""

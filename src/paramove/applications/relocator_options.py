@@ -21,12 +21,12 @@ class RelocatorOptions(OldNames):
         grasp_z: Height at which a standing object is grasped.
         area_x, area_y: Working area; a place outside is not taken.
         standing: Places of other objects, which stay where they are.
-        least_gap: Between the middles of two objects.
+        min_gap: Between the middles of two objects.
         places: How many places are pointed at.
         aligns: Whether the person first points at the object, whose place is known. As far beside it as the tracker
             finds that, it finds every place: person and cameras are measured a little wrong.
-        most_offset: A person who points farther beside the object does not point at it.
-        least_certainty: Of a place, 0 to 1; for a less certain one the robot asks again. 0.85 is a deviation of 1.5 cm.
+        max_offset: A person who points farther beside the object does not point at it.
+        min_certainty: Of a place, 0 to 1; for a less certain one the robot asks again. 0.85 is a deviation of 1.5 cm.
         hand_away: The person's hand has left when it is so far from the place pointed at.
         hand_away_s: And has been for so long.
         attempts: How often in a row an object is tried to be fetched before the person is asked.
@@ -40,6 +40,9 @@ class RelocatorOptions(OldNames):
     old_names = (
         ("patience_s", "ask_again_s"),
         ("arm_patience_s", "arming_timeout_s"),
+        ("least_gap", "min_gap"),
+        ("most_offset", "max_offset"),
+        ("least_certainty", "min_certainty"),
     )
 
     object_name: str = "yellow"
@@ -49,11 +52,11 @@ class RelocatorOptions(OldNames):
     area_x: Range = (0.125, 0.19)
     area_y: Range = (-0.105, 0.07)
     standing: tuple[Place, ...] = ()
-    least_gap: float = Field(0.05, ge=0)
+    min_gap: float = Field(0.05, ge=0)
     places: int = Field(3, ge=1, le=1000)
     aligns: bool = True
-    most_offset: float = Field(0.035, gt=0)
-    least_certainty: float = Field(0.85, ge=0, le=1)
+    max_offset: float = Field(0.035, gt=0)
+    min_certainty: float = Field(0.85, ge=0, le=1)
     hand_away: float = Field(0.08, gt=0)
     hand_away_s: float = Field(0.3, ge=0)
     attempts: int = Field(3, ge=1)

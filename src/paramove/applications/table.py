@@ -11,7 +11,7 @@ AT_REST = frozenset({Gesture.KIND_APPEARED, Gesture.KIND_RESTED})
 
 @dataclass(frozen=True)
 class Sighting:
-    """The newest thing seen of an object.
+    """The latest thing seen of an object.
 
     Attributes:
         kind: Of `Gesture.Kind`: appeared, moved, rested or vanished.
@@ -48,7 +48,7 @@ class Surface:
 
 
 class Table:
-    """Keeps the newest sighting of every object, and whether the hand is in view."""
+    """Keeps the latest sighting of every object, and whether the hand is in view."""
 
     def __init__(self) -> None:
         self.objects: dict[str, Sighting] = {}

@@ -36,4 +36,4 @@ from .topics import HUMAN_ARM_POSE as HUMAN_ARM_POSE
 from .topics import TOPICS as TOPICS
 from .topics import Topic as Topic
 from .visitor import BusVisitor as BusVisitor
-from .visitor import say_now as say_now
+from .visitor import publish_now as publish_now

@@ -1,10 +1,10 @@
-"""Lockstep, the simulator's side: says the clock and waits for the members.
+"""Lockstep, the simulator's side: publishes the clock and waits for the members.
 
 barrier = LockstepBarrier(bus)
 if barrier.wait_for_members():
     while not bus.stopped:
         bus.publish(...)                            # what the world shows at this time
-        for heard in barrier.advance(now_ns): ...   # says the beat; what the members said in it
+        for received in barrier.advance(now_ns): ...   # publishes the tick; what the members published in it
         # step the world by one period
 """
 
@@ -36,22 +36,22 @@ MAX_ANSWER_BYTES = 2**18
 
 
 class LockstepBarrier:
-    """The one who says the clock.
+    """The publisher of the clock.
 
-    With `bus.settings.lockstep` a beat ends when every member has said DONE. A member whose process ends or that says
-    LEAVE is waited for no more and is named in `lost`; when it is started again it joins at the next beat. There is no
-    time limit: a member that hangs is named in the log every 5 s, and the supervisor decides what becomes of it.
-    Without lockstep the clock is only said, and its caller paces it.
+    With `bus.settings.lockstep` a tick ends when every member has published DONE. A member whose process ends or that
+    publishes LEAVE is waited for no more and is named in `lost`; when it is started again it joins at the next tick.
+    There is no time limit: a member that hangs is named in the log every 5 s, and the supervisor decides what becomes
+    of it. Without lockstep the clock is only published, and its caller paces it.
 
     Args:
-        bus: A bus that says `clock`.
+        bus: A bus that publishes `clock`.
         members: Names of the nodes to wait for; default `bus.settings.members`.
 
     Attributes:
         members: Nodes that time waits for at present.
         lost: Nodes that have left, in order.
-        tick: Number of the newest beat. 0 is the handshake.
-        refused: How many answers were not what a member says.
+        tick: Number of the latest tick. 0 is the handshake.
+        refused: How many answers were not those of a member.
     """
 
     def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:
@@ -78,46 +78,46 @@ class LockstepBarrier:
         return frozenset(self._marks)
 
     def wait_for_members(self) -> bool:
-        """Waits until every expected member has joined and everybody hears everybody; False if the bus was stopped.
+        """Waits until all expected members have joined and are connected; False if the bus was stopped.
 
-        What the simulator says before is kept and goes out afterwards, so that nobody misses it.
+        What the simulator publishes before is queued and goes out afterwards, so that nobody misses it.
         """
         if not self._lockstep:
             return not self._exchange.stopped
         while not self._exchange.stopped and self._expected - self._newcomers.keys():
             self._wait(self._expected - self._newcomers.keys(), "join")
-        self._beat(self._bus.now_ns)
+        self._publish_tick(self._bus.now_ns)
         self._bus.read_up_to(self._all_marks(), keep=True)
         self._bus.release()
         return not self._exchange.stopped
 
     def advance(self, now_ns: int) -> list[Received]:
-        """Says the next beat and, in lockstep, waits until all members are done with it.
+        """Publishes the next tick and, in lockstep, waits until all members are done with it.
 
         Args:
-            now_ns: Simulated time of the beat, not before the last one.
+            now_ns: Simulated time of the tick, not before the last one.
 
         Returns:
-            What was said to this bus in the beat, in an order that is the same in every run.
+            What this bus received in the tick, in an order that is the same in every run.
         """
         self.tick += 1
-        self._beat(now_ns)
+        self._publish_tick(now_ns)
         return self._bus.read_up_to(self._all_marks())
 
-    def _beat(self, now_ns: int) -> None:
+    def _publish_tick(self, now_ns: int) -> None:
         self._admit()
         self._bus.keep_time(now_ns)
         self._answered.clear()
-        beat = Clock(time_ns=now_ns, tick=self.tick, period_ns=TICK_PERIOD_NS, lockstep=self._lockstep)
-        beat.said.extend(from_marks(self._all_marks()))
-        self._bus.say_at_once(topics.CLOCK, beat)
+        clock = Clock(time_ns=now_ns, tick=self.tick, period_ns=TICK_PERIOD_NS, lockstep=self._lockstep)
+        clock.published.extend(from_marks(self._all_marks()))
+        self._bus.publish_at_once(topics.CLOCK, clock)
         while not self._exchange.stopped and (missing := self._marks.keys() - self._answered):
             self._wait(missing, f"be done with tick {self.tick}")
 
     def _all_marks(self) -> dict[str, tuple[int, int]]:
         marks = self._exchange.marks()
-        for said in self._marks.values():
-            marks |= said
+        for published in self._marks.values():
+            marks |= published
         return marks
 
     def _open(self) -> None:
@@ -172,7 +172,7 @@ class LockstepBarrier:
             return True
         if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:
             return False  # of a process that is no member any more
-        self._marks[node] = to_marks(answer.said)
+        self._marks[node] = to_marks(answer.published)
         if answer.kind == TickDone.KIND_LEAVE:
             self._remove(node, "left")
         elif answer.tick == self.tick:
@@ -180,9 +180,9 @@ class LockstepBarrier:
         return True
 
     def _admit(self) -> None:
-        """Takes newcomers in; done between beats only, so that each beat has one set of members."""
+        """Takes newcomers in; done between ticks only, so that each tick has one set of members."""
         for node, greeting in sorted(self._newcomers.items()):
-            self._marks[node] = to_marks(greeting.said)
+            self._marks[node] = to_marks(greeting.published)
             if self.tick > 0:
                 _log.warning("lockstep: %s joins at tick %d", node, self.tick)
         self._newcomers.clear()

@@ -1,7 +1,7 @@
 """How fast a topic may come.
 
-A speaker gone wild must not take its listeners' time. Time is read from the messages' own stamps, on the bus clock: so
-a listener that was busy for a while, or simulated time that runs fast, breaks no budget.
+A publisher gone wild must not take its subscribers' time. Time is read from the messages' own stamps, on the bus clock:
+so a subscriber that was busy for a while, or simulated time that runs fast, breaks no budget.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ class RateBudget:
         self._leak_per_ns = ALLOWANCE * 1e-9 * (rate_hz or 0.0)
         self._epoch: int | None = None
         self._level = 0.0
-        self._newest_ns = 0
+        self._latest_ns = 0
 
     def admits(self, epoch: int, published_ns: int) -> bool:
         """Whether a message of that publish time is within the budget, which it then uses up."""
         if self.rate_hz is None:
             return True
         if epoch != self._epoch:
-            self._epoch, self._level, self._newest_ns = epoch, 0.0, published_ns
-        if published_ns > self._newest_ns:
-            self._level = max(0.0, self._level - (published_ns - self._newest_ns) * self._leak_per_ns)
-            self._newest_ns = published_ns
+            self._epoch, self._level, self._latest_ns = epoch, 0.0, published_ns
+        if published_ns > self._latest_ns:
+            self._level = max(0.0, self._level - (published_ns - self._latest_ns) * self._leak_per_ns)
+            self._latest_ns = published_ns
         if self._level + 1 > BURST:
             return False
         self._level += 1

@@ -25,16 +25,17 @@ _log = logging.getLogger(__name__)
 
 
 class Bus:
-    """What a node hears and says, and its time.
+    """Topics that a node subscribes to and publishes, and its time.
 
-    Everything happens in the thread that uses the bus: sockets are read and the status is said once a second while the
-    node waits for its next message. A bus that says `clock` keeps the time itself (see `paramove.bus.barrier`).
+    Everything happens in the thread that uses the bus: sockets are read and the status is published once a second
+    while the node waits for its next message. A bus that publishes `clock` keeps the time itself (see
+    `paramove.bus.barrier`).
 
     Args:
         node: Name of the node.
         settings: What the supervisor tells every node of the bus.
-        hears: Topics to hear.
-        says: Topics to say; the status topic is added.
+        subscribes: Topics to subscribe to.
+        publishes: Topics to publish; the status topic is added.
         run_folder: Where the node may write files.
 
     Attributes:
@@ -61,7 +62,7 @@ class Bus:
         self.dropped: Counter[str] = Counter()
         self._taken_up: Received | Tick | None = None
         self.exchange = Exchange(node, settings)
-        self._heard: list[str] = []
+        self._subscribed: list[str] = []
         self._backlog: list[Received] = []
         self._held: list[tuple[Topic, Any, int | None]] = []
         self._tick: Tick | None = None
@@ -70,14 +71,14 @@ class Bus:
             publishes = tuple(publishes)
             self._status = StatusReporter(self.exchange, node)
             for topic in publishes:
-                self.exchange.say(topic)
+                self.exchange.advertise(topic)
             for topic in subscribes:
-                self.hear(topic)
+                self.subscribe(topic)
             self._ticks = self._source_of_time(topics.CLOCK in publishes)
         except BaseException:
             self.exchange.close()
             raise
-        self.exchange.every_second = lambda: self._status.say(self.now_ns)
+        self.exchange.every_second = lambda: self._status.publish(self.now_ns)
 
     @property
     def now_ns(self) -> int:
@@ -94,12 +95,12 @@ class Bus:
 
     @property
     def has_failed(self) -> bool:
-        """Whether the newest state said is `failed`."""
+        """Whether the latest state published is `failed`."""
         return self._status.state == NodeStatus.STATE_FAILED
 
     @property
     def has_ended(self) -> bool:
-        """Whether the newest state said is that the node is about to end well."""
+        """Whether the latest state published is that the node is about to end well."""
         return self._status.state == NodeStatus.STATE_STOPPED
 
     @property
@@ -107,39 +108,41 @@ class Bus:
         """Whether the node was asked to end."""
         return self.exchange.stopped
 
-    def hear(self, topic: Topic) -> None:
-        """Begins to hear one more topic."""
-        self.exchange.hear(topic)
-        if topic.name not in self._heard:
-            self._heard.append(topic.name)
+    def subscribe(self, topic: Topic) -> None:
+        """Subscribes to one more topic."""
+        self.exchange.subscribe(topic)
+        if topic.name not in self._subscribed:
+            self._subscribed.append(topic.name)
 
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
         """Calls `call`, in the bus's thread, as soon as `descriptor` can be read, even between two ticks.
 
-        So another thread of the node can have something said at once. `call` must read the descriptor.
+        So another thread of the node can publish at once. `call` must read the descriptor.
         """
         self.exchange.when_readable(descriptor, call)
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
-        """Says `message`. Never waits.
+        """Publishes `message`. Never waits.
 
-        In lockstep, what is said before the first tick goes out with it: only then does everybody listen.
+        In lockstep, what is published before the first tick goes out with it: only then has everybody subscribed.
 
         Args:
-            topic: One of those the node says.
+            topic: One of those the node publishes.
             message: Of the topic's type.
             captured_ns: When what it tells of was so, ns of the bus clock; default now.
 
         Raises:
-            KeyError: the node does not say this topic.
+            KeyError: the node does not publish this topic.
             TypeError, ValueError: see `Publisher.publish`.
         """
         self.exchange.check_process()
         if topic.name not in self.exchange.publishers:
-            said = ", ".join(sorted(self.exchange.publishers))
-            raise KeyError(f"{self.node} does not say {topic.name}; it says: {said}. Add the topic to PUBLISHES")
-        if self._ticks.may_say:
-            self.say_at_once(topic, message, captured_ns)
+            published = ", ".join(sorted(self.exchange.publishers))
+            raise KeyError(
+                f"{self.node} does not publish {topic.name}; add the topic to PUBLISHES, which has {published}"
+            )
+        if self._ticks.may_publish:
+            self.publish_at_once(topic, message, captured_ns)
         else:
             self._held.append((topic, message, captured_ns))
 
@@ -149,7 +152,7 @@ class Bus:
     def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Received | Tick]: ...
 
     def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
-        """Every message of these topics (default: of all heard, also later on), oldest first, until the bus is stopped.
+        """Every message of these topics (default: of all subscribed, also later on), oldest first, until the bus stops.
 
         Messages of other topics are kept for a later loop, as many as the topic's high water mark.
 
@@ -160,17 +163,17 @@ class Bus:
         return self._events(wanted, tick, conflate=False)
 
     def latest(self, *wanted: Topic) -> Iterator[Received]:
-        """Like `events`, but of each topic only the newest message that has arrived."""
+        """Like `events`, but of each topic only the latest message that has arrived."""
         for event in self._events(wanted, tick=False, conflate=True):
             assert isinstance(event, Received)
             yield event
 
     def starting(self, sentence: str) -> None:
-        """Says what the node is doing before it is ready."""
+        """Publishes what the node is doing before it is ready."""
         self._status.change(NodeStatus.STATE_STARTING, sentence, self.now_ns)
 
     def ready(self, sentence: str) -> None:
-        """Says that the node does its work, and how."""
+        """Publishes that the node does its work, and how."""
         if not self._frozen:  # what lives now lives on: the collector need not look at it again
             self._frozen = True
             gc.collect()
@@ -178,15 +181,15 @@ class Bus:
         self._status.change(NodeStatus.STATE_READY, sentence, self.now_ns)
 
     def degraded(self, sentence: str) -> None:
-        """Says that the node works with less than it should, and what is missing."""
+        """Publishes that the node works with less than it should, and what is missing."""
         self._status.change(NodeStatus.STATE_DEGRADED, sentence, self.now_ns)
 
     def failed(self, sentence: str) -> None:
-        """Says that the node cannot do its work, and why."""
+        """Publishes that the node cannot do its work, and why."""
         self._status.change(NodeStatus.STATE_FAILED, sentence, self.now_ns)
 
     def ended(self, sentence: str) -> None:
-        """Says that the node is about to end well."""
+        """Publishes that the node is about to end well."""
         self._status.change(NodeStatus.STATE_STOPPED, sentence, self.now_ns)
 
     def stop(self) -> None:
@@ -194,14 +197,14 @@ class Bus:
         self.exchange.stop()
 
     def close(self) -> None:
-        """Leaves the bus. Messages said just before still arrive."""
+        """Leaves the bus. Messages published just before still arrive."""
         self.exchange.stop()
         if isinstance(self._ticks, LockstepTicks):
             self._ticks.leave()
         self.exchange.close()
 
     def idle(self, seconds: float) -> None:
-        """Does nothing for so long but what the bus needs: answers subscriptions, says the status, drains sockets.
+        """Does nothing for so long but what the bus needs: answers subscriptions, publishes the status, drains sockets.
 
         For a process with a pace of its own, such as the simulator in real time. Also with no time left the bus gets
         what it needs, once. Ends early only if the bus is stopped.
@@ -211,48 +214,48 @@ class Bus:
         while not self.stopped and (left_s := end_s - time.monotonic()) > 0:
             self.exchange.wait(left_s)
 
-    def wait_for_listener(self, seconds: float) -> None:
-        """Waits until somebody hears the node's status, at most so long.
+    def wait_for_subscriber(self, seconds: float) -> None:
+        """Waits until there is a subscriber to the node's status, at most so long.
 
         For a node that ends as soon as it has begun: else it would take the reason with it.
         """
         end_s = time.monotonic() + seconds
-        while not (self._status.has_listener or self.stopped) and (left_s := end_s - time.monotonic()) > 0:
+        while not (self._status.has_subscriber or self.stopped) and (left_s := end_s - time.monotonic()) > 0:
             self.exchange.wait(left_s)
 
     def read_up_to(self, marks: Marks, keep: bool = False) -> list[Received]:
-        """Waits for everything heard up to the marks; returns it in the order of publish time, then of SUBSCRIBES.
+        """Waits for everything received up to the marks; returns it in the order of publish time, then of SUBSCRIBES.
 
         Args:
             marks: Topic name on the bus -> epoch and sequence.
             keep: Only wait, and leave the messages for the next call.
         """
-        self.exchange.drain(self._heard)
-        read_up_to(self.exchange, marks, self._heard)
-        return [] if keep else self.exchange.take_up_to(marks, self._heard)
+        self.exchange.drain(self._subscribed)
+        read_up_to(self.exchange, marks, self._subscribed)
+        return [] if keep else self.exchange.take_up_to(marks, self._subscribed)
 
     def keep_time(self, now_ns: int) -> None:
-        """Sets the time, on the bus that says `clock`; raises RuntimeError on others or if time ran backwards."""
+        """Sets the time, on the bus that publishes `clock`; raises RuntimeError on others or if time ran backwards."""
         if not isinstance(self._ticks, ExternalClock):
-            raise RuntimeError(f"{self.node} does not say {topics.CLOCK.name}, so it cannot set the time")
+            raise RuntimeError(f"{self.node} does not publish {topics.CLOCK.name}, so it cannot set the time")
         if now_ns < self._ticks.now_ns:
             raise RuntimeError(f"time would run back from {self._ticks.now_ns} ns to {now_ns} ns")
         self._ticks.now_ns = now_ns
 
     def hold(self) -> None:
-        """Keeps what is said from now on until `release`, on the bus that says `clock`."""
+        """Queues what is published from now on until `release`, on the bus that publishes `clock`."""
         assert isinstance(self._ticks, ExternalClock)
-        self._ticks.may_say = False
+        self._ticks.may_publish = False
 
     def release(self) -> None:
-        """Says what was kept, and everything at once from now on."""
+        """Publishes what was kept, and everything at once from now on."""
         if isinstance(self._ticks, ExternalClock):
-            self._ticks.may_say = True
+            self._ticks.may_publish = True
         held, self._held = self._held, []
         for topic, message, captured_ns in held:
-            self.say_at_once(topic, message, captured_ns)
+            self.publish_at_once(topic, message, captured_ns)
 
-    def say_at_once(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
+    def publish_at_once(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         """Like `publish`, but never kept back."""
         now_ns = self.now_ns
         captured_ns = now_ns if captured_ns is None else captured_ns
@@ -266,8 +269,8 @@ class Bus:
     ) -> None:
         self.close()
 
-    def _source_of_time(self, says_clock: bool) -> TickSource:
-        if says_clock:
+    def _source_of_time(self, publishes_clock: bool) -> TickSource:
+        if publishes_clock:
             return ExternalClock()
         if self.settings.clock == "monotonic":
             return RealTimeTicks(self.exchange)
@@ -275,15 +278,19 @@ class Bus:
 
     def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Received | Tick]:
         names = {topic.name for topic in wanted}
-        if unheard := names - set(self._heard):
-            raise KeyError(f"{self.node} does not hear {', '.join(sorted(unheard))}; add the topic to SUBSCRIBES")
+        if not_subscribed := names - set(self._subscribed):
+            raise KeyError(
+                f"{self.node} does not subscribe to {', '.join(sorted(not_subscribed))}; add the topic to SUBSCRIBES"
+            )
         while not self.stopped:
-            while not self.stopped and (heard := self._next_of(names or set(self._heard), conflate)) is not None:
-                yield from self._timed(heard)
+            while (
+                not self.stopped and (received := self._next_of(names or set(self._subscribed), conflate)) is not None
+            ):
+                yield from self._timed(received)
             if tick and self._tick is not None and not self.stopped:
                 now, self._tick = self._tick, None
                 yield from self._timed(now)
-            if not self._next_turn():
+            if not self._next_iteration():
                 return
 
     def _timed(self, event: Received | Tick) -> Iterator[Received | Tick]:
@@ -298,29 +305,29 @@ class Bus:
 
     def _next_of(self, names: set[str], conflate: bool) -> Received | None:
         """Takes the oldest message of these topics out of the backlog; with `conflate` also all others of its topic."""
-        for index, heard in enumerate(self._backlog):
-            if heard.topic.name not in names:
+        for index, received in enumerate(self._backlog):
+            if received.topic.name not in names:
                 continue
-            if conflate and any(later.topic.name == heard.topic.name for later in self._backlog[index + 1 :]):
+            if conflate and any(later.topic.name == received.topic.name for later in self._backlog[index + 1 :]):
                 continue
-            name = heard.topic.name
+            name = received.topic.name
             if conflate:
                 self._backlog = [item for item in self._backlog if item.topic.name != name]
             else:
                 del self._backlog[index]
-            return heard
+            return received
         return None
 
-    def _next_turn(self) -> bool:
-        """Waits for the next turn; False once the bus was stopped."""
+    def _next_iteration(self) -> bool:
+        """Waits for the next iteration; False once the bus was stopped."""
         self.exchange.housekeeping()
         self._trim_backlog()
-        turn = self._ticks.next(self._heard)
-        if turn is None:
+        iteration = self._ticks.next(self._subscribed)
+        if iteration is None:
             return False
-        self._backlog += turn.messages
-        self._tick = turn.tick
-        if self._held and self._ticks.may_say:
+        self._backlog += iteration.messages
+        self._tick = iteration.tick
+        if self._held and self._ticks.may_publish:
             self.release()
         return True
 
@@ -328,12 +335,12 @@ class Bus:
         """Drops the oldest messages that no loop asked for, beyond what may wait of a topic."""
         if not self._backlog:
             return
-        waiting = Counter(heard.topic.name for heard in self._backlog)
+        waiting = Counter(received.topic.name for received in self._backlog)
         kept = []
-        for heard in self._backlog:
-            if waiting[heard.topic.name] > heard.topic.high_water_mark:
-                waiting[heard.topic.name] -= 1
-                self.dropped[heard.topic.name] += 1
+        for received in self._backlog:
+            if waiting[received.topic.name] > received.topic.high_water_mark:
+                waiting[received.topic.name] -= 1
+                self.dropped[received.topic.name] += 1
             else:
-                kept.append(heard)
+                kept.append(received)
         self._backlog = kept

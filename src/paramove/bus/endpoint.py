@@ -27,7 +27,7 @@ class BusFolderError(Exception):
 
 
 class TopicTakenError(Exception):
-    """Another process already says this topic; the text names it."""
+    """Another process already publishes this topic; the text names it."""
 
 
 def socket_path(folder: Path, name: str) -> Path:
@@ -106,7 +106,7 @@ class Ownership:
         except BlockingIOError:
             owner = os.pread(self._lock, 200, 0).decode(errors="replace").strip() or "a process that just started"
             os.close(self._lock)
-            raise TopicTakenError(f"{path.name} is already said by {owner}; a topic has one speaker") from None
+            raise TopicTakenError(f"{path.name} is already published by {owner}; a topic has one publisher") from None
         except BusFolderError:
             os.close(self._lock)
             raise
@@ -149,7 +149,7 @@ def is_alive(path: Path) -> bool:
         try:
             probe.connect(os.fspath(path))
         except BlockingIOError:
-            return True  # the listener's queue is full: somebody is there
+            return True  # the subscriber's queue is full: somebody is there
         except OSError:
             return False
     return True

@@ -38,9 +38,9 @@ _WHOLE = struct.Struct("<HBBQQIQqqII")
 SIZE = _WHOLE.size
 
 FLAG_WELCOME = 1
-"""Said because somebody subscribed; the sequence is that of the newest message said so far."""
+"""Sent because somebody subscribed; the sequence is that of the latest message published so far."""
 FLAG_LAST_VALUE = 2
-"""With FLAG_WELCOME: the payload is the newest message, said again. Without: a welcome has no message in it."""
+"""With FLAG_WELCOME: the payload is the latest message, sent again. Without: a welcome has no message in it."""
 
 
 class Reason(enum.Enum):
@@ -82,7 +82,7 @@ class Envelope(NamedTuple):
 
     @property
     def is_welcome(self) -> bool:
-        """Whether it was said because of a new subscription."""
+        """Whether it was sent because of a new subscription."""
         return bool(self.flags & FLAG_WELCOME)
 
     @property
@@ -142,5 +142,5 @@ def _schema_sentence(found: int, expected: int) -> str:
     names = [type_of_hash(value) or "a type unknown here" for value in (found, expected)]
     return (
         f"schema hash is {found:#018x} ({names[0]}), the topic carries {expected:#018x} ({names[1]}); "
-        "correct the speaker, or run every process from the same installation"
+        "correct the publisher, or run every process from the same installation"
     )

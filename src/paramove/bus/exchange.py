@@ -1,4 +1,4 @@
-"""All sockets of one process: who it says what to, what it hears, and the one place where it waits."""
+"""All sockets of one process: publishers, subscribers, and the one place where it waits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 Marks = Mapping[str, tuple[int, int]]
-"""Topic name on the bus -> epoch and sequence of the newest message said."""
+"""Topic name on the bus -> epoch and sequence of the latest message published."""
 
 WATCH_PERIOD_S = 0.25
 DRAIN_LIMIT = 1000
@@ -57,8 +57,8 @@ class Exchange:
         self._second_due_s = 0.0
         self._closed = False
 
-    def say(self, topic: Topic) -> Publisher:
-        """Becomes the speaker of a topic."""
+    def advertise(self, topic: Topic) -> Publisher:
+        """Becomes the publisher of a topic."""
         settings = self.settings
         publisher = Publisher(self.context, settings.folder_of(topic), topic, self.node, settings.name_of(topic))
         self._owned.append(publisher.ownership)
@@ -67,8 +67,8 @@ class Exchange:
         self._poller.register(publisher.socket, zmq.POLLIN)
         return publisher
 
-    def hear(self, topic: Topic) -> Subscriber:
-        """Begins to hear a topic; to ask for it again changes nothing."""
+    def subscribe(self, topic: Topic) -> Subscriber:
+        """Subscribes to a topic; to do it again changes nothing."""
         if topic.name not in self.subscribers:
             settings = self.settings
             subscriber = Subscriber(self.context, settings.folder_of(topic), topic, settings.name_of(topic))
@@ -106,7 +106,7 @@ class Exchange:
     def wait(self, timeout_s: float) -> set[object]:
         """Waits until something can be read, at most `timeout_s`.
 
-        Drains what can be read of the heard topics and answers subscriptions.
+        Drains what can be read of the subscribed topics and answers subscriptions.
 
         Returns:
             The sockets and descriptors that could be read.
@@ -129,45 +129,45 @@ class Exchange:
         """Takes what has arrived of these topics out of the sockets, without waiting.
 
         Args:
-            topics: Names of heard topics.
+            topics: Names of subscribed topics.
             ready: Something is known to wait on each of them.
         """
         for name in topics:
             subscriber, pending = self.subscribers[name], self._pending[name]
             for number in range(DRAIN_LIMIT):
-                heard = subscriber.receive(ready and number == 0)
-                if heard is None:
+                received = subscriber.receive(ready and number == 0)
+                if received is None:
                     break
-                pending.append((subscriber.counter.epoch or 0, heard))
+                pending.append((subscriber.counter.epoch or 0, received))
 
     def take(self, topics: Iterable[str]) -> list[Received]:
         """Everything drained of these topics, in the order of publish time, then of the topics."""
         found: list[Received] = []
         for name in topics:
             pending = self._pending[name]
-            found += [heard for _, heard in pending]
+            found += [received for _, received in pending]
             pending.clear()
         return sorted(found, key=_published)
 
     def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Received]:
-        """Like `take`, but leaves what was said after the marks. A topic without a mark is taken whole."""
+        """Like `take`, but leaves what was published after the marks. A topic without a mark is taken whole."""
         found: list[Received] = []
         for name in topics:
             pending = self._pending[name]
             subscriber = self.subscribers[name]
             mark = marks.get(subscriber.name)
             while pending:
-                epoch, heard = pending[0]
+                epoch, received = pending[0]
                 present = epoch == subscriber.counter.epoch
-                # Of the present speaker and said after the mark, or by a new start of it that has no mark yet.
-                if mark is not None and present and (epoch != mark[0] or heard.sequence > mark[1]):
+                # Of the present publisher and published after the mark, or by a new start of it that has no mark yet.
+                if mark is not None and present and (epoch != mark[0] or received.sequence > mark[1]):
                     break
-                found.append(heard)
+                found.append(received)
                 pending.popleft()
         return sorted(found, key=_published)
 
     def missing(self, marks: Marks, topics: Iterable[str]) -> list[str]:
-        """Those of the topics that have not been heard up to their marks."""
+        """Those of the topics that have not been received up to their marks."""
         absent = []
         for name in topics:
             subscriber = self.subscribers[name]
@@ -177,7 +177,7 @@ class Exchange:
         return absent
 
     def marks(self) -> dict[str, tuple[int, int]]:
-        """The newest message of every topic said here, but the clock and the status, which follow other rules."""
+        """The latest message of every topic published here, but the clock and the status, which follow other rules."""
         return {
             item.name: (item.epoch, item.sequence)
             for item in self.publishers.values()
@@ -190,7 +190,7 @@ class Exchange:
         return pending.popleft()[1] if pending else None
 
     def reopen(self, name: str) -> None:
-        """Subscribes to a heard topic anew: the speaker's welcome then shows what was lost."""
+        """Subscribes to a topic anew: the publisher's welcome then shows what was lost."""
         self._poller.unregister(self.subscribers[name].socket)
         self.subscribers[name].reopen()
         self._poller.register(self.subscribers[name].socket, zmq.POLLIN)
@@ -203,7 +203,7 @@ class Exchange:
                 os.eventfd_write(self._wake, 1)
 
     def close(self) -> None:
-        """Closes everything. Messages said just before still arrive, for `publisher.LINGER_MS` at most."""
+        """Closes everything. Messages published just before still arrive, for `publisher.LINGER_MS` at most."""
         if self._closed:
             return
         self.stopped = self._closed = True
@@ -249,5 +249,5 @@ class Exchange:
             self.every_second()
 
 
-def _published(heard: Received) -> int:
-    return heard.published_ns
+def _published(received: Received) -> int:
+    return received.published_ns

@@ -1,6 +1,6 @@
 """Looks at a running bus from outside, without taking part. For the command line and the dashboard.
 
-Nothing here waits longer than it is told to: a topic whose speaker is dead, busy or absent is shown as what it is.
+Nothing here waits longer than it is told to: a topic whose publisher is dead, busy or absent is shown as what it is.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ _POLL_MS = 50
 
 @dataclass(frozen=True)
 class PublisherOnBus:
-    """Whether and by whom a topic is said.
+    """Whether a topic has a publisher, and who it is.
 
     Attributes:
         topic: Row of the table.
         alive: Whether a process holds the topic.
-        holder: What the holder of the topic's lock wrote, such as "pid 12 (camera)"; "" if nobody ever said it.
+        holder: What the holder of the topic's lock wrote, such as "pid 12 (camera)"; "" if nobody ever published it.
     """
 
     topic: Topic
@@ -38,16 +38,16 @@ class PublisherOnBus:
 
 @dataclass
 class Measurement:
-    """What was heard of a topic within some seconds. Times are of this process's monotonic clock.
+    """Messages of a topic received within some seconds. Times are of this process's monotonic clock.
 
     Attributes:
         topic: Row of the table.
-        welcomed: Whether the speaker answered.
-        messages: How many were heard; a latched value that was said before counts, too.
+        welcomed: Whether the publisher answered.
+        messages: How many were received; a latched value that was published before counts, too.
         lost: Gaps in the sequence.
         refused: Messages that were not what the topic carries.
-        sequence: Of the newest message of the speaker.
-        epoch: Of the speaker.
+        sequence: Of the latest message of the publisher.
+        epoch: Of the publisher.
         bytes_total: Of the payloads.
         arrivals_s: When messages arrived.
     """
@@ -80,15 +80,15 @@ class Measurement:
         return self.bytes_total / self.messages if self.messages else 0.0
 
 
-def speakers(folder: Path) -> list[PublisherOnBus]:
-    """Every topic of the table, and every status topic that was said in the folder."""
+def publishers(folder: Path) -> list[PublisherOnBus]:
+    """Every topic of the table, and every status topic that was published in the folder."""
     nodes = sorted(path.name.removeprefix("status.") for path in folder.glob("status.*") if path.suffix != ".lock")
     public = [topic for topic in topics.TOPICS if not topic.truth]
-    return [speaker(folder, topic) for topic in (*public, *(topics.status(node) for node in nodes))]
+    return [publisher_of(folder, topic) for topic in (*public, *(topics.status(node) for node in nodes))]
 
 
-def speaker(folder: Path, topic: Topic) -> PublisherOnBus:
-    """Who says one topic."""
+def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:
+    """The publisher of one topic."""
     path = socket_path(folder, topic.name)
     return PublisherOnBus(topic, is_held(path), holder_of(path))
 
@@ -101,8 +101,8 @@ def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Re
         try:
             while time.monotonic() < end_s:
                 for subscriber in subscribers:
-                    while (heard := subscriber.receive()) is not None:
-                        yield heard
+                    while (received := subscriber.receive()) is not None:
+                        yield received
                 _poll(subscribers, end_s)
         finally:
             for subscriber in subscribers:
@@ -110,7 +110,7 @@ def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Re
 
 
 def measure(folder: Path, wanted: Sequence[Topic], seconds: float) -> list[Measurement]:
-    """Counts what is said on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
+    """Counts what is published on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
     end_s = time.monotonic() + seconds
     found = [Measurement(topic) for topic in wanted]
     with zmq.Context() as context:
@@ -132,12 +132,12 @@ def measure(folder: Path, wanted: Sequence[Topic], seconds: float) -> list[Measu
 
 
 def statuses(folder: Path, seconds: float) -> dict[str, Any]:
-    """Newest `NodeStatus` of each node whose status topic has a living speaker; None if it did not answer in time."""
-    alive = [item.topic for item in speakers(folder) if item.alive and item.topic.name.startswith("status/")]
+    """Latest `NodeStatus` of each node whose status topic has a living publisher; None if it did not answer in time."""
+    alive = [item.topic for item in publishers(folder) if item.alive and item.topic.name.startswith("status/")]
     found: dict[str, Any] = {topic.name.removeprefix("status/"): None for topic in alive}
     if alive:
-        for heard in listen(folder, alive, seconds):
-            found[heard.topic.name.removeprefix("status/")] = heard.message
+        for received in listen(folder, alive, seconds):
+            found[received.topic.name.removeprefix("status/")] = received.message
             if None not in found.values():
                 break
     return found

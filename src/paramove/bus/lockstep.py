@@ -1,14 +1,16 @@
 """Lockstep, the member's side: time waits until this process is done with a tick.
 
-1. The member connects to `<bus folder>/lockstep` and greets (JOIN) once the clock's speaker has welcomed it.
-2. The first beat whose marks name the member is a handshake: it only waits until the speaker of every topic it hears
-   and that has a mark has welcomed it. So nothing said later is missed. Nothing is said in it.
-3. At every later beat it reads each topic up to the beat's mark, which is what had been said when the beat began. What
-   has arrived beyond is kept for the next turn. So a turn holds the same messages on any machine.
-4. When the node comes back for the next turn it answers DONE with the marks of what it has said itself.
+1. The member connects to `<bus folder>/lockstep` and greets (JOIN) once the clock's publisher has welcomed it.
+2. The first tick whose marks name the member is a handshake: it only waits until the publisher of every topic it
+receives
+   and that has a mark has welcomed it. So nothing published later is missed. Nothing is published in it.
+3. At every later tick it reads each topic up to the tick's mark, which is what had been published when the tick began.
+What
+   has arrived beyond is kept for the next iteration. So a iteration holds the same messages on any machine.
+4. When the node comes back for the next iteration it answers DONE with the marks of what it has published itself.
 
-A topic without a mark has a speaker that time does not wait for (a person's page, a node with `lockstep: false`), and
-status topics follow wall time; their messages are handed over at the beat after they arrived.
+A topic without a mark has a publisher that time does not wait for (a person's page, a node with `lockstep: false`), and
+status topics follow wall time; their messages are handed over at the tick after they arrived.
 """
 
 from __future__ import annotations
@@ -34,12 +36,12 @@ _log = logging.getLogger(__name__)
 SERVICE = "lockstep"
 """Name of the barrier's socket in the bus folder."""
 HEALING_PERIOD_S = 2.0
-"""After so long a message that should be here is asked for again, or given up if its speaker is gone."""
+"""After so long a message that should be here is asked for again, or given up if its publisher is gone."""
 
 
-def to_marks(said: Iterable[TopicMark]) -> dict[str, tuple[int, int]]:
+def to_marks(marks: Iterable[TopicMark]) -> dict[str, tuple[int, int]]:
     """Marks of a message as a dictionary."""
-    return {mark.topic: (mark.epoch, mark.sequence) for mark in said}
+    return {mark.topic: (mark.epoch, mark.sequence) for mark in marks}
 
 
 def from_marks(marks: Marks) -> list[TopicMark]:
@@ -52,16 +54,16 @@ def member_mark(node: str) -> str:
     return f"{SERVICE}/{node}"
 
 
-def read_up_to(exchange: Exchange, marks: Marks, heard: list[str]) -> None:
+def read_up_to(exchange: Exchange, marks: Marks, names: list[str]) -> None:
     """Waits until everything up to the marks has been drained.
 
-    A message that does not come although its speaker lives is asked for again, so that it is counted as lost; if the
-    speaker is gone it is given up. Both are logged: from there on the run may differ from another one.
+    A message that does not come although its publisher lives is asked for again, so that it is counted as lost; if the
+    publisher is gone it is given up. Both are logged: from there on the run may differ from another one.
     """
     started_s = healed_s = time.monotonic()
     while not exchange.stopped:
-        exchange.drain(heard)
-        absent = exchange.missing(marks, heard)
+        exchange.drain(names)
+        absent = exchange.missing(marks, names)
         if not absent:
             return
         now_s = time.monotonic()
@@ -70,10 +72,10 @@ def read_up_to(exchange: Exchange, marks: Marks, heard: list[str]) -> None:
             for name in absent:
                 connected = exchange.subscribers[name].connected
                 _log.warning(
-                    "lockstep: topic %s not heard up to its mark after %.0f s; %s; this run may differ from others",
+                    "lockstep: topic %s not received up to its mark after %.0f s; %s; this run may differ from others",
                     name,
                     now_s - started_s,
-                    "asking again" if connected else "its speaker is gone",
+                    "asking again" if connected else "its publisher is gone",
                 )
                 if connected:
                     exchange.reopen(name)
@@ -83,14 +85,14 @@ def read_up_to(exchange: Exchange, marks: Marks, heard: list[str]) -> None:
 
 
 class LockstepTicks:
-    """Turns of a member."""
+    """Iterations of a member."""
 
     def __init__(self, exchange: Exchange, node: str) -> None:
         self._exchange = exchange
         self._node = node
         self.now_ns = 0
-        self.may_say = False
-        self._clock = exchange.hear(topics.CLOCK)
+        self.may_publish = False
+        self._clock = exchange.subscribe(topics.CLOCK)
         self._socket: zmq.Socket[Any] = exchange.context.socket(zmq.DEALER)
         self._socket.setsockopt(zmq.IDENTITY, node.encode())
         self._socket.setsockopt(zmq.LINGER, 200)
@@ -102,7 +104,7 @@ class LockstepTicks:
         self._shaken = False
         self._tick: int | None = None
 
-    def next(self, heard: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> LoopTick | None:
         if self._tick is not None:
             self._answer(TickDone.KIND_DONE, self._tick)
             self._tick = None
@@ -110,21 +112,21 @@ class LockstepTicks:
             if not self._joined:
                 self._join()
                 continue
-            beat = self._next_beat()
-            if beat is None:
+            clock = self._next_clock()
+            if clock is None:
                 continue
-            self.now_ns = beat.time_ns
-            marks = to_marks(beat.said)
+            self.now_ns = clock.time_ns
+            marks = to_marks(clock.published)
             if marks.get(member_mark(self._node), (0, 0))[0] != os.getpid():
                 continue  # the barrier has not read our greeting yet
-            read_up_to(self._exchange, marks, heard)
+            read_up_to(self._exchange, marks, names)
             if not self._shaken:
                 self._shaken = True
-                self._answer(TickDone.KIND_DONE, beat.tick)
+                self._answer(TickDone.KIND_DONE, clock.tick)
                 continue
-            self.may_say = True
-            self._tick = beat.tick
-            return LoopTick(self._exchange.take_up_to(marks, heard), Tick(beat.tick, beat.time_ns))
+            self.may_publish = True
+            self._tick = clock.tick
+            return LoopTick(self._exchange.take_up_to(marks, names), Tick(clock.tick, clock.time_ns))
         return None
 
     def leave(self) -> None:
@@ -141,20 +143,20 @@ class LockstepTicks:
         else:
             self._exchange.wait(LONGEST_WAIT_S)
 
-    def _next_beat(self) -> Clock | None:
-        beat = self._exchange.pop(topics.CLOCK)
-        if beat is None:
+    def _next_clock(self) -> Clock | None:
+        clock = self._exchange.pop(topics.CLOCK)
+        if clock is None:
             self._exchange.drain([topics.CLOCK.name])
-            beat = self._exchange.pop(topics.CLOCK)
-        if beat is None:
+            clock = self._exchange.pop(topics.CLOCK)
+        if clock is None:
             self._exchange.wait(LONGEST_WAIT_S)
             return None
-        message: Clock = beat.message
+        message: Clock = clock.message
         return message
 
     def _answer(self, kind: TickDone.Kind, tick: int) -> None:
         marks = self._exchange.marks() | {member_mark(self._node): (os.getpid(), 0)}
-        answer = TickDone(node=self._node, pid=os.getpid(), kind=kind, tick=tick, said=from_marks(marks))
+        answer = TickDone(node=self._node, pid=os.getpid(), kind=kind, tick=tick, published=from_marks(marks))
         payload = answer.SerializeToString()
         envelope = Envelope(self._schema, publisher_id(self._node), 0, tick, self.now_ns, self.now_ns)
         self._socket.send_multipart([pack(envelope, payload), payload], zmq.NOBLOCK)

@@ -1,4 +1,4 @@
-"""What libzmq says about the connections of a socket."""
+"""What libzmq reports about the connections of a socket."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HEAD = struct.Struct("=hi")
 _READ_AT_ONCE = 2000
 COMPLAINT_PERIOD_S = 60.0
 HANDSHAKE_MS = 2000
-"""How long a connection may take to say that it speaks ZeroMQ."""
+"""How long a connection may take to show that it speaks ZeroMQ."""
 
 
 class Monitor:
@@ -56,16 +56,16 @@ class Monitor:
 
 
 class ForeignConnections:
-    """Counts connections to a bound socket that do not say that they speak ZeroMQ: a browser, a scanner, a mistake.
+    """Counts connections to a bound socket that do not show that they speak ZeroMQ: a browser, a scanner, a mistake.
 
-    libzmq ends them by itself; other connections are not affected. They are told of in one line a minute at most.
+    libzmq ends them by itself; other connections are not affected. They are logged in one line a minute at most.
 
     Args:
         socket: Before it is bound.
         name: Of the topic or service, for the log.
 
     Attributes:
-        count: How many there were; for a moment also one that is about to say so.
+        count: How many there were; for a short time also one that is about to show it.
     """
 
     def __init__(self, socket: zmq.Socket[Any], name: str) -> None:

@@ -8,8 +8,8 @@ The supervisor starts a node as `python -m nodes.<name> --config FILE`. The file
     run_folder: runs/2026-11-21_10-00-00
 
 Exit codes: 0 ended well or by SIGTERM or SIGINT; 2 wrong arguments; 66 a file or device is missing; 70 the node raised
-an exception or ended after it had said that it failed; 75 a topic or the bus folder is held by somebody else; 78 the
-configuration, or a file that it names, is wrong.
+an exception or ended after it had published that it failed; 75 a topic or the bus folder is held by somebody else; 78
+the configuration, or a file that it names, is wrong.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from paramove.documents import InputError, OldNames, exit_codes, read_document
 _log = logging.getLogger(__name__)
 
 LAST_WORD_S = 1.0
-"""A node that has failed waits so long at most for somebody to hear why."""
+"""A node that has failed waits so long at most until somebody has received the reason."""
 
 
 class NodeConfig(OldNames):
@@ -90,8 +90,8 @@ def main(
 
     Args:
         run: Loops over `bus.events` or `bus.latest` and returns when they end.
-        hears: Topics that the node hears.
-        says: Topics that it says.
+        subscribes: Topics that the node subscribes to.
+        publishes: Topics that it publishes.
         config_type: Its parameters.
     """
     parser = argparse.ArgumentParser(description=sys.modules[run.__module__].__doc__)
@@ -114,7 +114,7 @@ def main(
     with bus:
         code = _run(run, bus, config)
         if code != exit_codes.OK:
-            bus.wait_for_listener(LAST_WORD_S)
+            bus.wait_for_subscriber(LAST_WORD_S)
         sys.exit(code)
 
 

@@ -1,4 +1,4 @@
-"""Says one topic."""
+"""Publishes one topic."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _NOBLOCK_SNDMORE = int(zmq.NOBLOCK | zmq.SNDMORE)
 """As plain numbers: to combine enums takes longer than to send."""
 
 LINGER_MS = 500
-"""How long closing waits for messages said just before."""
+"""How long closing waits for messages published just before."""
 
 
 class Publisher:
-    """The one speaker of a topic, bound to `ipc://<folder>/<name with . for />`.
+    """The one publisher of a topic, bound to `ipc://<folder>/<name with . for />`.
 
-    Every new subscription is answered by a *welcome* with the epoch and the newest sequence. The subscriber learns from
-    it that it is connected and from where on to count losses; on a latched topic it holds the newest message. The
+    Every new subscription is answered by a *welcome* with the epoch and the latest sequence. The subscriber learns from
+    it that it is connected and from where on to count losses; on a latched topic it holds the latest message. The
     welcome is sent from `serve` and `publish`: there is no thread.
 
     Args:
@@ -38,7 +38,7 @@ class Publisher:
 
     Attributes:
         epoch: Of this start.
-        sequence: Of the newest message said.
+        sequence: Of the latest message published.
         subscriptions: How many have been answered since the start.
         foreign: Connections that did not speak ZeroMQ; `foreign.look()` is to be called a few times a second.
 
@@ -63,7 +63,7 @@ class Publisher:
         self._last: tuple[Envelope, bytes] | None = None
         self.socket: zmq.Socket[Any] = context.socket(zmq.XPUB)
         self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
-        self.socket.setsockopt(zmq.SNDHWM, topic.speaker_high_water_mark)
+        self.socket.setsockopt(zmq.SNDHWM, topic.publisher_high_water_mark)
         self.socket.setsockopt(zmq.LINGER, LINGER_MS)
         # A subscriber only ever sends subscriptions.
         self.socket.setsockopt(zmq.MAXMSGSIZE, 1024)
@@ -71,7 +71,7 @@ class Publisher:
         self.socket.bind(f"ipc://{path}")
 
     def publish(self, message: Any, captured_ns: int, now_ns: int) -> int:
-        """Says `message` and returns its sequence number. Never waits.
+        """Publishes `message` and returns its sequence number. Never waits.
 
         Raises:
             TypeError: the topic carries another type.
@@ -102,7 +102,7 @@ class Publisher:
             self._welcome()
 
     def close(self) -> None:
-        """Closes the socket; messages already said are still delivered for `LINGER_MS`."""
+        """Closes the socket; messages already published are still delivered for `LINGER_MS`."""
         self.foreign.close()
         self.socket.close()
 

@@ -1,8 +1,8 @@
-"""A bus that hands out what was recorded or made up, and keeps what the node says. For replay tests of nodes.
+"""A bus of recorded or synthetic messages that stores what the node publishes. For replay tests of nodes.
 
 bus = RecordedBus([Received(topics.CAMERA_IMAGE, image, 0, 0, 1), Tick(1, 66_666_667)])
 run(bus, Config())
-assert [said.message for said in bus.said_on(topics.OBJECTS_TRACKED)] == [...]
+assert [published.message for published in bus.published_on(topics.OBJECTS_TRACKED)] == [...]
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from paramove.bus.soundness import unsound
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import TICK_PERIOD_NS, Tick
 from paramove.bus.topics import Topic
+from paramove.documents import renamed_attribute
 
 
 @dataclass(frozen=True)
 class Published:
-    """One message that the node said."""
+    """One message that the node published."""
 
     topic: Topic
     message: Any
@@ -37,13 +38,13 @@ def with_ticks(messages: Iterable[Received], period_ns: int = TICK_PERIOD_NS) ->
         period_ns: Of the ticks; a message published exactly at a tick comes before it.
     """
     number = 0
-    for heard in sorted(messages, key=lambda item: item.published_ns):
+    for received in sorted(messages, key=lambda item: item.published_ns):
         if number == 0:
-            number = -(-heard.published_ns // period_ns)
-        while heard.published_ns > number * period_ns:
+            number = -(-received.published_ns // period_ns)
+        while received.published_ns > number * period_ns:
             yield Tick(number, number * period_ns)
             number += 1
-        yield heard
+        yield received
     yield Tick(number, number * period_ns)
 
 
@@ -57,10 +58,10 @@ class RecordedBus:
         protected: Leave out messages with unsound numbers, as the bus does; they are kept in `refused`.
 
     Attributes:
-        said: Everything the node said, in order.
+        published: Everything the node published, in order.
         states: States and sentences in order, such as ("ready", "tracking 4 colours").
         refused: Topic and what is unsound, of each message that was left out.
-        now_ns: Publish time of the newest message or time of the newest tick.
+        now_ns: Publish time of the latest message or time of the latest tick.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class RecordedBus:
         self.node = node
         self.run_folder = run_folder or Path()
         self.settings = BusSettings(folder=self.run_folder, clock="simulated")
-        self.said: list[Published] = []
+        self.published: list[Published] = []
         self.states: list[tuple[str, str]] = []
         self.refused: list[tuple[str, str]] = []
         self.now_ns = 0
@@ -87,36 +88,39 @@ class RecordedBus:
             raise TypeError(f"topic {topic.name} carries {topic.type_name}, not {type(message).__name__}")
         kept = topic.type()
         kept.CopyFrom(message)
-        self.said.append(Published(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
+        self.published.append(Published(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
 
-    def said_on(self, topic: Topic) -> list[Published]:
-        """What the node said on one topic."""
-        return [said for said in self.said if said.topic.name == topic.name]
+    def published_on(self, topic: Topic) -> list[Published]:
+        """What the node published on one topic."""
+        return [one for one in self.published if one.topic.name == topic.name]
+
+    said = renamed_attribute("said", "published")
+    said_on = renamed_attribute("said_on", "published_on")
 
     def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
         """As `Bus.events`; ends with the recording. Messages of other topics stay for a later loop."""
         return self._events({topic.name for topic in wanted}, tick)
 
     def latest(self, *wanted: Topic) -> Iterator[Received]:
-        """As `Bus.latest`; the messages between two ticks are one turn, without ticks each message is its own."""
+        """As `Bus.latest`; the messages between two ticks are one iteration, without ticks each message is its own."""
         names = {topic.name for topic in wanted}
-        turn: dict[str, Received] = {}
+        iteration: dict[str, Received] = {}
         has_ticks = any(isinstance(event, Tick) for event in self._waiting)
         for event in self._events(names, tick=True):
             if isinstance(event, Received):
-                turn.pop(event.topic.name, None)
-                turn[event.topic.name] = event
+                iteration.pop(event.topic.name, None)
+                iteration[event.topic.name] = event
                 if has_ticks:
                     continue
-            yield from turn.values()
-            turn.clear()
-        yield from turn.values()
+            yield from iteration.values()
+            iteration.clear()
+        yield from iteration.values()
 
-    def hear(self, topic: Topic) -> None:
-        """Every topic of the recording is heard anyway."""
+    def subscribe(self, topic: Topic) -> None:
+        """Every topic of the recording is subscribed anyway."""
 
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
-        """There is nothing to wait for in a recording; what another thread has to say is asked for at ticks."""
+        """There is nothing to wait for in a recording; messages of another thread are fetched at ticks."""
 
     def starting(self, sentence: str) -> None:
         """Keeps the state."""
@@ -146,11 +150,11 @@ class RecordedBus:
         """Ends every loop over events."""
         self.stopped = True
 
-    def hands_out(self, heard: Received) -> bool:
+    def hands_out(self, received: Received) -> bool:
         """Whether the node gets a message."""
-        found = unsound(heard.message) if self._protected else ""
+        found = unsound(received.message) if self._protected else ""
         if found:
-            self.refused.append((heard.topic.name, found))
+            self.refused.append((received.topic.name, found))
         return not found
 
     def _change(self, state: str, sentence: str) -> None:

@@ -20,15 +20,15 @@ class Arrival(enum.Enum):
 class SequenceCounter:
     """Follows one topic.
 
-    The first thing heard of an epoch, a welcome as a rule, is the base line: nothing said before it was meant for this
-    subscriber. From there on every gap is a loss, and a later welcome also shows a loss at the end. A new epoch is a
-    restarted publisher, hence a new base line and no loss.
+    The first thing received of an epoch, usually a welcome, is the base line: nothing published before was meant for
+    this subscriber. From there on every gap is a loss, and a later welcome also shows a loss at the end. A new epoch is
+    a restarted publisher, hence a new base line and no loss.
 
     Attributes:
-        epoch: Of the present publisher; None until something was heard.
-        sequence: Newest of that epoch.
-        messages: Messages heard, each counted once.
-        lost: Messages said and not heard.
+        epoch: Of the present publisher; None until something was received.
+        sequence: Latest of that epoch.
+        messages: Messages received, each counted once.
+        lost: Messages published and not received.
         repeated: Messages that came again.
         refused: How many messages were refused, by reason.
         epochs: How many publishers followed each other.
@@ -61,7 +61,7 @@ class SequenceCounter:
             self.repeated += 1
             return Arrival.REPEATED
         else:
-            # A welcome without a message says that everything up to its sequence had been said.
+            # A welcome without a message means that everything up to its sequence had been published.
             self.lost += envelope.sequence - self.sequence - int(envelope.has_message)
         self.sequence = envelope.sequence
         if not envelope.has_message:
@@ -70,5 +70,5 @@ class SequenceCounter:
         return Arrival.NEW
 
     def has_reached(self, epoch: int, sequence: int) -> bool:
-        """Whether everything up to that message has been heard, or belongs to a publisher that was replaced."""
+        """Whether everything up to that message has been received, or belongs to a publisher that was replaced."""
         return epoch in self._past or (epoch == self.epoch and self.sequence >= sequence)

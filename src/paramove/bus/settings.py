@@ -1,4 +1,4 @@
-"""What a process is told about the bus it joins."""
+"""Settings of a process for the bus that it joins."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class BusSettings(BaseModel):
 
     Attributes:
         folder: Of the sockets.
-        clock: `monotonic`: real time. `simulated`: what the topic `clock` says.
+        clock: `monotonic`: real time. `simulated`: the time of the topic `clock`.
         lockstep: The simulator waits for this process at every tick. Only with the simulated clock.
         truth_folder: Of the sockets of topics under `truth/`; given to the simulator and evaluators only.
         remaps: Topic name in the node -> topic name on the bus.
@@ -52,7 +52,7 @@ class BusSettings(BaseModel):
     members: tuple[str, ...] = ()
 
     def folder_of(self, topic: Topic) -> Path:
-        """Folder of the topic's socket; raises ValueError for ground truth that this process is not told of."""
+        """Folder of the topic's socket; raises ValueError for ground truth whose folder this process does not get."""
         if not topic.truth:
             return self.folder
         if self.truth_folder is None:

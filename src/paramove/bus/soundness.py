@@ -1,6 +1,6 @@
 """Whether the numbers in a message can be numbers of this world: finite, not beyond all size, times that exist.
 
-Protobuf carries NaN and infinity, and a clamp may turn NaN into full travel. So no such message reaches a node.
+Protobuf carries NaN and infinity, and a clamp may iteration NaN into full travel. So no such message reaches a node.
 """
 
 from __future__ import annotations

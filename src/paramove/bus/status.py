@@ -1,4 +1,4 @@
-"""What a node says of itself, once a second."""
+"""State of a node, published once a second."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_SENTENCE = 4000
 
 
 class StatusReporter:
-    """Says `status/<node>`.
+    """Publishes `status/<node>`.
 
     Attributes:
         processing_ns: Time the node has spent on messages and ticks, on the wall clock.
@@ -27,7 +27,7 @@ class StatusReporter:
 
     def __init__(self, exchange: Exchange, node: str) -> None:
         self._exchange = exchange
-        self._publisher = exchange.say(status(node))
+        self._publisher = exchange.advertise(status(node))
         self._node = node
         self._state: NodeStatus.State = NodeStatus.STATE_STARTING
         self._sentence = ""
@@ -36,25 +36,25 @@ class StatusReporter:
 
     @property
     def state(self) -> NodeStatus.State:
-        """Newest state said."""
+        """Latest state published."""
         return self._state
 
     @property
-    def has_listener(self) -> bool:
-        """Whether anybody has subscribed; from then on the newest state has been told, for the topic is latched."""
+    def has_subscriber(self) -> bool:
+        """Whether anybody has subscribed; from then on the latest state has been sent, as the topic is latched."""
         return self._publisher.subscriptions > 0
 
     def change(self, state: NodeStatus.State, sentence: str, now_ns: int) -> None:
-        """Says a state and a sentence at once, if they are new."""
+        """Publishes a state and a sentence at once, if they are new."""
         sentence = sentence[:MAX_SENTENCE]
         if (state, sentence) == (self._state, self._sentence) and self._publisher.sequence:
             return
         self._state, self._sentence = state, sentence
         _log.info("%s: %s", NodeStatus.State.Name(state).removeprefix("STATE_").lower(), sentence)
-        self.say(now_ns)
+        self.publish(now_ns)
 
-    def say(self, now_ns: int) -> None:
-        """Says the present state and counts."""
+    def publish(self, now_ns: int) -> None:
+        """Publishes the present state and counts."""
         message = NodeStatus(
             node=self._node,
             state=self._state,
@@ -65,9 +65,9 @@ class StatusReporter:
         )
         message.captured.FromNanoseconds(now_ns)
         for publisher in self._exchange.publishers.values():
-            message.said.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
+            message.published.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
         for subscriber in self._exchange.subscribers.values():
-            message.heard.append(_count(subscriber.name, subscriber.counter))
+            message.received.append(_count(subscriber.name, subscriber.counter))
         self._publisher.publish(message, now_ns, now_ns)
 
 

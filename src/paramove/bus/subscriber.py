@@ -1,4 +1,4 @@
-"""Hears one topic."""
+"""Receives one topic."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Received:
         topic: Row of the table.
         message: Decoded.
         captured_ns: When what it tells of was so, ns of the bus clock.
-        published_ns: When it was said.
+        published_ns: When it was published.
         sequence: Of its publisher's epoch.
         payload: The encoded message, for those who store it.
     """
@@ -53,7 +53,7 @@ class Received:
 
 
 class Subscriber:
-    """Hears a topic, whether its speaker is there already or comes later, and counts exactly what it misses.
+    """Receives a topic, whether its publisher is there already or comes later, and counts exactly what is lost.
 
     Args:
         context: libzmq context.
@@ -78,7 +78,7 @@ class Subscriber:
 
     @property
     def welcomed(self) -> bool:
-        """Whether the speaker has answered: nothing said from now on is missed without being counted."""
+        """Whether the publisher has answered: messages lost from now on are counted."""
         return self.counter.epoch is not None
 
     def receive(self, ready: bool = False) -> Received | None:
@@ -87,7 +87,7 @@ class Subscriber:
         Repeated and refused ones are counted and passed over. After many of them it also returns None.
 
         Args:
-            ready: A poll has just said that something is waiting, so that need not be asked again.
+            ready: A poll has just shown that something is waiting, so that need not be checked again.
         """
         for _ in range(_PASSED_OVER_AT_ONCE):
             raw = self.receive_raw(ready)
@@ -125,7 +125,7 @@ class Subscriber:
             if arrival is Arrival.NEW:
                 return envelope, payload
             if arrival is Arrival.OUTDATED:
-                self._log_refusal(RefusedError(Reason.EPOCH, self._two_speakers_sentence(envelope)))
+                self._log_refusal(RefusedError(Reason.EPOCH, self._two_publishers_message(envelope)))
         return None
 
     def is_deaf(self) -> bool:
@@ -150,7 +150,7 @@ class Subscriber:
         self._refuse(
             RefusedError(
                 Reason.CONNECTION,
-                f"libzmq ended the connection to {holder_of(self._path) or 'its speaker'} for good: a message above "
+                f"libzmq ended the connection to {holder_of(self._path) or 'its publisher'} for good: a message above "
                 f"{self.topic.max_bytes} bytes, or no ZeroMQ; opened anew",
             )
         )
@@ -207,7 +207,7 @@ class Subscriber:
             raise RefusedError(Reason.DECODE, f"payload is no {self.topic.type_name}: {error}") from error
         found = unsound(message)
         if found:
-            raise RefusedError(Reason.NUMBER, f"{found}; finite numbers expected, correct the speaker")
+            raise RefusedError(Reason.NUMBER, f"{found}; finite numbers expected, correct the publisher")
         return message
 
     def _refuse(self, error: RefusedError) -> None:
@@ -223,12 +223,12 @@ class Subscriber:
     def _budget_sentence(self) -> str:
         rate_hz = self.topic.budget_hz or 0.0
         return (
-            f"{holder_of(self._path) or 'its speaker'} says more than {ALLOWANCE * rate_hz:g} a second and {BURST} at "
-            f"once; the topic's rate is {rate_hz:g} Hz. What is beyond is dropped; correct the speaker"
+            f"{holder_of(self._path) or 'its publisher'} publishes more than {ALLOWANCE * rate_hz:g} a second and "
+            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. What is beyond is dropped; correct the publisher"
         )
 
-    def _two_speakers_sentence(self, envelope: Envelope) -> str:
+    def _two_publishers_message(self, envelope: Envelope) -> str:
         return (
-            f"two speakers: epoch {envelope.epoch} speaks on after epoch {self.counter.epoch} has replaced it and is "
-            f"not heard; the lock is held by {holder_of(self._path) or 'nobody'}. End the other process"
+            f"two publishers: epoch {envelope.epoch} still publishes after epoch {self.counter.epoch} has replaced it, "
+            f"and is ignored; the lock is held by {holder_of(self._path) or 'nobody'}. End the other process"
         )

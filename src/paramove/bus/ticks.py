@@ -1,11 +1,11 @@
-"""Time, and what a node gets of it: turns of messages and ticks.
+"""Time, and what a node gets of it: iterations of messages and ticks.
 
-The loop of a node goes in turns. A turn is a list of messages and at most one tick, which comes after them. Where time
-comes from decides what a turn is:
+The loop of a node goes in iterations. A iteration is a list of messages and at most one tick, which comes after them.
+Where time comes from decides what a iteration is:
 
     real time     whatever has arrived; ticks are made here, 15 times a second
-    simulated     whatever has arrived; a tick for each beat of the topic `clock`
-    lockstep      exactly what had been said before the beat, then its tick (`paramove.bus.lockstep`)
+    simulated     whatever has arrived; a tick for each message of the topic `clock`
+    lockstep      exactly what had been published before the tick, then its tick (`paramove.bus.lockstep`)
     recorded      what a recording holds (`paramove.bus.recorded`)
 """
 
@@ -46,24 +46,24 @@ class LoopTick:
 
 
 class TickSource(Protocol):
-    """A source of time and turns."""
+    """A source of time and iterations."""
 
     @property
     def now_ns(self) -> int:
         """Time of the bus clock."""
 
     @property
-    def may_say(self) -> bool:
-        """Whether messages go out at once; otherwise the bus keeps them until the next turn."""
+    def may_publish(self) -> bool:
+        """Whether messages go out at once; otherwise the bus keeps them until the next iteration."""
 
-    def next(self, heard: list[str]) -> LoopTick | None:
-        """Waits for the next turn with these topics; None once the bus was stopped. Ends the turn before."""
+    def next(self, names: list[str]) -> LoopTick | None:
+        """Waits for the next iteration with these topics; None once the bus was stopped. Ends the iteration before."""
 
 
 class RealTimeTicks:
-    """Turns of the monotonic clock."""
+    """Iterations of the monotonic clock."""
 
-    may_say = True
+    may_publish = True
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
@@ -75,11 +75,11 @@ class RealTimeTicks:
         """Nanoseconds of the machine's monotonic clock."""
         return time.monotonic_ns()
 
-    def next(self, heard: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> LoopTick | None:
         exchange = self._exchange
         while not exchange.stopped:
-            exchange.drain(heard)
-            messages = exchange.take(heard)
+            exchange.drain(names)
+            messages = exchange.take(names)
             now_ns = time.monotonic_ns()
             number = (now_ns - self._start_ns) // TICK_PERIOD_NS
             if number > self._number:  # ticks that were slept through are skipped
@@ -93,25 +93,25 @@ class RealTimeTicks:
 
 
 class SimulatedTicks:
-    """Turns of the topic `clock`, which is not waited for and does not wait."""
+    """Iterations of the topic `clock`, which is not waited for and does not wait."""
 
-    may_say = True
+    may_publish = True
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
         self.now_ns = 0
-        exchange.hear(topics.CLOCK)
+        exchange.subscribe(topics.CLOCK)
 
-    def next(self, heard: list[str]) -> LoopTick | None:
+    def next(self, names: list[str]) -> LoopTick | None:
         exchange = self._exchange
         while not exchange.stopped:
-            exchange.drain([topics.CLOCK.name])  # first: what was said before a beat has then arrived, too
-            exchange.drain(heard)
-            messages = exchange.take(heard)
+            exchange.drain([topics.CLOCK.name])  # first: what was published before a tick has then arrived, too
+            exchange.drain(names)
+            messages = exchange.take(names)
             tick = None
-            while (beat := exchange.pop(topics.CLOCK)) is not None:  # beats that were slept through are skipped
-                self.now_ns = beat.message.time_ns
-                tick = Tick(beat.message.tick, self.now_ns)
+            while (clock := exchange.pop(topics.CLOCK)) is not None:  # ticks that were slept through are skipped
+                self.now_ns = clock.message.time_ns
+                tick = Tick(clock.message.tick, self.now_ns)
             if messages or tick:
                 return LoopTick(messages, tick)
             exchange.wait(LONGEST_WAIT_S)
@@ -119,11 +119,11 @@ class SimulatedTicks:
 
 
 class ExternalClock:
-    """The time of the process that says the clock: it has no turns, it makes them."""
+    """The time of the process that publishes the clock: it makes the iterations of the others."""
 
     def __init__(self) -> None:
         self.now_ns = 0
-        self.may_say = True
+        self.may_publish = True
 
-    def next(self, heard: list[str]) -> LoopTick | None:
-        raise RuntimeError("the process that says the clock hears with LockstepBarrier.advance, not with bus.events")
+    def next(self, names: list[str]) -> LoopTick | None:
+        raise RuntimeError("the publisher of the clock receives with LockstepBarrier.advance, not with bus.events")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import enum
 import re
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,9 +37,9 @@ from paramove.msgs.truth_pb2 import TruthArm, TruthLayout, TruthState
 class Profile(enum.Enum):
     """How a topic treats a message that a later one follows."""
 
-    LATEST = "latest"  # only the newest is of use; the reader drops the older ones
+    LATEST = "latest"  # only the latest message is of use; the reader drops older ones
     QUEUE = "queue"  # every message counts
-    LATCHED = "latched"  # every message counts and a late joiner gets the newest one
+    LATCHED = "latched"  # every message counts and a late joiner gets the latest one
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Topic:
 
     @property
     def budget_hz(self) -> float | None:
-        """Nominal rate by the messages' own publish times, which a listener enforces; None where there is none.
+        """Nominal rate by the messages' own publish times, which a subscriber enforces; None where there is none.
 
         The clock makes that time, and a status follows the wall clock also in simulated time.
         """
@@ -88,12 +89,12 @@ class Topic:
 
     @property
     def high_water_mark(self) -> int:
-        """How many messages may wait at the listener before the newest is dropped (and counted as lost)."""
+        """How many messages may wait at the subscriber before the latest is dropped (and counted as lost)."""
         return 60 if self.is_image else 1000
 
     @property
-    def speaker_high_water_mark(self) -> int:
-        """How many may wait at the speaker, for each listener. Few images: their memory is the speaker's."""
+    def publisher_high_water_mark(self) -> int:
+        """How many may wait at the publisher, for each subscriber. Few images: their memory is the publisher's."""
         return 6 if self.is_image else 1000
 
 
@@ -102,11 +103,11 @@ _IMAGE_BYTES = 2**24
 _MOVEMENT_BYTES = 2**20
 
 CLOCK = Topic("clock", Clock, 15, _QUEUE)
-CAMERA_LIGHT = Topic("camera/light", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
+CAMERA_IMAGE_RAW = Topic("camera/image_raw", RawImage, 15, _LATEST, "camera_optical", max_bytes=_IMAGE_BYTES)
 CAMERA_IMAGE = Topic(
     "camera/image", CompressedImage, 15, _LATEST, "camera_optical", recorded=True, max_bytes=_IMAGE_BYTES
 )
-CAMERA_LIGHTS = tuple(replace(CAMERA_LIGHT, name=f"camera_{number}/light") for number in range(1, 5))
+CAMERA_IMAGES_RAW = tuple(replace(CAMERA_IMAGE_RAW, name=f"camera_{number}/image_raw") for number in range(1, 5))
 CAMERA_IMAGES = tuple(replace(CAMERA_IMAGE, name=f"camera_{number}/image") for number in range(1, 5))
 """Of the calibrated cameras that look at a person."""
 OBJECTS_TRACKED = Topic("objects/tracked", TrackedObjects, 15, _QUEUE, "camera_optical", recorded=True)
@@ -134,7 +135,7 @@ OPERATOR_ARM_AT_START = replace(OPERATOR_ARM, name="operator/arm_at_start")
 """From a program, for an emulated robot: the publisher of `operator/arm` is a person's terminal."""
 OPERATOR_STOP = Topic("operator/stop", StopRequest, None, _LATCHED, recorded=True)
 OPERATOR_ESTOP = replace(OPERATOR_STOP, name="operator/estop")
-"""From a terminal: a topic has one speaker, and that of `operator/stop` may be the live page."""
+"""From a terminal: a topic has one publisher, and that of `operator/stop` may be the live page."""
 WIRE_HOAP3_STREAM = Topic("wire/hoap3/stream", StreamBatch, None, _QUEUE, recorded=True, max_bytes=_MOVEMENT_BYTES)
 WIRE_HOAP3_STATE = Topic("wire/hoap3/state", Hoap3State, 15, _QUEUE, recorded=True)
 TRUTH_LAYOUT = Topic("truth/layout", TruthLayout, None, _LATCHED, "world")
@@ -151,12 +152,12 @@ TOPICS: tuple[Topic, ...] = tuple(
 """Every topic but the status topics, which exist once per node: see `status`."""
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
-STEREO_LIGHTS = CAMERA_LIGHTS[:2]
+STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
 """What two cameras see of a tracked arm."""
 ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
 """Arming requests: a driver subscribes to all of them."""
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
-"""A person's stops: a driver hears all of them."""
+"""A person's stops: a driver subscribes to all of them."""
 
 _STATUS_PREFIX = "status/"
 _NAME = re.compile(r"[a-z0-9_]+(/[a-z0-9_]+)*")
@@ -168,7 +169,7 @@ def is_name(name: str) -> bool:
 
 
 def status(node: str) -> Topic:
-    """Topic on which the node called `node` says how it fares.
+    """Topic of the status of the node called `node`.
 
     Raises ValueError if the name has other characters than lower-case letters, digits and `_`.
     """
@@ -178,8 +179,36 @@ def status(node: str) -> Topic:
     return Topic(name, NodeStatus, 1, _LATCHED, recorded=True)
 
 
+OLD_NAMES = {f"{camera}/light": f"{camera}/image_raw" for camera in ("camera", *(f"camera_{n}" for n in range(1, 5)))}
+"""Topics that had another name in the release before; the old one is taken for one release, with a warning."""
+_OLD_CONSTANTS = {
+    "CAMERA_LIGHT": "CAMERA_IMAGE_RAW", "CAMERA_LIGHTS": "CAMERA_IMAGES_RAW", "STEREO_LIGHTS": "STEREO_IMAGES_RAW",
+}  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    """The constants by the names that they had in the release before."""
+    if name not in _OLD_CONSTANTS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return globals()[_now_called(f"topics.{name}", _OLD_CONSTANTS[name])]
+
+
+def present_names(text: str) -> str:
+    """The text of a launch file with the names that its topics have now."""
+    for old, new in OLD_NAMES.items():
+        if re.search(rf"(?<![\w/]){old}(?![\w/])", text):
+            text = re.sub(rf"(?<![\w/]){old}(?![\w/])", _now_called(f"topic {old}", new), text)
+    return text
+
+
+def _now_called(old: str, new: str) -> str:
+    warnings.warn(f"{old} is called {new} now; the next release knows the new name only", FutureWarning, stacklevel=3)
+    return new
+
+
 def by_name(name: str) -> Topic:
-    """Topic of that name; raises KeyError that names the nearest topics."""
+    """Topic of that name, or of that name before; raises KeyError that names the nearest topics."""
+    name = OLD_NAMES.get(name, name)
     if name.startswith(_STATUS_PREFIX):
         return status(name.removeprefix(_STATUS_PREFIX))
     for topic in TOPICS:

@@ -1,4 +1,4 @@
-"""A program that says and hears topics of a run without being one of its nodes, such as a command in a terminal."""
+"""A program that publishes and subscribes without being a node of the run, such as a command in a terminal."""
 
 from __future__ import annotations
 
@@ -39,21 +39,21 @@ class BusVisitor:
         self._opened.close()
 
     def publisher(self, topic: Topic) -> Publisher:
-        """The one speaker of a topic. Raises TopicTakenError and BusFolderError."""
+        """The one publisher of a topic. Raises TopicTakenError and BusFolderError."""
         publisher = Publisher(self._context, self._folder, topic, self._name)
         self._owned.callback(publisher.ownership.release)
         self._sockets.callback(publisher.close)
         return publisher
 
     def subscriber(self, topic: Topic) -> Subscriber:
-        """A listener to a topic."""
+        """A subscriber to a topic."""
         subscriber = Subscriber(self._context, self._folder, topic)
         self._sockets.callback(subscriber.close)
         return subscriber
 
 
-def say_now(publisher: Publisher, message: Any) -> None:
-    """Say what a person wants at this moment; `captured` of the message is set."""
+def publish_now(publisher: Publisher, message: Any) -> None:
+    """Publishes a person's request with the present time as `captured`."""
     now_ns = time.monotonic_ns()
     message.captured.FromNanoseconds(now_ns)
     publisher.publish(message, now_ns, now_ns)

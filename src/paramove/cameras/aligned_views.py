@@ -29,7 +29,7 @@ class Views:
 class AlignedViews:
     """Collects images and gives sets of them.
 
-    A set is complete when each camera has an image within half a period of the newest. A camera that has been silent
+    A set is complete when each camera has an image within half a period of the latest. A camera that has been silent
     for `TIMEOUT_PERIODS` is not waited for; from its next image on it is part of the sets again.
 
     Args:
@@ -81,15 +81,15 @@ class AlignedViews:
     def _said(self, moment_ns: int) -> Iterator[Views]:
         """The images within half a period of the moment; newer ones wait on, older ones are forgotten."""
         near, images = self._period_ns // 2, list[Image | None]()
-        newest_ns = moment_ns
+        latest_ns = moment_ns
         for place, held in enumerate(self._waiting):
             if held is None or held[0] > moment_ns + near:
                 images.append(None)
                 continue
             self._waiting[place] = None
             images.append(held[1] if held[0] >= moment_ns - near else None)
-            newest_ns = max(newest_ns, held[0])
-        if self._said_ns is None or newest_ns > self._said_ns:
-            self._said_ns = newest_ns
-            gone = (name for place, name in enumerate(self._names) if self._is_gone(place, newest_ns))
-            yield Views(newest_ns, tuple(images), tuple(gone))
+            latest_ns = max(latest_ns, held[0])
+        if self._said_ns is None or latest_ns > self._said_ns:
+            self._said_ns = latest_ns
+            gone = (name for place, name in enumerate(self._names) if self._is_gone(place, latest_ns))
+            yield Views(latest_ns, tuple(images), tuple(gone))

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from paramove.documents import Floats, Image, InputError, read_document, replacing
 
-MOST_CAMERAS = 4
+MAX_CAMERAS = 4
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
 """Numbers of distortion coefficients that OpenCV knows."""
@@ -218,9 +218,9 @@ def measured_file(run_folder: Path, path: Path) -> Path:
 def measured_cameras(run_folder: Path, path: Path) -> list[CalibratedCamera]:
     """The cameras of a calibration file, named camera_1, camera_2, ... in their order, as their topics are.
 
-    Raises InputError for a file that is none, or more than `MOST_CAMERAS`.
+    Raises InputError for a file that is none, or more than `MAX_CAMERAS`.
     """
     found = read_cameras(measured_file(run_folder, path))
-    if len(found) > MOST_CAMERAS:
-        raise InputError(f"{path}: {len(found)} cameras found, at most {MOST_CAMERAS} are used")
+    if len(found) > MAX_CAMERAS:
+        raise InputError(f"{path}: {len(found)} cameras found, at most {MAX_CAMERAS} are used")
     return [replace(one, name=f"camera_{number}") for number, one in enumerate(found, start=1)]

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from paramove.cameras.charuco_board import Board, BoardView
 from paramove.documents import Floats, InputError
 
-LEAST_VIEWS = 6
+MIN_VIEWS = 6
 GOOD_VIEWS = 15
 GOOD_ERROR_PX, POOR_ERROR_PX = 0.5, 1.0
-LEAST_TILT_DEG = 7.0
+MIN_TILT_DEG = 7.0
 """Root mean square angle of the boards to their mean direction; a hand that turns the board reaches 20 to 30."""
-MOST_FOCAL_SD = 0.015
+MAX_FOCAL_SD = 0.015
 """Of the focal length. More than that is 15 mm of distance at 1 m."""
 OUTLIER_FACTOR, OUTLIER_PX = 3.0, 1.0
-MOST_OUTLIERS = 0.25
+MAX_OUTLIERS = 0.25
 SCALE_TOLERANCE, SCALE_SUSPICION = 0.005, 0.15
 """A printer that fits to the page changes sizes by 3 to 6 %. What differs more than 15 % is another board."""
 GRID = 4
@@ -76,7 +76,7 @@ class Lens:
             )
         if len(self.used) < GOOD_VIEWS:
             said.append(f"{len(self.used)} views were used; take {GOOD_VIEWS} or more")
-        if self.tilt_deg < 2 * LEAST_TILT_DEG:
+        if self.tilt_deg < 2 * MIN_TILT_DEG:
             said.append(f"the board was tilted by only {self.tilt_deg:.0f} deg: tilt it by 30 to 45 deg to all sides")
         if self.covered < 0.75:
             said.append(
@@ -119,10 +119,10 @@ def calibrate_lens(name: str, views: Sequence[BoardView], board: Board) -> Lens:
     """
     _check_views(name, views)
     tilt = _tilt_deg(views, board)
-    if tilt < LEAST_TILT_DEG:
+    if tilt < MIN_TILT_DEG:
         raise CalibrationError(
             f"{name}: in all {len(views)} views the board is parallel (its directions differ by {tilt:.1f} deg, more "
-            f"than {LEAST_TILT_DEG:g} needed), so focal length and distance cannot be told apart: tilt the board by 30 "
+            f"than {MIN_TILT_DEG:g} needed), so focal length and distance cannot be told apart: tilt the board by 30 "
             "to 45 deg to all sides"
         )
     fitted = _fit(views, board)
@@ -153,9 +153,9 @@ def _check_views(name: str, views: Sequence[BoardView]) -> None:
     if len(sizes) > 1:
         shown = ", ".join(f"{width} x {height} px ({image})" for (width, height), image in sizes.items())
         raise CalibrationError(f"{name}: images of different resolutions: {shown}; take all with the same setting")
-    if len(views) < LEAST_VIEWS:
+    if len(views) < MIN_VIEWS:
         raise CalibrationError(
-            f"{name}: too few views: the board was found in {len(views)} images, at least {LEAST_VIEWS} needed, "
+            f"{name}: too few views: the board was found in {len(views)} images, at least {MIN_VIEWS} needed, "
             f"{GOOD_VIEWS} are good; see that the whole board is in the image, sharp, and lit evenly"
         )
 
@@ -216,7 +216,7 @@ def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
 def _agreeing(errors_px: Floats) -> NDArray[np.bool_]:
     """Views to keep: all but those that are far worse than the rest (blurred, bent, moved); at most a quarter."""
     bad = errors_px > max(OUTLIER_PX, OUTLIER_FACTOR * float(np.median(errors_px)))
-    too_many = bad.sum() > MOST_OUTLIERS * len(bad) or (~bad).sum() < LEAST_VIEWS
+    too_many = bad.sum() > MAX_OUTLIERS * len(bad) or (~bad).sum() < MIN_VIEWS
     return np.ones(len(bad), dtype=np.bool_) if too_many else ~bad
 
 
@@ -224,11 +224,11 @@ def _check_lens(name: str, fitted: _Fit, focal: float, size: tuple[int, int]) ->
     centre_x, centre_y = float(fitted.matrix[0, 2]), float(fitted.matrix[1, 2])
     inside = 0.0 < centre_x < size[0] and 0.0 < centre_y < size[1]
     plausible = 0.2 * max(size) < focal < 10.0 * max(size)
-    if fitted.focal_sd_px <= MOST_FOCAL_SD * focal and inside and plausible:
+    if fitted.focal_sd_px <= MAX_FOCAL_SD * focal and inside and plausible:
         return
     raise CalibrationError(
         f"{name}: the views do not tell the lens (focal length {focal:.0f} ± {fitted.focal_sd_px:.0f} px, ± "
-        f"{MOST_FOCAL_SD:.1%} wanted; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
+        f"{MAX_FOCAL_SD:.1%} wanted; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
         f"error {fitted.error_px:.2f} px): take more views, nearer, tilted by 30 to 45 deg to all sides"
     )
 

@@ -26,7 +26,7 @@ STILL_SHARE = 0.01
 """Of the image's width, by which the board may move between two looks to be still; faster ones are blurred."""
 NEW_SHARE = 0.05
 """Of the image's width, by which the corners of a new view differ from those of all before."""
-MOST_VIEWS = 40
+MAX_VIEWS = 40
 """More views cost time and tell nothing new."""
 TABLE_S = 1.0
 """For so long, at the end of a video or before a live camera, the board lies still on the table."""
@@ -133,17 +133,17 @@ class LiveImages:
 
     def held(self) -> Found:
         """Views of the board before the camera, the table's included. Raises InputError."""
-        collector, looked_at, newest_s = ViewCollector(), 0, None
+        collector, looked_at, latest_s = ViewCollector(), 0, None
         self._say(f"{self.name}: hold the board before the camera, still for a moment, each time at another angle")
         for time_s, view in self._looks():
             looked_at += 1
-            newest_s = time_s if newest_s is None else newest_s
+            latest_s = time_s if latest_s is None else latest_s
             if collector.offer(view):
-                newest_s = time_s
+                latest_s = time_s
                 self._say(f"{self.name}: view {len(collector.views)} of {GOOD_VIEWS}")
             if len(collector.views) == GOOD_VIEWS:
                 break
-            if time_s - newest_s > TIMEOUT_S:
+            if time_s - latest_s > TIMEOUT_S:
                 raise CalibrationError(
                     f"{self.name}: no new view of the board for {TIMEOUT_S:g} s, {len(collector.views)} of "
                     f"{GOOD_VIEWS} taken: more light, the board nearer, tilted, and held still for a second"
@@ -183,7 +183,7 @@ class ViewCollector:
     def offer(self, view: BoardView | None) -> bool:
         """The view of the next look, None where no board was found. True if it is kept."""
         before, self._before = self._before, view
-        if view is None or before is None or len(self.views) >= MOST_VIEWS:
+        if view is None or before is None or len(self.views) >= MAX_VIEWS:
             return False
         if _motion(view, before) > STILL_SHARE or any(_motion(view, kept) < NEW_SHARE for kept in self.views):
             return False

@@ -27,23 +27,23 @@ NOMINAL_SQUARES = (0.030, 0.045)
 SIZE_UNTOLD_ID = MARKERS * len(NOMINAL_SQUARES)
 """First id of boards with squares of any other size."""
 SQUARE_LIMITS = (0.004, 0.4)
-LEAST_CORNERS = 8
+MIN_CORNERS = 8
 """A view with fewer corners tells little of the lens, and a wrong one among them would not be found."""
-LEAST_ROWS = 2
+MIN_ROWS = 2
 ENOUGH_TO_BEND = 14
 """With fewer corners a smooth bend of the board cannot be told from one that was found wrongly."""
-LEAST_MISFIT_PX = (0.3, 0.6)
+MIN_MISFIT_PX = (0.3, 0.6)
 """A corner nearer than this to where the others want it is never doubted; with a bend, and without."""
 BESIDE = 0.09
 """Where the squares around a corner are looked at, in squares along both sides: before a marker begins."""
-LEAST_CONTRAST = 0.3
+MIN_CONTRAST = 0.3
 """Of the brighter black to the darker white square at a corner, by that of the extremes."""
 MAGNIFICATIONS = (1, 2, 3)
 LARGEST_PX = 4000
 """A magnified image is not wider than this: markers in it are large enough, and it would take seconds."""
 AMPLE_SPACING_PX = 35.0
 """Between neighbouring corners; where they are farther apart, magnifying finds them no better."""
-MOST_MISFIT = 0.12
+MAX_MISFIT = 0.12
 """Of a corner to the plane's perspective, in squares. A strong wide-angle lens bends the board by 0.05."""
 
 
@@ -195,17 +195,17 @@ class BoardFinder:
         corners, ids, _, _ = self._detectors[first].detectBoard(
             large, markerCorners=marker_corners, markerIds=marker_ids
         )
-        if ids is None or len(ids) < LEAST_CORNERS:
+        if ids is None or len(ids) < MIN_CORNERS:
             return None
         order = np.argsort(ids.ravel())
         which = ids.ravel()[order].astype(np.int32)
         points = (corners.reshape(-1, 2).astype(np.float64)[order] + 0.5) / times - 0.5
         on_board = np.stack(np.divmod(which, COLUMNS - 1), axis=1)[:, ::-1].astype(np.float64)
         kept = _crossing(gray, on_board, points)
-        if kept.sum() < LEAST_CORNERS:
+        if kept.sum() < MIN_CORNERS:
             return None
         kept[kept] = _agreeing(on_board[kept], points[kept])
-        if kept.sum() < LEAST_CORNERS or _on_one_line(which[kept]):
+        if kept.sum() < MIN_CORNERS or _on_one_line(which[kept]):
             return None
         size = (int(gray.shape[1]), int(gray.shape[0]))
         return BoardView(name, which[kept], points[kept], size, first)
@@ -230,7 +230,7 @@ def _crossing(gray: Image, on_board: Floats, in_image: Floats) -> NDArray[np.boo
     black = np.where(even[:, None], levels[:, :2], levels[:, 2:])
     white = np.where(even[:, None], levels[:, 2:], levels[:, :2])
     contrast = white.max(axis=1) - black.min(axis=1)
-    return np.asarray(white.min(axis=1) - black.max(axis=1) > LEAST_CONTRAST * contrast)
+    return np.asarray(white.min(axis=1) - black.max(axis=1) > MIN_CONTRAST * contrast)
 
 
 def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
@@ -239,11 +239,11 @@ def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
     First with a perspective view, up to what a lens bends; then with one bent smoothly: what is left of the distances
     is fitted by a quadratic of the place on the board, and what then is far off was found wrongly.
     """
-    homography, inliers = cv2.findHomography(in_image, on_board, cv2.RANSAC, MOST_MISFIT)
+    homography, inliers = cv2.findHomography(in_image, on_board, cv2.RANSAC, MAX_MISFIT)
     if homography is None or inliers is None:
         return np.zeros(len(on_board), dtype=np.bool_)
     kept = np.asarray(inliers.ravel() > 0)
-    while kept.sum() >= LEAST_CORNERS:
+    while kept.sum() >= MIN_CORNERS:
         view, _ = cv2.findHomography(on_board[kept], in_image[kept])
         seen = cv2.perspectiveTransform(on_board[:, None], view)[:, 0]
         x, y = (on_board - on_board.mean(axis=0)).T
@@ -251,7 +251,7 @@ def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
         terms = np.column_stack([np.ones_like(x), x, y, *([x * x, x * y, y * y] if bends else [])])
         weights = np.linalg.lstsq(terms[kept], (in_image - seen)[kept], rcond=None)[0]
         misfit = np.linalg.norm(in_image - seen - terms @ weights, axis=1)
-        limit = max(LEAST_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[kept])))
+        limit = max(MIN_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[kept])))
         worst = int(np.argmax(np.where(kept, misfit, 0.0)))  # one at a time, as it bends the others' fit
         if misfit[worst] <= limit:
             break
@@ -261,7 +261,7 @@ def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
 
 def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:
     rows, columns = np.divmod(corner_ids, COLUMNS - 1)
-    return len(set(rows.tolist())) < LEAST_ROWS or len(set(columns.tolist())) < LEAST_ROWS
+    return len(set(rows.tolist())) < MIN_ROWS or len(set(columns.tolist())) < MIN_ROWS
 
 
 def views_of(images: Sequence[tuple[str, Image]]) -> list[BoardView | None]:

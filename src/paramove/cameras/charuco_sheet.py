@@ -19,7 +19,7 @@ UNPRINTED_MM = 6.0
 """Border that common printers leave white."""
 HEAD_MM = 19.0
 """Least height above the chequers, for the ruler and its words."""
-LEAST_SQUARE_MM = 20.0
+MIN_SQUARE_MM = 20.0
 """Below the chequers is as much room as a square is high; the words need this much."""
 RULER_MM = 100.0
 MODULES = 6
@@ -52,10 +52,10 @@ def board_sheet(paper: str = "a4", square: float | None = None) -> bytes:
         raise BoardError(f"paper {paper!r} is not known: {', '.join(PAPERS)} expected")
     sheet = PAPERS[paper]
     square_mm = sheet.square_mm if square is None else 1000.0 * square
-    most = min((sheet.width_mm - 2 * UNPRINTED_MM) / COLUMNS, (sheet.height_mm - HEAD_MM) / (ROWS + 1))
-    if not LEAST_SQUARE_MM <= square_mm <= most:
+    maximum = min((sheet.width_mm - 2 * UNPRINTED_MM) / COLUMNS, (sheet.height_mm - HEAD_MM) / (ROWS + 1))
+    if not MIN_SQUARE_MM <= square_mm <= maximum:
         raise BoardError(
-            f"squares of {square_mm:g} mm found; on {paper} {LEAST_SQUARE_MM:g} to {int(most)} mm fit, "
+            f"squares of {square_mm:g} mm found; on {paper} {MIN_SQUARE_MM:g} to {int(maximum)} mm fit, "
             "with the words around them"
         )
     drawing = _chequers(Board.printed(square_mm / 1000.0), sheet)
@@ -76,8 +76,8 @@ def marker_sheet(numbers: Mapping[str, int], side: float = 0.045, paper: str = "
         raise BoardError(f"paper {paper!r} is not known: {', '.join(PAPERS)} expected")
     sheet, side_mm = PAPERS[paper], 1000.0 * side
     cell = side_mm * (1.0 + 2.0 / MODULES)  # a white module around it, without which it is not found
-    pitch, most = cell + 4.0, min((sheet.width_mm - 16.0) / len(numbers), (sheet.height_mm - 40.0) / 2) - 4.0
-    largest = int(most / (1.0 + 2.0 / MODULES))
+    pitch, maximum = cell + 4.0, min((sheet.width_mm - 16.0) / len(numbers), (sheet.height_mm - 40.0) / 2) - 4.0
+    largest = int(maximum / (1.0 + 2.0 / MODULES))
     if not 10.0 <= side_mm <= largest:
         raise BoardError(
             f"markers of {side_mm:g} mm found; {len(numbers)} of 10 to {largest} mm fit twice on {paper}, with borders"

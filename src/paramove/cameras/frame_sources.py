@@ -18,7 +18,7 @@ from paramove.documents import Image, InputError, opened_video
 
 _log = logging.getLogger(__name__)
 
-SOURCES = "topic:camera/light, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
+SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
 TIMEOUT_NS = 1_000_000_000
 """A source that is silent for longer has a fault."""
 
@@ -45,36 +45,36 @@ class Capture(Protocol):
 class FrameSource(Protocol):
     """Gives frames when asked, once a tick, or (a topic) once a message."""
 
-    hears_light: bool
-    """True if frames come as messages, False if they are fetched at each tick."""
+    from_topic: bool
+    """True if frames come as messages, False if they are read at each tick."""
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
-        """The newest frame, None if there is no new one yet. Raises FrameError."""
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
+        """The latest frame, None if there is no new one yet. Raises FrameError."""
 
     def close(self) -> None: ...
 
 
 class TopicFrames:
-    """Frames said by another node as raw images, such as the simulator's camera."""
+    """Frames that another node publishes as raw images, such as the simulator's camera."""
 
-    hears_light = True
+    from_topic = True
 
     def __init__(self) -> None:
         self._index = 0
-        self._newest_ns: int | None = None
+        self._latest_ns: int | None = None
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
-        if light is None:
-            self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
-            if now_ns - self._newest_ns > TIMEOUT_NS:
+        if raw is None:
+            self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
+            if now_ns - self._latest_ns > TIMEOUT_NS:
                 raise FrameError(
-                    "no image on camera/light for more than 1 s: see what says it (the simulator)", "silent"
+                    "no image on camera/image_raw for more than 1 s: see what publishes it (the simulator)", "silent"
                 )
             return None
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._index += 1
-        return Frame(image_of_raw(light), now_ns, self._index - 1)
+        return Frame(image_of_raw(raw), now_ns, self._index - 1)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -86,7 +86,7 @@ class FileFrames:
     Raises SourceError if the file does not exist or is no video; EndOfFrames after the last frame.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -101,7 +101,7 @@ class FileFrames:
         self._start_ns: int | None = None
         self._grabbed = 0
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The frame of the video that is due. Raises EndOfFrames after the last one, FrameError."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         # A quarter of a frame of tolerance, as ticks are rounded to milliseconds.
@@ -127,7 +127,7 @@ class FileFrames:
 
 
 class DeviceFrames:
-    """Frames of a V4L2 device, read by a thread that keeps only the newest, so that an old frame never waits.
+    """Frames of a V4L2 device, read by a thread that keeps only the latest, so that an old frame never waits.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
     #14044): silence is noticed here after `timeout_ns` of the caller's clock, repetition by `FrameChecks`. Every
@@ -139,7 +139,7 @@ class DeviceFrames:
         open_capture: opens a path; tests give a fake device.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(
         self,
@@ -159,21 +159,21 @@ class DeviceFrames:
         }
         self._timeout_ns = timeout_ns
         self._open_capture = open_capture or _open_v4l2
-        self._newest_ns: int | None = None
+        self._latest_ns: int | None = None
         self._index = 0
         self._reader = _Reader(self._open())
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The latest frame, None if there is no new one yet. Raises FrameError if none has come for long."""
-        self._newest_ns = now_ns if self._newest_ns is None else self._newest_ns
+        self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
         image = self._reader.take()
         if image is None:
-            silent_ns = now_ns - self._newest_ns
+            silent_ns = now_ns - self._latest_ns
             if silent_ns < self._timeout_ns:
                 return None
             self._reopen(now_ns)
             raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._index += 1
         return Frame(image, now_ns, self._index - 1)
 
@@ -189,26 +189,26 @@ class DeviceFrames:
 
     def _reopen(self, now_ns: int) -> None:
         self._reader.stop()
-        self._newest_ns = now_ns
+        self._latest_ns = now_ns
         self._reader = _Reader(self._open())
 
 
 class _Reader:
-    """A thread that reads frames and keeps the newest. It ends when a read fails."""
+    """A thread that reads frames and keeps the latest. It ends when a read fails."""
 
     def __init__(self, capture: Capture) -> None:
         self._capture = capture
         self._lock = threading.Lock()
-        self._newest: Image | None = None
+        self._latest: Image | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._read, name="camera reader", daemon=True)
         self._thread.start()
 
     def take(self) -> Image | None:
-        """The newest frame since the last call, if any."""
+        """The latest frame since the last call, if any."""
         with self._lock:
-            newest, self._newest = self._newest, None
-        return newest
+            latest, self._latest = self._latest, None
+        return latest
 
     def stop(self) -> None:
         """Ask the thread to end. It releases the device itself, as another thread's release during a read crashes."""
@@ -222,7 +222,7 @@ class _Reader:
                 if not done:
                     break
                 with self._lock:
-                    self._newest = image
+                    self._latest = image
         except cv2.error as error:  # unplugged during a read; the silence is told by the other side
             _log.warning("reading the camera: %s", error.err)
         finally:
@@ -232,7 +232,7 @@ class _Reader:
 def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
     """The source that the text names. Raises InputError if there is none like it or it cannot be opened."""
     kind, _, rest = source.partition(":")
-    if kind == "topic" and rest == "camera/light":
+    if kind == "topic" and rest == "camera/image_raw":
         return TopicFrames()
     if kind == "file" and rest:
         return FileFrames(Path(rest))

@@ -14,9 +14,9 @@ from paramove.cameras.calibration import CalibrationError, Lens
 from paramove.cameras.charuco_board import Board, BoardView
 from paramove.documents import Floats
 
-LEAST_NOISE_PX = 0.05
+MIN_NOISE_PX = 0.05
 """Corners are never found better than this, however few there are to show it."""
-MOST_MOTION_PX = 2.0
+MAX_MOTION_PX = 2.0
 """Of a corner between two images of the table; more is a board or camera that was moved."""
 CLEARER = 1.3
 """The mirrored pose of a plane (Collins and Bartoli 2014) must fit worse by this factor, or be about the same pose."""
@@ -64,7 +64,7 @@ def place_camera(lens: Lens, views: Sequence[BoardView], board: Board) -> Placem
             f"{lens.name}: the camera would be {distance:.2f} m from the board; {DISTANCES[0]:g} to {DISTANCES[1]:g} m "
             f"expected: is a square really {board.square * 1000:g} mm wide? Measure it and give it by --square"
         )
-    noise = max(error_px / np.sqrt(2.0), LEAST_NOISE_PX)
+    noise = max(error_px / np.sqrt(2.0), MIN_NOISE_PX)
     turn_sd, position_sd = _deviations(np.asarray(jacobian[:, :6], dtype=np.float64), rotation, shift, noise)
     position_sd = float(np.hypot(position_sd, distance * lens.focal_sd_px / lens.matrix[0, 0]))
     turn_sd = float(np.hypot(turn_sd, np.rad2deg(lens.centre_sd_px / lens.matrix[0, 0])))
@@ -85,7 +85,7 @@ def _check_views(lens: Lens, views: Sequence[BoardView]) -> None:
             )
         both, here, there = np.intersect1d(view.corner_ids, views[0].corner_ids, return_indices=True)
         motion = np.linalg.norm(view.points[here] - views[0].points[there], axis=1) if len(both) else np.zeros(1)
-        if float(np.median(motion)) > MOST_MOTION_PX:
+        if float(np.median(motion)) > MAX_MOTION_PX:
             raise CalibrationError(
                 f"{lens.name}: between {views[0].name} and {view.name} the board on the table or the camera moved by "
                 f"{float(np.median(motion)):.0f} px: all images of the table must show one place"
@@ -109,7 +109,7 @@ def _best_pose(lens: Lens, on_table: Floats, in_image: Floats) -> tuple[Any, Any
         (best, pose), (other, mirrored) = found[:2]
         between = cv2.Rodrigues(pose[0])[0] @ cv2.Rodrigues(mirrored[0])[0].T
         angle = np.rad2deg(np.linalg.norm(cv2.Rodrigues(between)[0]))
-        if other < CLEARER * max(best, LEAST_NOISE_PX) and angle > SAME_TILT_DEG:
+        if other < CLEARER * max(best, MIN_NOISE_PX) and angle > SAME_TILT_DEG:
             raise CalibrationError(
                 f"{lens.name}: the board on the table looks too small to tell its tilt (two poses {angle:.0f} deg "
                 "apart fit equally): move the camera nearer, use a larger board or a higher resolution"

@@ -23,7 +23,7 @@ class FolderFrames:
     Raises InputError if there are none; EndOfFrames after the last one.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(self, folder: Path, rate_hz: float) -> None:
         self._files = sorted(file for file in folder.glob("*") if file.suffix.lower() in PICTURES)
@@ -36,8 +36,8 @@ class FolderFrames:
         self._start_ns: int | None = None
         self._next = 0
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
-        """The newest picture that is due. Raises FrameError for one that cannot be read."""
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
+        """The latest picture that is due. Raises FrameError for one that cannot be read."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         index = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + TICK_SHARE)
         if index < self._next:
@@ -61,7 +61,7 @@ class RecordingFrames:
     Raises InputError if the recording has none; EndOfFrames after the last one.
     """
 
-    hears_light = False
+    from_topic = False
 
     def __init__(self, path: Path, topic: str) -> None:
         if not path.is_file():
@@ -78,17 +78,17 @@ class RecordingFrames:
         self._start_ns: int | None = None
         self._index = 0
 
-    def frame(self, now_ns: int, light: RawImage | None = None) -> Frame | None:
-        """The newest image that is due. Raises FrameError for one that cannot be decoded."""
+    def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
+        """The latest image that is due. Raises FrameError for one that cannot be decoded."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
         due_ns = self._first_ns + (now_ns - self._start_ns) + 1_000_000
         if self._waiting is None:
             raise EndOfFrames(f"{self._path} has ended after {self._index} images on {self._topic}")
-        newest: Recorded | None = None
+        latest: Recorded | None = None
         while self._waiting is not None and self._captured_ns(self._waiting) <= due_ns:
-            newest, self._waiting = self._waiting, next(self._recorded, None)
+            latest, self._waiting = self._waiting, next(self._recorded, None)
             self._index += 1
-        return None if newest is None else Frame(decode(newest.message), now_ns, self._index - 1)
+        return None if latest is None else Frame(decode(latest.message), now_ns, self._index - 1)
 
     def close(self) -> None:
         """Lets go of the file."""

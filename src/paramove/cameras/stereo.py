@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.cameras.calibrated import CalibratedCamera
 from paramove.documents import Floats, InputError
 
-LEAST_BASELINE = 0.01
+MIN_BASELINE = 0.01
 """m. Cameras nearer to each other see the same."""
-LEAST_ANGLE_DEG = 1.0
+MIN_ANGLE_DEG = 1.0
 """Between the rays to a point: below, an error of a tenth of a pixel is one of a tenth of the distance."""
 STEPS = 6
 
@@ -66,7 +66,7 @@ class StereoRig:
             raise StereoError(f"{len(cameras)} camera found: places in space need at least two calibrated cameras")
         places = np.array([camera.position for camera in cameras])
         self.baseline = float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
-        if self.baseline < LEAST_BASELINE:
+        if self.baseline < MIN_BASELINE:
             names = ", ".join(camera.name for camera in cameras)
             raise StereoError(
                 f"the cameras {names} stand {self.baseline * 1000:.1f} mm apart: they see the same, so no distance can "
@@ -105,7 +105,7 @@ class StereoRig:
         residual_px = np.sqrt(np.sum(residuals**2, axis=(0, 2)) / np.maximum(count, 1))
         angles = self._angles_deg(points, used)
         depths = np.einsum("kj,nj->kn", self._from_world[:, 2, :3], points) + self._from_world[:, 2, 3:]
-        known = (count >= 2) & (angles >= LEAST_ANGLE_DEG) & np.all((depths > 0.0) | ~used, axis=0)
+        known = (count >= 2) & (angles >= MIN_ANGLE_DEG) & np.all((depths > 0.0) | ~used, axis=0)
         covariances = sigma_px**2 * _solved(information, np.broadcast_to(np.eye(3), information.shape))
         unknown = np.where(known, 0.0, np.nan)
         return Triangulation(

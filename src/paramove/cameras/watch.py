@@ -49,7 +49,7 @@ class CameraWatch:
             self._heard_ns.setdefault(name, now_ns)
 
     def refused(self) -> list[str]:
-        """Why the newest images of some cameras could not be used, a sentence each."""
+        """Why the latest images of some cameras could not be used, a sentence each."""
         return list(self._refused.values())
 
     def troubles(self) -> list[str]:

@@ -41,10 +41,19 @@ def topic_named(name: str) -> Topic:
         raise typer.Exit(2) from None
 
 
+OLD_KEYS = {"publisher": "said by", "published": "said so far", "received": "heard"}
+"""Key of a row -> its name in the release before, which JSON has too for one release."""
+
+
+def with_old_keys(row: dict[str, Any]) -> dict[str, Any]:
+    """A row for JSON, with the values of renamed keys by both names."""
+    return row | {old: row[key] for key, old in OLD_KEYS.items() if key in row}
+
+
 def show(rows: Sequence[dict[str, Any]], as_json: bool) -> None:
     """Prints rows that have the same keys, as JSON or as a table."""
     if as_json:
-        typer.echo(json.dumps(rows, indent=2))
+        typer.echo(json.dumps([with_old_keys(row) for row in rows], indent=2))
         return
     if not rows:
         return

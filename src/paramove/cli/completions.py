@@ -82,7 +82,7 @@ def domains(incomplete: str) -> list[str]:
 
 
 def run_folders(incomplete: str) -> list[str]:
-    """Folders of runs, the newest first."""
+    """Folders of runs, the latest first."""
     with contextlib.suppress(OSError):
         found = sorted((path.name for path in Path("runs").iterdir() if path.is_dir()), reverse=True)
         return _beginning(incomplete, (f"runs/{name}" for name in found))

@@ -46,7 +46,7 @@ def graph(
         str | None, typer.Option("--domain", help="for --live", autocompletion=completions.domains)
     ] = None,
 ) -> None:
-    """Draw who says and hears what, with rates; what is heard and said by nobody is marked.
+    """Draw which node publishes and subscribes to what, with rates; topics without publisher are marked.
 
     Exit codes: 0 done; 1 nothing is running; 66 no such launch file; 77 the output cannot be written; 78 the launch
     file is wrong.

@@ -45,7 +45,7 @@ def logs(
     run: Annotated[
         Path | None,
         typer.Option(
-            metavar="FOLDER", help="folder of the run; default: the newest", autocompletion=completions.run_folders
+            metavar="FOLDER", help="folder of the run; default: the latest", autocompletion=completions.run_folders
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print a JSON object per line")] = False,

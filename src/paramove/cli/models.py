@@ -137,7 +137,7 @@ def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
     from paramove.training import left_out_sentences, with_unit
 
     low_high = [f"{with_unit(name)}: {low:.4g} to {high:.4g}" for name, (low, high) in facts["parameters"].items()]
-    least, most = facts["frames_per_state"]
+    minimum, maximum = facts["frames_per_state"]
     frames = facts["resampled_frames"]
     times = facts["state_durations"]
     rows = [
@@ -148,7 +148,7 @@ def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("points", ", ".join(facts["points"]) or f"not named; {facts['components']} components"),
         ("unit, frame", f"{facts['unit']}, {facts['frame']}"),
         ("parameters", "; ".join(low_high)),
-        ("states", f"{facts['states']} of {least} to {most} frames"
+        ("states", f"{facts['states']} of {minimum} to {maximum} frames"
          + (f"; every movement is brought to {frames} frames" if frames else "")),
         ("time in a state", f"{min(times):.3g} to {max(times):.3g} {facts['state_durations_unit']}"),
     ]  # fmt: skip
@@ -232,7 +232,7 @@ def _tell(
     for name in shown:
         for letter, line in zip(["same"] if name in same else letters, lines, strict=False):
             typer.echo(f"{name:<22}{letter:<6}{printable(line[name])}")
-    typer.echo("\ndistance of their movements over the theta of both: root mean square (greatest), cm")
+    typer.echo("\ndistance of their movements over the theta of both: root mean square (largest), cm")
     table_of([
         {"": letter} | {
             other: "–" if one is two else f"{100 * cell['rms_m']:.2f} ({100 * cell['greatest_m']:.1f})"

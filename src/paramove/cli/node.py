@@ -34,14 +34,15 @@ def list_nodes(
     as_json: JsonOption = False,
     seconds: Annotated[float, typer.Option(min=0.1, help="how long to wait for an answer")] = 2.0,
 ) -> None:
-    """List the nodes: state, what they say of themselves, messages, losses, seconds spent, restarts and last end."""
+    """List the nodes: state, their own status, messages, losses, seconds spent, restarts and last end."""
     folder = bus_folder(domain)
     try:
         supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
     except NoRunError:  # nodes that were started one by one
         supervised = {}
-    said = inspection.statuses(folder, seconds)
-    rows = [_row(node, said.get(node), node in said, supervised.get(node), seconds) for node in {**supervised, **said}]
+    found = inspection.statuses(folder, seconds)
+    nodes = {**supervised, **found}
+    rows = [_row(node, found.get(node), node in found, supervised.get(node), seconds) for node in nodes]
     if not rows and not as_json:
         typer.echo("no node is on the bus")
     show(rows, as_json)
@@ -121,9 +122,9 @@ def _row(
         "pid": status.pid or known.get("pid"),
         "processed": status.processed,
         "seconds": round(status.processing_seconds, 3),
-        "heard": sum(count.messages for count in status.heard),
-        "lost": sum(count.lost for count in status.heard),
-        "refused": sum(count.refused for count in status.heard),
+        "received": sum(count.messages for count in status.received),
+        "lost": sum(count.lost for count in status.received),
+        "refused": sum(count.refused for count in status.received),
         "restarts": known["restarts"],
         "last_end": known["exit_reason"],
         "sentence": status.sentence or known["sentence"],

@@ -52,8 +52,8 @@ def recognize(
 ) -> None:
     """Say which action a movement is and with which parameters; of several models, which explains it best.
 
-    Theta comes with the region that holds it in 95 % of the cases. A movement that is less typical than 1 % is said to
-    be none of the known ones.
+    Theta comes with the region that holds it in 95 % of the cases. A movement with a p-value below 1 % is rejected
+    as none of the known actions.
 
     Exit codes: 0, also where nothing known was seen; 66 a file is missing; 78 a file or the movement cannot be used.
     """
@@ -118,8 +118,8 @@ def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
     ]
     if found.outside:
         rows.append(("beware", f"{', '.join(found.outside)} outside what the model was trained with"))
-    typical = "this model cannot tell" if found.typicality is None else percent(found.typicality)
-    rows += [("typicality", typical), ("log-likelihood", f"{facts['log_likelihood']:.1f}")]
+    p_value = "this model has none" if found.p_value is None else percent(found.p_value)
+    rows += [("p-value", p_value), ("log-likelihood", f"{facts['log_likelihood']:.1f}")]
     if "labelled_action" in facts:
         rows.append(("labelled", facts["labelled_action"]))
     if found.labelled is not None:
@@ -138,7 +138,7 @@ def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
         row["posterior"] = percent(facts["posterior"][facts["most_probable_action"]])
     for name, value in facts["theta"].items():
         row[name] = f"{value:.3f} ± {facts['theta_region_95'][name]:.2g}"
-    row["typicality"] = None if facts["typicality"] is None else percent(facts["typicality"])
+    row["p-value"] = None if facts["p_value"] is None else percent(facts["p_value"])
     row["log-likelihood"] = facts["log_likelihood"]
     if "labelled_action" in facts:
         row["labelled"] = facts["labelled_action"]

@@ -14,7 +14,7 @@ from paramove.recording import RecordingExistsError, Recovery, RecoveryError, St
 
 app = typer.Typer(add_completion=False)
 
-MOST_DAMAGES = 20
+MAX_DAMAGES = 20
 
 
 @app.command("recover")
@@ -77,9 +77,9 @@ def _lines(result: Recovery) -> list[str]:
     if not result.lost_is_exact:
         counted = f"at least {counted}, and what these bytes held" if result.lost else "what these bytes held"
     lines = [f"{result.destination}: kept {kept}", f"lost {counted}{':' if result.damages else ''}"]
-    lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MOST_DAMAGES]]
-    if len(result.damages) > MOST_DAMAGES:
-        lines.append(f"  and {len(result.damages) - MOST_DAMAGES} more")
+    lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MAX_DAMAGES]]
+    if len(result.damages) > MAX_DAMAGES:
+        lines.append(f"  and {len(result.damages) - MAX_DAMAGES} more")
     if result.known_until_s is not None:
         lines += [
             f"not known: what came after the message of {result.known_until_s:.3f} s, as its writer never finished it",

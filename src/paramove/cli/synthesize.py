@@ -81,8 +81,8 @@ def _check(model: ParametricHMM, theta: object) -> None:
     low_high = [f"{with_unit(name)}: {a:.4g} to {b:.4g}" for name, a, b in zip(names, low, high, strict=True)]
     if len(values) != len(names):
         raise InputError(f"theta has {len(names)} components ({'; '.join(low_high)}), found {len(values)} in --theta")
-    outside = [told for told, value, least, most in zip(low_high, values, low, high, strict=True)
-               if not least <= value <= most]  # fmt: skip
+    outside = [told for told, value, minimum, maximum in zip(low_high, values, low, high, strict=True)
+               if not minimum <= value <= maximum]  # fmt: skip
     if outside:
         typer.echo(
             printable(f"theta is outside what the model was trained with, the movement is extrapolated: "

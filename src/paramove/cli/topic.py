@@ -1,4 +1,4 @@
-"""`paramove topic`: what is said on the bus."""
+"""`paramove topic`: topics, messages and rates on the bus."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import typer
 
 from paramove.bus import inspection, topics
 from paramove.cli import completions
-from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show, topic_named
+from paramove.cli.bus_options import DomainOption, JsonOption, bus_folder, show, topic_named, with_old_keys
 
-app = typer.Typer(name="topic", help="Look at what is said on the bus.", no_args_is_help=True)
+app = typer.Typer(name="topic", help="Look at topics, messages and rates on the bus.", no_args_is_help=True)
 
 NameArgument = Annotated[
     str, typer.Argument(help="name of the topic, such as camera/image", autocompletion=completions.topics)
@@ -22,7 +22,7 @@ LONGEST_BYTES = 32
 
 @app.command("list")
 def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> None:
-    """List every topic, its type and who says it. `silent`: nobody does."""
+    """List every topic, its type and its publisher."""
     rows = [
         {
             "topic": item.topic.name,
@@ -30,18 +30,18 @@ def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> Non
             "rate_hz": item.topic.rate_hz,
             "profile": item.topic.profile.value,
             "recorded": item.topic.recorded,
-            "said by": item.holder if item.alive else "silent",
+            "publisher": item.holder if item.alive else "none",
         }
-        for item in inspection.speakers(bus_folder(domain))
+        for item in inspection.publishers(bus_folder(domain))
     ]
     show(rows, as_json)
 
 
 @app.command()
 def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = False, wait_s: float = 1.0) -> None:
-    """Show one topic: its row of the table, who says it and how much has been said."""
+    """Show one topic: its row of the table, its publisher and the number of its messages."""
     folder, topic = bus_folder(domain), topic_named(name)
-    found = inspection.speaker(folder, topic)
+    found = inspection.publisher_of(folder, topic)
     row: dict[str, Any] = {
         "topic": topic.name,
         "type": topic.type_name,
@@ -50,13 +50,13 @@ def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = 
         "frame": topic.frame,
         "recorded": topic.recorded,
         "alive": found.alive,
-        "said by": found.holder if found.alive else "silent",
+        "publisher": found.holder if found.alive else "none",
     }
     if found.alive:
         (measured,) = inspection.measure(folder, [topic], wait_s)
-        row |= {"answers": measured.welcomed, "epoch": measured.epoch, "said so far": measured.sequence}
+        row |= {"answers": measured.welcomed, "epoch": measured.epoch, "published": measured.sequence}
     if as_json:
-        typer.echo(json.dumps(row, indent=2))
+        typer.echo(json.dumps(with_old_keys(row), indent=2))
     else:
         show([{"": key, " ": value} for key, value in row.items()], as_json=False)
 
@@ -72,20 +72,24 @@ def echo(
     """Print messages as they arrive: one per block, or with --json one JSON object per line."""
     folder, topic = bus_folder(domain), topic_named(name)
     messages = 0
-    for heard in inspection.listen(folder, [topic], seconds):
+    for received in inspection.listen(folder, [topic], seconds):
         messages += 1
-        content = readable(heard.message)
-        head = {"sequence": heard.sequence, "captured_ns": heard.captured_ns, "published_ns": heard.published_ns}
+        content = readable(received.message)
+        head = {
+            "sequence": received.sequence,
+            "captured_ns": received.captured_ns,
+            "published_ns": received.published_ns,
+        }
         if as_json:
             typer.echo(json.dumps(head | {"message": content}))
         else:
-            typer.echo(f"--- {topic.name} {heard.sequence}, captured at {heard.captured_ns * 1e-9:.3f} s")
+            typer.echo(f"--- {topic.name} {received.sequence}, captured at {received.captured_ns * 1e-9:.3f} s")
             typer.echo(json.dumps(content, indent=2, ensure_ascii=True))
         if messages == count:
             return
     if messages == 0:
-        state = inspection.speaker(folder, topic)
-        reason = f"{state.holder} said nothing" if state.alive else "silent, nobody says it"
+        state = inspection.publisher_of(folder, topic)
+        reason = f"{state.holder} published nothing" if state.alive else "no publisher"
         typer.echo(f"{topic.name}: {reason} within {seconds:g} s", err=True)
         raise typer.Exit(1)
 
@@ -93,7 +97,8 @@ def echo(
 @app.command()
 def hz(
     names: Annotated[
-        list[str] | None, typer.Argument(help="topics; default: all that are said", autocompletion=completions.topics)
+        list[str] | None,
+        typer.Argument(help="topics; default: all with a publisher", autocompletion=completions.topics),
     ] = None,
     domain: DomainOption = None,
     as_json: JsonOption = False,
@@ -101,8 +106,8 @@ def hz(
 ) -> None:
     """Measure rates, losses, the longest gap and sizes. Reads envelopes only."""
     folder = bus_folder(domain)
-    said = {item.topic.name for item in inspection.speakers(folder) if item.alive}
-    wanted = [topic_named(name) for name in names] if names else [topics.by_name(name) for name in sorted(said)]
+    alive = {item.topic.name for item in inspection.publishers(folder) if item.alive}
+    requested = [topic_named(name) for name in names] if names else [topics.by_name(name) for name in sorted(alive)]
     rows = [
         {
             "topic": item.topic.name,
@@ -113,9 +118,9 @@ def hz(
             "refused": item.refused,
             "longest_gap_s": round(item.longest_gap_s, 4),
             "mean_bytes": round(item.mean_bytes),
-            "state": _state(item.topic.name in said, item.welcomed),
+            "state": _state(item.topic.name in alive, item.welcomed),
         }
-        for item in inspection.measure(folder, wanted, seconds)
+        for item in inspection.measure(folder, requested, seconds)
     ]
     show(rows, as_json)
 
@@ -145,7 +150,7 @@ def _scalar(field: Any, value: Any) -> Any:
     return value if not isinstance(value, float) or value - value == 0 else str(value)
 
 
-def _state(said: bool, welcomed: bool) -> str:
-    if not said:
-        return "silent"
-    return "said" if welcomed else "does not answer"
+def _state(alive: bool, welcomed: bool) -> str:
+    if not alive:
+        return "no publisher"
+    return "published" if welcomed else "not responding"

@@ -38,7 +38,7 @@ def train(
         str | None, typer.Option(metavar="NAMES", help="those that are learned (default: all that vary)")
     ] = None,
     states: Annotated[int, typer.Option(min=1, max=500, help="number of states")] = 20,
-    d_min: Annotated[int | None, typer.Option("--d-min", min=1, help="least frames in a state")] = None,
+    d_min: Annotated[int | None, typer.Option("--d-min", min=1, help="smallest frames in a state")] = None,
     d_max: Annotated[int | None, typer.Option("--d-max", min=1, help="most frames in a state")] = None,
     frames: Annotated[int, typer.Option(min=5, max=2000, help="every movement is brought to so many")] = 100,
     residuals: Annotated[

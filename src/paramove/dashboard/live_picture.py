@@ -72,7 +72,7 @@ class LivePicture:
             "object": {"radius": surface.object_radius, "height": surface.object_height},
         }
         beliefs = self._beliefs
-        self._hear: dict[str, Callable[[Any, float], None]] = {
+        self._handlers: dict[str, Callable[[Any, float], None]] = {
             topics.APPLICATION_STAGE.name: beliefs.on_stage,
             topics.SPEECH.name: beliefs.on_speech,
             topics.RULES.name: beliefs.on_rules,
@@ -83,10 +83,10 @@ class LivePicture:
             topics.RELOCATION_STATUS.name: beliefs.on_goal_status,
         }
 
-    def hear(self, heard: Received) -> None:
+    def handle(self, heard: Received) -> None:
         """Take in one message of any topic that the page knows."""
-        if heard.topic.name in self._hear:
-            self._hear[heard.topic.name](heard.message, heard.captured_ns * 1e-9)
+        if heard.topic.name in self._handlers:
+            self._handlers[heard.topic.name](heard.message, heard.captured_ns * 1e-9)
         elif heard.topic.name == topics.CAMERA_IMAGE.name:
             self._image = bytes(heard.message.data)
         elif heard.topic.name == topics.ACTION_OUTLINE.name:
@@ -96,7 +96,7 @@ class LivePicture:
         elif heard.topic.name == topics.ARM_SAFETY.name:
             self._safety = _safety(heard.message)
         elif heard.topic.type is NodeStatus:
-            self._nodes.hear(heard.message, self._wall_s())
+            self._nodes.handle(heard.message, self._wall_s())
 
     def changes(self, now_ns: int, stop: dict[str, Any]) -> dict[str, Any]:
         """Sections that are not what they were at the last call.
@@ -124,7 +124,7 @@ class LivePicture:
         return changed
 
     def image(self) -> bytes | None:
-        """The newest image if there is one that was not given yet, JPEG."""
+        """The latest image if there is one that was not given yet, JPEG."""
         image, self._image = self._image, None
         return image
 

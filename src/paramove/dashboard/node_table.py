@@ -9,11 +9,11 @@ from paramove.bus import Bus, topics
 from paramove.msgs.node_status_pb2 import NodeStatus
 
 
-def hear_nodes(bus: Bus) -> None:
-    """Begins to hear the status of every node that has spoken in the bus's folder by now."""
+def subscribe_to_nodes(bus: Bus) -> None:
+    """Subscribes to the status of every node that has published one in the bus's folder."""
     for path in bus.settings.folder.glob("status.*"):
         if path.suffix != ".lock":
-            bus.hear(topics.status(path.name.removeprefix("status.")))
+            bus.subscribe(topics.status(path.name.removeprefix("status.")))
 
 
 @dataclass
@@ -25,12 +25,12 @@ class _Node:
 
 
 class NodeTable:
-    """Newest status of each node. Times are of the wall's monotonic clock, s."""
+    """Latest status of each node. Times are of the wall's monotonic clock, s."""
 
     def __init__(self) -> None:
         self._nodes: dict[str, _Node] = {}
 
-    def hear(self, status: NodeStatus, now_s: float) -> None:
+    def handle(self, status: NodeStatus, now_s: float) -> None:
         """Take in what a node says; a new process id means that it was started again."""
         before = self._nodes.get(status.node)
         node = _Node(status, now_s)
@@ -43,14 +43,14 @@ class NodeTable:
         self._nodes[status.node] = node
 
     def section(self, now_s: float) -> list[dict[str, Any]]:
-        """One row for each node that was ever heard, by name."""
+        """One row for each node that has ever published its status, by name."""
         return [
             {
                 "name": name,
                 "state": NodeStatus.State.Name(node.status.state).removeprefix("STATE_").lower(),
                 "sentence": node.status.sentence,
                 "ms": None if node.processing_ms is None else round(node.processing_ms, 1),
-                "lost": sum(count.lost for count in node.status.heard),
+                "lost": sum(count.lost for count in node.status.received),
                 "restarts": node.restarts,
                 "silent_s": round(now_s - node.heard_s),
             }

@@ -1,6 +1,6 @@
 """The page's server: a few files and one socket for each browser, on loopback, in a thread of its own.
 
-The bus's thread leaves the newest content with `show` and never waits. Each browser is sent what has changed since it
+The bus's thread leaves the latest content with `show` and never waits. Each browser is sent what has changed since it
 was last sent something, once it has said "next": it has drawn what it got before. So a slow one gets fewer pictures but
 no older ones, and nothing piles up, not even in the sockets. The only other word that a browser may say is "stop"; it
 makes `pressed` readable, which the bus's thread watches.

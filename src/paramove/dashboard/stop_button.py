@@ -51,7 +51,7 @@ class StopButton:
             request.captured.FromNanoseconds(self._asked_ns)
             self._say(request)
 
-    def hear(self, heard: Received) -> None:
+    def handle(self, heard: Received) -> None:
         """Of all messages the gate's: whether it has heard the stop, and whether the arm rests.
 
         That it was this page that asked does not matter: it may have been restarted in between.

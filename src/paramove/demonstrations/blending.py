@@ -30,7 +30,7 @@ class BlendTiming:
     Attributes:
         crossing: share of the whole movement between arriving at the first place and leaving the second.
         pause: share of the crossing that the hand rests at each of the two places.
-        stillness: a movement is at its place while it is slower than this share of its greatest speed.
+        stillness: a movement is at its place while it is slower than this share of its largest speed.
     """
 
     crossing: float = 0.36
@@ -84,7 +84,7 @@ def phase(movement: Floats, stillness: float = 0.1) -> Floats:
     if len(before) == 0 or len(after) == 0 or after[0] - before[-1] < 4:
         raise ValueError(
             f"a movement to blend goes out, stays at a place and returns; in the middle half it never is slower than "
-            f"{stillness:g} of its greatest speed for three frames; raise `stillness`"
+            f"{stillness:g} of its largest speed for three frames; raise `stillness`"
         )
     arrived, leaves = int(before[-1]) + 1, int(after[0]) - 1
     length = np.cumsum(speed)

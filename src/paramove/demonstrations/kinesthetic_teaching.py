@@ -37,7 +37,7 @@ class KinestheticTeacher:
         append: Whether the set may be there already.
 
     Attributes:
-        written: Recordings of the segments that have ended, the newest last.
+        written: Recordings of the segments that have ended, the latest last.
 
     Raises:
         DescriptionError: The robot has no such arm.
@@ -75,7 +75,7 @@ class KinestheticTeacher:
         """Whether a segment has begun."""
         return self._samples is not None
 
-    def hear(self, at_ns: int, angles: Floats) -> None:
+    def handle(self, at_ns: int, angles: Floats) -> None:
         """Where all joints of the robot are, [J] in its order, rad."""
         if self._samples is not None and (not self._samples or at_ns > self._samples[-1][0]):
             self._samples.append((at_ns, angles))
@@ -105,7 +105,7 @@ class KinestheticTeacher:
         return np.array(take.labels[0].theta)
 
     def drop(self) -> str:
-        """Take back the newest segment of this session that has ended, its recording and its label.
+        """Take back the latest segment of this session that has ended, its recording and its label.
 
         Returns:
             The name of its recording.

@@ -111,10 +111,10 @@ def place_of_theta(parameter_names: tuple[str, ...]) -> slice | None:
     return None
 
 
-def frame_ranges(marked: NDArray[np.bool_], first: int = 0, most: int = 6) -> str:
+def frame_ranges(marked: NDArray[np.bool_], first: int = 0, maximum: int = 6) -> str:
     """Marked frames in words: '3-7, 12'; further ranges than `most` are counted."""
     found = [f"{a + first}" if b - a == 1 else f"{a + first}-{b - 1 + first}" for a, b in runs(marked)]
-    return ", ".join(found[:most]) + (f" and {len(found) - most} more ranges" if len(found) > most else "")
+    return ", ".join(found[:maximum]) + (f" and {len(found) - maximum} more ranges" if len(found) > maximum else "")
 
 
 def runs(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:

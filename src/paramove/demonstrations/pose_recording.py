@@ -17,9 +17,9 @@ from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.recording import RecordingWriter, read
 
 BILLION = 1_000_000_000
-MOST_UNSEEN = 2_000_000
-MOST_RATIO = 20
-"""Above `MOST_UNSEEN` places, the points that there are may be so many times as many as those that are seen."""
+MAX_UNSEEN = 2_000_000
+MAX_RATIO = 20
+"""Above `MAX_UNSEEN` places, the points that there are may be so many times as many as those that are seen."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def read_poses(path: Path) -> PoseRecording:
                 raise DemonstrationError(f"{file}: pose {len(times)} was captured at {captured_ns / 1e9:g} s: damaged")
             times.append(captured_ns)
             frames.add(recorded.message.frame)
-            if len(times) * len(columns) > max(MOST_UNSEEN, MOST_RATIO * len(rows_seen)):
+            if len(times) * len(columns) > max(MAX_UNSEEN, MAX_RATIO * len(rows_seen)):
                 raise DemonstrationError(
                     f"{file}: {len(columns)} names of points in {len(times)} poses, of which a pose has "
                     f"{len(rows_seen) / len(times):.1f}; expected poses of the same points"

@@ -223,12 +223,12 @@ def leaning(target: Floats, arm_length: float) -> Floats:
 def kept_away(effector: Floats, shoulder: Floats, target: Floats) -> Floats:
     """The path with places nearer to the shoulder than a bent arm likes moved outward; the target stays. (T, 3)."""
     width = 0.03
-    least = min(0.26, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)
+    minimum = min(0.26, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)
     line = effector - shoulder
     distance = np.linalg.norm(line, axis=1)
-    beyond = distance - least
+    beyond = distance - minimum
     softened = np.where(beyond > width, beyond, np.clip(beyond + width, 0.0, None) ** 2 / (4.0 * width))
-    result: Floats = shoulder + line * ((least + softened) / distance)[:, None]
+    result: Floats = shoulder + line * ((minimum + softened) / distance)[:, None]
     return result
 
 

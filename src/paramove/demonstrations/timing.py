@@ -68,7 +68,7 @@ def onset(movement: Movement, point: str = FINGERTIP, slow: float = SLOW, fast: 
     quick = np.flatnonzero(speed > fast)
     if not quick.size:
         raise DemonstrationError(
-            f"{movement.source}: {point} never exceeds {fast * 100:g} cm/s (its greatest speed is "
+            f"{movement.source}: {point} never exceeds {fast * 100:g} cm/s (its largest speed is "
             f"{speed.max() * 100:.1f} cm/s): this is no movement, or the unit is wrong"
         )
     still = np.flatnonzero(speed[: quick[0]] <= slow)

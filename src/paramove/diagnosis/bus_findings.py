@@ -134,10 +134,10 @@ def _identity(port: Path, servo: FoundServo) -> Iterator[Wrong]:
 
 def _voltage(servo: FoundServo) -> Iterator[Wrong]:
     names = ("Present Input Voltage", "Min Voltage Limit", "Max Voltage Limit")
-    present, least, most = (servo.values.get(name) for name in names)
-    if present is None or least is None or most is None or least <= present <= most:
+    present, minimum, maximum = (servo.values.get(name) for name in names)
+    if present is None or minimum is None or maximum is None or minimum <= present <= maximum:
         return
-    sentence = f"measures {present / 10:.1f} V, its limits are {least / 10:.1f} to {most / 10:.1f} V"
+    sentence = f"measures {present / 10:.1f} V, its limits are {minimum / 10:.1f} to {maximum / 10:.1f} V"
     wanted = f"{servo.table.voltage:g} V" if servo.table is not None else "what its manual recommends"
     yield Level.PROBLEM, sentence, (f"switch off, and give it a supply of {wanted}",)
 

@@ -17,6 +17,7 @@ from .files import unreadable as unreadable
 from .input_error import InputError as InputError
 from .key_findings import findings as findings
 from .old_names import OldNames as OldNames
+from .old_names import renamed_attribute as renamed_attribute
 from .pictures import JPEG as JPEG
 from .pictures import decoded as decoded
 from .pictures import opened_video as opened_video

@@ -22,10 +22,10 @@ from paramove.documents.input_error import InputError
 ARRAY_BYTES = 512 * MEBIBYTE
 """Of all arrays that are read: an hour of 40 points at 100 Hz has 350 MB."""
 ALWAYS_BYTES = 64 * MEBIBYTE
-MOST_RATIO = 30
+MAX_RATIO = 30
 """Arrays above `ALWAYS_BYTES` may be so many times as large as their file; recorded movements are at most 5."""
-MOST_ARRAYS = 5000
-MOST_EMPTY = 1_000_000
+MAX_ARRAYS = 5000
+MAX_EMPTY = 1_000_000
 DIRECTORY_BYTES = 2 * MEBIBYTE
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED = 1
@@ -51,8 +51,8 @@ def read_arrays(
     kind: str = "file of arrays (.npz)",
     raising: type[InputError] = InputError,
     only: Collection[str] = (),
-    most_bytes: int = ARRAY_BYTES,
-    most_arrays: int = MOST_ARRAYS,
+    max_bytes: int = ARRAY_BYTES,
+    max_arrays: int = MAX_ARRAYS,
 ) -> dict[str, NDArray[Any]]:
     """The arrays of a file by their names; of compressed files those that numpy writes.
 
@@ -61,8 +61,8 @@ def read_arrays(
         kind: What the file should be, for people.
         raising: Class of what is raised.
         only: Names of arrays, of which those that there are are read; empty for all.
-        most_bytes: Of all arrays that are read together, decompressed.
-        most_arrays: In the file.
+        max_bytes: Of all arrays that are read together, decompressed.
+        max_arrays: In the file.
 
     Raises `raising` if there is no such file, if it is damaged, larger than allowed, or holds objects.
     """
@@ -72,10 +72,10 @@ def read_arrays(
             found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
             wanted = {name: member for name, member in found.items() if not only or name in only}
             claimed = sum(member.file_size for member in wanted.values())
-            allowed = min(most_bytes, max(ALWAYS_BYTES, MOST_RATIO * size))
-            if claimed > allowed or len(found) > most_arrays:
+            allowed = min(max_bytes, max(ALWAYS_BYTES, MAX_RATIO * size))
+            if claimed > allowed or len(found) > max_arrays:
                 raise raising(
-                    f"{path}: expected at most {most_arrays} arrays of {allowed >> 20} MB together, "
+                    f"{path}: expected at most {max_arrays} arrays of {allowed >> 20} MB together, "
                     f"found {len(found)} of {claimed / MEBIBYTE:.0f} MB in a file of {size / MEBIBYTE:.1f} MB"
                 )
             return {name: _array(path, archive, member, raising) for name, member in wanted.items()}
@@ -105,7 +105,7 @@ def _array(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, raisin
         claimed = prod(shape) * dtype.itemsize
         if min(shape, default=0) < 0 or file.tell() + claimed != member.file_size:
             raise ValueError(f"{member.filename!r:.80} claims {claimed} bytes of numbers in {member.file_size}")
-        if not dtype.itemsize and prod(shape) > MOST_EMPTY:
+        if not dtype.itemsize and prod(shape) > MAX_EMPTY:
             raise ValueError(f"{member.filename!r:.80} claims {prod(shape)} values of no length")
     with archive.open(member) as file:
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)

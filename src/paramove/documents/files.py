@@ -13,7 +13,7 @@ TEXT_BYTES = 512 * MEBIBYTE
 
 
 def size_of(
-    path: Path, kind: str, raising: type[InputError] = InputError, most_bytes: int = TEXT_BYTES, remedy: str = ""
+    path: Path, kind: str, raising: type[InputError] = InputError, max_bytes: int = TEXT_BYTES, remedy: str = ""
 ) -> int:
     """Size of a regular file in bytes.
 
@@ -21,7 +21,7 @@ def size_of(
         path: Of the file.
         kind: What the file should be, for people.
         raising: Class of what is raised.
-        most_bytes: Larger files are refused.
+        max_bytes: Larger files are refused.
         remedy: What helps, for people.
 
     Raises `raising` for a missing file, a folder or device, and a file that is too large.
@@ -35,32 +35,32 @@ def size_of(
         raise raising(f"{path}: cannot be read: {error}{remedy}") from error
     if not stat.S_ISREG(found.st_mode):
         raise raising(f"{path}: expected a {kind}, found a folder or device{remedy}")
-    if found.st_size > most_bytes:
+    if found.st_size > max_bytes:
         raise raising(
-            f"{path}: expected a {kind} of at most {most_bytes / MEBIBYTE:.3g} MB, "
+            f"{path}: expected a {kind} of at most {max_bytes / MEBIBYTE:.3g} MB, "
             f"found {found.st_size / MEBIBYTE:.1f} MB{remedy}"
         )
     return found.st_size
 
 
 def read_bytes(
-    path: Path, kind: str, raising: type[InputError] = InputError, most_bytes: int = TEXT_BYTES, remedy: str = ""
+    path: Path, kind: str, raising: type[InputError] = InputError, max_bytes: int = TEXT_BYTES, remedy: str = ""
 ) -> bytes:
     """All of a file. Arguments and errors as of `size_of`; a file that may not be read is an error too."""
-    size_of(path, kind, raising, most_bytes, remedy)
+    size_of(path, kind, raising, max_bytes, remedy)
     try:
         with path.open("rb") as file:
-            return file.read(most_bytes)
+            return file.read(max_bytes)
     except OSError as error:
         raise raising(unreadable(path, error)) from error
 
 
 def read_text(
-    path: Path, kind: str, raising: type[InputError] = InputError, most_bytes: int = TEXT_BYTES, remedy: str = ""
+    path: Path, kind: str, raising: type[InputError] = InputError, max_bytes: int = TEXT_BYTES, remedy: str = ""
 ) -> str:
     """All of a UTF-8 text, without a byte order mark. Arguments and errors as of `size_of`; other text is refused."""
     try:
-        return read_bytes(path, kind, raising, most_bytes, remedy).decode("utf-8-sig")
+        return read_bytes(path, kind, raising, max_bytes, remedy).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise raising(f"{path}: expected a {kind}; it cannot be read as UTF-8 text: {error}") from error
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-MOST_FINDINGS = 5
+MAX_FINDINGS = 5
 
 
 def findings(error: ValidationError) -> str:
     """Of each wrong key where it is, what was expected and what was found; the first few of many."""
     found = error.errors()
-    more = [f"and {len(found) - MOST_FINDINGS} more"] if len(found) > MOST_FINDINGS else []
-    return "; ".join([_told(item) for item in found[:MOST_FINDINGS]] + more)
+    more = [f"and {len(found) - MAX_FINDINGS} more"] if len(found) > MAX_FINDINGS else []
+    return "; ".join([_told(item) for item in found[:MAX_FINDINGS]] + more)
 
 
 def _told(item: ErrorDetails) -> str:

@@ -1,8 +1,9 @@
-"""Parameters that have been renamed: the old names work for one release, with a warning."""
+"""Parameters and attributes that have been renamed: the old names work for one release, with a warning."""
 
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -26,6 +27,17 @@ class OldNames(BaseModel):
         for old, new in cls.old_names:
             values = _renamed(values, old, new, old.split("."))
         return values
+
+
+def renamed_attribute(old: str, new: str) -> Any:
+    """A property by which the attribute `new` is also read by the name that it had in the release before."""
+
+    def read(instance: Any) -> Any:
+        message = f"{type(instance).__name__}.{old} is called {new} now; the next release knows the new name only"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return getattr(instance, new)
+
+    return property(read, doc=f"Old name of `{new}`, for one release.")
 
 
 def _renamed(values: Any, old: str, new: str, path: Sequence[str]) -> Any:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from paramove.documents.files import MEBIBYTE, read_bytes, size_of, unreadable
 from paramove.documents.input_error import InputError
 
-MOST_PIXELS = 50_000_000
+MAX_PIXELS = 50_000_000
 """Of one picture, which may claim more than memory holds in a few bytes."""
 PICTURE_BYTES = 256 * MEBIBYTE
 VIDEO_BYTES = 2**40
@@ -32,8 +32,8 @@ def decoded(data: bytes) -> NDArray[np.uint8]:
     width, height = claimed_size(data)
     if not width * height:
         raise InputError("is no PNG, JPEG, BMP, WebP or TIFF: a whole JPEG or PNG expected")
-    if width * height > MOST_PIXELS:
-        raise InputError(f"claims {width} x {height} px, {MOST_PIXELS} px together allowed")
+    if width * height > MAX_PIXELS:
+        raise InputError(f"claims {width} x {height} px, {MAX_PIXELS} px together allowed")
     try:
         image: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error as error:
@@ -118,10 +118,10 @@ def opened_video(path: Path, raising: type[InputError] = InputError) -> Any:
     known = any(all(part in (ord("."), byte) for part, byte in zip(one, begin, strict=False)) for one in _VIDEOS)
     capture: Any = cv2.VideoCapture(str(path) if known and len(begin) == 12 else "")
     pixels = capture.get(cv2.CAP_PROP_FRAME_WIDTH) * capture.get(cv2.CAP_PROP_FRAME_HEIGHT)
-    if not capture.isOpened() or not 0.1 <= capture.get(cv2.CAP_PROP_FPS) <= 1000.0 or not 1 <= pixels <= MOST_PIXELS:
+    if not capture.isOpened() or not 0.1 <= capture.get(cv2.CAP_PROP_FPS) <= 1000.0 or not 1 <= pixels <= MAX_PIXELS:
         capture.release()
         raise raising(
             f"{path} ({size} bytes) is no video that OpenCV can read, or is cut off: an mp4 or avi with frames of at "
-            f"most {MOST_PIXELS} px expected"
+            f"most {MAX_PIXELS} px expected"
         )
     return capture

@@ -12,7 +12,7 @@ from paramove.hmm.compilation import compiled, compiled_arithmetic
 from paramove.hmm.vector_functions import UNDERFLOW, add_multiple, dot, exp_of_negative, log_of_one_plus
 
 DENSE_UNDERFLOW = -700.0
-LEAST_POSTERIOR = 1e-100
+MIN_POSTERIOR = 1e-100
 SMALLEST_SUM = 1e-200  # below it terms that were lost to underflow could count
 
 
@@ -184,7 +184,7 @@ def stacked_banded(
                 gamma[i, offset + t - 1] = 0.0
             for j in range(low[t], high[t] + 1):
                 posterior = gamma[j, offset + t]
-                if posterior < LEAST_POSTERIOR:
+                if posterior < MIN_POSTERIOR:
                     continue
                 for k in range(max(0, j - high[t - 1]), min(width - 1, j - low[t - 1]) + 1):
                     share = posterior * shares[t, j, k]

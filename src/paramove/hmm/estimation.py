@@ -41,7 +41,7 @@ class Parameters:
         means: shape (N, D).
         covariances: shape (N, D, D).
         durations: p_i(d) in column d - 1, zero for d < d_min; shape (N, d_max).
-        d_min: least number of frames of a state.
+        d_min: smallest number of frames of a state.
     """
 
     means: Floats
@@ -59,9 +59,9 @@ def whitened(covariances: Floats) -> tuple[Floats, Floats]:
     if bad >= 0 or not np.isfinite(log_determinant).all():
         state = max(bad, 0) if bad >= 0 else int(np.argmin(np.isfinite(log_determinant)))
         finite = np.isfinite(covariances[state]).all()
-        least = f"least eigenvalue {np.linalg.eigvalsh(covariances[state])[0]:.3g}" if finite else "not finite"
+        minimum = f"smallest eigenvalue {np.linalg.eigvalsh(covariances[state])[0]:.3g}" if finite else "not finite"
         raise ValueError(
-            f"the covariance of state {state} is not positive definite ({least}); train with a floor, with more "
+            f"the covariance of state {state} is not positive definite ({minimum}); train with a floor, with more "
             "sequences or with fewer states"
         )
     return whitening, -0.5 * (covariances.shape[1] * np.log(2.0 * np.pi) + log_determinant)

@@ -248,9 +248,9 @@ class GaussianHMM:
         return Stack.of([checked])
 
     def _check_length(self, n_frames: int, place: str) -> None:
-        fewest, most = self.topology.lengths(self.n_states)
-        if n_frames < fewest or (most is not None and n_frames > most):
-            allowed = f"at least {fewest}" if most is None else f"{fewest} to {most}"
+        fewest, maximum = self.topology.lengths(self.n_states)
+        if n_frames < fewest or (maximum is not None and n_frames > maximum):
+            allowed = f"at least {fewest}" if maximum is None else f"{fewest} to {maximum}"
             raise SequenceLengthError(
                 f"{place}a sequence of {n_frames} frames has no path through {self.n_states} states of this topology: "
                 f"allowed are {allowed} frames; resample it, or change n_states"

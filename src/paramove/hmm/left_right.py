@@ -30,7 +30,7 @@ class LeftRightHMM:
 
     Args:
         n_states: N.
-        d_min, d_max: least and most frames of each state.
+        d_min, d_max: minimum and maximum frames of each state.
         covariance: "full"; "diagonal", which takes dimensions as independent; "tied", one for all states.
         options: how it is trained.
 

@@ -18,11 +18,11 @@ class TrainingOptions:
         tolerance: stop when the objective gains less than this per frame.
         annealing_iterations: iterations over which the prior falls linearly to zero.
         prior_fraction: initial deviation sigma; sigma^2 I is added after each M-step while it lasts.
-        floor_fraction: least standard deviation of an output distribution in any direction, for ever.
+        floor_fraction: smallest standard deviation of an output distribution in any direction, for ever.
         shrinkage_frames: weight, in frames, of the pooled covariance in each covariance.
         duration_pseudocount: added to the count of each duration, so that no allowed duration becomes impossible; for a
             plain chain, to the count of each allowed transition, start and exit.
-        floor_deviation: least standard deviation in the data's unit; the larger of the two floors holds. With it,
+        floor_deviation: smallest standard deviation in the data's unit; the larger of the two floors holds. With it,
             dimensions that never change may be trained.
     """
 
@@ -54,7 +54,7 @@ class Regularisation:
 
     Attributes:
         added_variance: sigma^2 of the annealed prior.
-        floor_variance: least eigenvalue of a covariance.
+        floor_variance: smallest eigenvalue of a covariance.
         target: covariances towards which each state is shrunk, shape (N, D, D).
         target_frames: weight of the target in frames.
         duration_pseudocount: added to each duration count.

@@ -10,7 +10,7 @@ from paramove.documents import Floats, Ints
 
 CACHED_VALUES = 1 << 16
 LARGEST = 1e100
-LEAST_SPREAD = 1e-100
+MIN_SPREAD = 1e-100
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Stack:
     @classmethod
     def parts(cls, sequences: Sequence[Floats], n_states: int) -> "list[Stack]":
         """Several stacks, so small that what N states make of one stays in the processor's cache."""
-        most = max(1, CACHED_VALUES // n_states)
+        maximum = max(1, CACHED_VALUES // n_states)
         parts: list[list[Floats]] = [[]]
         filled = 0
         for sequence in sequences:
-            if parts[-1] and filled + len(sequence) > most:
+            if parts[-1] and filled + len(sequence) > maximum:
                 parts.append([])
                 filled = 0
             parts[-1].append(sequence)
@@ -133,7 +133,7 @@ def check_demonstrations(sequences: Sequence[Floats], floor_deviation: float) ->
     frames = np.concatenate(list(sequences))
     low, high = frames.min(axis=0), frames.max(axis=0)
     spread, size = high - low, np.maximum(np.abs(low), np.abs(high))
-    constant = (spread <= 1e-12 * size) | (spread < LEAST_SPREAD)
+    constant = (spread <= 1e-12 * size) | (spread < MIN_SPREAD)
     if constant.any():
         dimension = int(constant.argmax())
         raise ValueError(

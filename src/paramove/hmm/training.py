@@ -176,5 +176,5 @@ def regularisation_at(iteration: int, options: TrainingOptions, scale: float, ta
 
 
 def floor_variance(options: TrainingOptions, scale: float) -> float:
-    """Least variance of an output distribution in any direction, in the data's unit squared."""
+    """Smallest variance of an output distribution in any direction, in the data's unit squared."""
     return max(options.floor_fraction * scale, options.floor_deviation) ** 2

@@ -69,7 +69,7 @@ class ArmPoseSolver:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Least and greatest distance of the gripper from the shoulder, m, by the elbow's limits."""
+        """Minimum and maximum distance of the gripper from the shoulder, m, by the elbow's limits."""
         bend = np.array([self._lower[3], min(self._upper[3], 0.0)])
         squared = self._upper_arm**2 + self._forearm**2 + 2 * self._upper_arm * self._forearm * np.cos(bend)
         return float(np.sqrt(squared[0])), float(np.sqrt(squared[1]))
@@ -77,13 +77,13 @@ class ArmPoseSolver:
     def moved_outward(self, gripper: Floats, margin: float, width: float) -> Floats:
         """A path [K, 3] with points nearer to the shoulder than the elbow can bend moved outward; the rest stays.
 
-        No point ends nearer than `margin` beyond the least reach; the change begins `width` before that, m.
+        No point ends nearer than `margin` beyond the smallest reach; the change begins `width` before that, m.
         """
-        least = self.reach[0] + margin
+        minimum = self.reach[0] + margin
         distance = np.linalg.norm(gripper, axis=1, keepdims=True)
-        beyond = distance - least
+        beyond = distance - minimum
         softened = np.where(beyond > width, beyond, np.clip(beyond + width, 0.0, None) ** 2 / (4.0 * width))
-        return np.asarray(gripper * (least + softened) / distance)
+        return np.asarray(gripper * (minimum + softened) / distance)
 
     def solve(
         self,
@@ -173,15 +173,15 @@ class ArmPoseSolver:
         return solution
 
     def _check_reach(self, r: Floats) -> None:
-        least, greatest = self.reach
-        least, greatest = least - self._aside * 0.1, greatest + 1e-9  # the offset changes the bend by up to 2.6 deg
+        minimum, maximum = self.reach
+        minimum, maximum = minimum - self._aside * 0.1, maximum + 1e-9  # the offset changes the bend by up to 2.6 deg
         distance = np.linalg.norm(r, axis=1)
-        bad = np.flatnonzero(~((distance >= least) & (distance <= greatest)))
+        bad = np.flatnonzero(~((distance >= minimum) & (distance <= maximum)))
         if bad.size:
             k = int(bad[0])
             raise UnreachablePoseError(
                 f"pose {k}: gripper at {_cm(r[k])} cm is {distance[k] * 100:.1f} cm from the shoulder; "
-                f"the arm reaches {least * 100:.1f} to {greatest * 100:.1f} cm"
+                f"the arm reaches {minimum * 100:.1f} to {maximum * 100:.1f} cm"
             )
 
     def _nearest(self, poses: _Poses, turns: Floats) -> JointSolution:

@@ -53,7 +53,7 @@ class ArmState:
         self.measured = 1.0
         self.lost = False
 
-    def hear(self, message: JointStates, now_ns: int) -> bool:
+    def handle(self, message: JointStates, now_ns: int) -> bool:
         """Take in the measured joints; returns False, and keeps what is known, if one is missing or not finite."""
         measured = {joint.name: joint.position for joint in message.joints}
         try:
@@ -88,8 +88,8 @@ class ArmState:
         """Take the pose from the measured joints if they tell it: at the base pose, or at rest. Whether it is known."""
         if self.known or not self._heard or now_ns < self._busy_until_ns:
             return self.known
-        newest_ns, angles = self._heard[-1]
-        if now_ns - newest_ns > STALE_NS:
+        latest_ns, angles = self._heard[-1]
+        if now_ns - latest_ns > STALE_NS:
             return False
         self.at_base = bool((np.abs(angles - self._base) <= BASE_TOLERANCE).all())
         if not self.at_base and not self._rests():

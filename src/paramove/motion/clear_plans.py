@@ -15,11 +15,11 @@ from paramove.motion.joint_path import joined, joint_motion
 from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.relocation import RelocationPlanner
 
-LEAST_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
+MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objects
 _HIGHER_ENTRY = 0.065
 _HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
 _BEHIND_ROW = 0.004
-_LEAST_TO_STANDING = 0.003  # m, where no way keeps more: places of standing objects are known to about 2 mm
+_MIN_TO_STANDING = 0.003  # m, where no way keeps more: places of standing objects are known to about 2 mm
 _HALF_OPEN = 0.45  # ξ; an object of 20 mm is let go at less than half of it
 _HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 
@@ -169,18 +169,18 @@ class ClearPlans:
                 reasons.append(str(error))
                 continue
             closest = self._checker.smallest(motion.angles, middles, motion.holding, every=6)
-            if closest.distance >= LEAST_CLEARANCE:
+            if closest.distance >= MIN_CLEARANCE:
                 return motion
             if closest.standing is not None:
                 in_the_way.add(closest.standing)
-                if closest.distance >= max(_LEAST_TO_STANDING, next_best[0]):
+                if closest.distance >= max(_MIN_TO_STANDING, next_best[0]):
                     next_best = closest.distance, motion
             phase = [name for name, start in motion.phases if start <= motion.times[closest.sample]][-1]
             if choices:
                 hopeless.append((phase, choices[number].get(phase)))
             reasons.append(
                 f"{closest.pair[0]} would come within {closest.distance * 1000:.1f} mm of {closest.pair[1]} "
-                f"in {phase} (allowed {LEAST_CLEARANCE * 1000:.0f} mm)"
+                f"in {phase} (allowed {MIN_CLEARANCE * 1000:.0f} mm)"
             )
         if next_best[1] is not None:
             return next_best[1]

@@ -23,7 +23,7 @@ from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParameterGrid
 
 _TINY = 1e-9
-_LEAST_RADIUS = 1e-6  # m; keeps the elbow's side known where the arm is straight
+_MIN_RADIUS = 1e-6  # m; keeps the elbow's side known where the arm is straight
 POINTS = ("shoulder", "elbow", "knuckle", "index", "thumb")
 ElbowInterpolation = Literal["carried", "linear"]
 
@@ -38,7 +38,7 @@ class RobotMovement(ReachingMovement):
         grid: Targets in the robot's shoulder frame (t̂ of 5.2.3), m.
         means: [G, N, 9], m.
         scale: s = l / l′.
-        o_min, o_max: Least and greatest distance of finger and thumb after scaling, m.
+        o_min, o_max: Minimum and maximum distance of finger and thumb after scaling, m.
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
         release_state: Last state in which the object is held (T′).
         duration: Mean duration of the demonstrations, s.
@@ -221,7 +221,7 @@ def interpolated_elbow(weights: Floats, elbow: Floats, gripper: Floats) -> Float
     carried = _unit(carried - _dot(carried, along_line) * along_line)
     middle = (upper_arm**2 + distance**2 - forearm**2) / (2.0 * distance)  # a cos β of (5.8)
     middle = np.clip(middle, -upper_arm, upper_arm)
-    radius = np.sqrt(np.maximum(upper_arm**2 - middle**2, _LEAST_RADIUS**2))
+    radius = np.sqrt(np.maximum(upper_arm**2 - middle**2, _MIN_RADIUS**2))
     return np.asarray(middle * along_line + radius * carried)
 
 

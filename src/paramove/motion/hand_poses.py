@@ -9,7 +9,7 @@ from paramove.documents import Floats
 from paramove.motion.table_clearance import TableClearance
 from paramove.robots import Chain, OutOfReachError
 
-LEAST_HEIGHT = 0.0005
+MIN_HEIGHT = 0.0005
 """m; of the hand's lowest point above the table."""
 _PITCHES_A_BAND = 41
 _GRID_M = 0.005
@@ -69,7 +69,7 @@ class HandPoses:
 
     def _clear(self, row: Floats) -> bool:
         pose = np.append(row, self._gripper)[None]
-        return float(self._clearance.heights(pose)[0]) >= LEAST_HEIGHT and self._clearance.touching(pose) is None
+        return float(self._clearance.heights(pose)[0]) >= MIN_HEIGHT and self._clearance.touching(pose) is None
 
     def _refusal(self, goal: Floats, wanted: float, band: tuple[float, float], reached: bool) -> OutOfReachError:
         lowest, highest = np.rad2deg(band)

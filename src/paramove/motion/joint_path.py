@@ -14,7 +14,7 @@ from paramove.motion.timing import minimum_jerk
 from paramove.robots import ArmKinematics
 
 LIMIT_SHARE = 0.5  # of the operating velocity and acceleration: nobody expects this motion
-LEAST_DURATION_S = 0.5
+MIN_DURATION_S = 0.5
 JOINED_WITHIN = np.deg2rad(0.01)
 
 
@@ -43,7 +43,7 @@ def joint_motion(
     # Peaks of the minimum-jerk profile: velocity 15/8 d/T, acceleration 10/√3 d/T².
     by_velocity = 1.875 * distance / (LIMIT_SHARE * velocity)
     by_acceleration = np.sqrt(5.7735 * distance / (LIMIT_SHARE * acceleration))
-    duration = max(LEAST_DURATION_S, float(by_velocity.max()), float(by_acceleration.max()))
+    duration = max(MIN_DURATION_S, float(by_velocity.max()), float(by_acceleration.max()))
     n = int(np.ceil(duration / period))
     angles = a + minimum_jerk(np.arange(n + 1) / n)[:, None] * (b - a)
     gripper = kinematics.forward(angles[:, :5]).gripper

@@ -36,12 +36,12 @@ class RelocationOptions:
     work_slope: float = 0.25  # rad; the forearm's slope while it interacts, the same everywhere: objects stay upright
     level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
     limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
-    reach_margin: float = 0.002  # the synthesised path keeps this much outside the least reach of the arm
+    reach_margin: float = 0.002  # the synthesised path keeps this much outside the smallest reach of the arm
     reach_width: float = 0.012  # and begins to be moved outward from twice so much on
     turn_smoothing: float = 0.15  # s, over which a turn of the elbow comes and goes
     blend_share: float = 0.45  # part of the approach over which the robot's own base pose fades into the movement
     begin_within: tuple[tuple[float, float], ...] = ((0.128, 0.15), (-0.06, -0.01), (-0.04, -0.015))
-    """x, y, z of where a movement may begin that begins above the table: clear of torso, least reach and objects."""
+    """x, y, z of where a movement may begin that begins above the table: clear of torso, smallest reach and objects."""
     raise_via_deg: tuple[tuple[float, ...], ...] = (
         (142.0, -20.0, 28.0, -107.0, 68.0),
         (133.0, -45.0, 36.0, -109.0, 70.0),

@@ -22,7 +22,7 @@ ARM_LENGTHS = (0.3, 1.2)
 """m; from shoulder to elbow to knuckles of a child to that of a tall person. Millimetres or degrees lie far outside."""
 SERVO_ARM_LENGTHS = (0.15, 1.2)
 """m; the same of an arm that was led by hand."""
-MOST_MISSED = 0.05
+MAX_MISSED = 0.05
 FINGER = 0.10
 """m; so far the middle of knuckle, index and thumb may stay behind what the index touches."""
 FRAMES = (FRAME, BODY, ARM_BASE)
@@ -63,7 +63,7 @@ def check_reaching_model(model: ParametricHMM) -> None:
     if isinstance(movement, RobotMovement) and not movement.o_max > movement.o_min:
         raise ValueError("expected a hand that opens and closes, found a constant distance of finger and thumb")
     missed = _missed(movement) * arm_length
-    if not missed <= MOST_MISSED:
+    if not missed <= MAX_MISSED:
         raise ValueError(f"expected a movement that reaches its targets, found {missed:.3g} m beside the middle one")
 
 

@@ -196,8 +196,8 @@ class RelocationPlanner:
 
     def far_enough(self, point: Floats) -> Floats:
         """The point moved away from the shoulder until `_outward` leaves it where it is."""
-        least = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
-        return point * max(1.0, least / float(np.linalg.norm(point)))
+        minimum = self.solver.reach[0] + self.options.reach_margin + self.options.reach_width
+        return point * max(1.0, minimum / float(np.linalg.norm(point)))
 
     def _outward(self, gripper: Floats) -> Floats:
         """The path with points nearer to the shoulder than the elbow can bend moved outward; the rest stays."""

@@ -184,7 +184,7 @@ class ServoArmReaching:
         gripper: Floats,
         clearance: float,
     ) -> tuple[Floats | None, str]:
-        """Rows along a way with the least arch with which it is clear; if it never is, None and what is in the way."""
+        """Rows along a path with the smallest arch that is clear; if none is, None and what is in the way."""
         refusal = ""
         for arch in _ARCHES_M:
             try:
@@ -255,12 +255,12 @@ class ServoArmReaching:
         """What is in the way of a path; empty if nothing is."""
         checked = np.concatenate([rows[:-1:_CHECKED_EVERY], rows[-1:]])
         heights, hand = self._clearance.heights(checked), self._arm.forward(checked[:, :-1]).position
-        least = np.full(len(checked), clearance)
+        minimum = np.full(len(checked), clearance)
         for end in (0, -1):
             near = np.linalg.norm(hand - hand[end], axis=1) < self.options.near
-            least[near] = np.minimum(least[near], heights[end] - _GAP_TO_ENDS_M)
-        worst = int((heights - least).argmin())
-        if heights[worst] < least[worst]:
+            minimum[near] = np.minimum(minimum[near], heights[end] - _GAP_TO_ENDS_M)
+        worst = int((heights - minimum).argmin())
+        if heights[worst] < minimum[worst]:
             return f"the arm would be {1000 * heights[worst]:.0f} mm above the table at {metres(hand[worst])}"
         touching = self._clearance.touching(checked[:: 2 * _CHECKED_EVERY])
         return "" if touching is None else f"its {touching[0]} would touch its {touching[1]}"

@@ -89,7 +89,7 @@ class Synthesizer:
         self._running: _Running | None = None
         self._waiting: RelocationGoal | None = None
         self._hulls = _Hulls()
-        self._newest: dict[str, RelocationStatus] = {}
+        self._latest: dict[str, RelocationStatus] = {}
         self._statuses: list[RelocationStatus] = []
         self._trajectories: list[JointTrajectory] = []
         self._now_ns = 0
@@ -118,11 +118,11 @@ class Synthesizer:
         return "waiting for a goal"
 
     def on_goal(self, goal: RelocationGoal) -> None:
-        """Accept or refuse a goal. The same id again is answered with its newest status and not done twice.
+        """Accept or refuse a goal. The same id again is answered with its latest status and not done twice.
 
-        While it is not known where the arm is (see `ArmState`), the newest goal waits until the arm rests.
+        While it is not known where the arm is (see `ArmState`), the latest goal waits until the arm rests.
         """
-        known = self._newest.get(goal.id)
+        known = self._latest.get(goal.id)
         if known is not None:
             self._statuses.append(known)
         elif goal.asked_again:
@@ -134,7 +134,7 @@ class Synthesizer:
 
     def on_joint_states(self, message: JointStates) -> None:
         """Hear the measured joints: where the arm is, and by the fingers whether something is held."""
-        if not self._hand.hear(message, self._now_ns):
+        if not self._hand.handle(message, self._now_ns):
             return
         running = self._running
         if running is not None and running.motion is not None and self._should_hold(running.motion, running.time_s):
@@ -248,7 +248,7 @@ class Synthesizer:
         except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
             self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
             if isinstance(refusal, NoClearPlanError):
-                self._newest[goal.id].in_the_way.extend(sorted(refusal.in_the_way))
+                self._latest[goal.id].in_the_way.extend(sorted(refusal.in_the_way))
 
     def _begin(self, goal: RelocationGoal) -> None:
         if not goal.id:
@@ -318,9 +318,9 @@ class Synthesizer:
         if self._hulls.goal_id == goal_id:
             status.from_hull, status.to_hull = self._hulls.from_hull, self._hulls.to_hull
         self._statuses.append(status)
-        self._newest[goal_id] = status
-        while len(self._newest) > REMEMBERED_GOALS:
-            del self._newest[next(iter(self._newest))]
+        self._latest[goal_id] = status
+        while len(self._latest) > REMEMBERED_GOALS:
+            del self._latest[next(iter(self._latest))]
 
     def _should_hold(self, motion: PlannedMotion, time_s: float) -> bool:
         """Whether the motion holds an object from half a second before to half a second after `time_s`."""

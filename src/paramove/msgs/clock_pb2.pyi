@@ -7,18 +7,18 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Clock(_message.Message):
-    __slots__ = ("time_ns", "tick", "period_ns", "lockstep", "said")
+    __slots__ = ("time_ns", "tick", "period_ns", "lockstep", "published")
     TIME_NS_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
     PERIOD_NS_FIELD_NUMBER: _ClassVar[int]
     LOCKSTEP_FIELD_NUMBER: _ClassVar[int]
-    SAID_FIELD_NUMBER: _ClassVar[int]
+    PUBLISHED_FIELD_NUMBER: _ClassVar[int]
     time_ns: int
     tick: int
     period_ns: int
     lockstep: bool
-    said: _containers.RepeatedCompositeFieldContainer[TopicMark]
-    def __init__(self, time_ns: _Optional[int] = ..., tick: _Optional[int] = ..., period_ns: _Optional[int] = ..., lockstep: bool = ..., said: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ...) -> None: ...
+    published: _containers.RepeatedCompositeFieldContainer[TopicMark]
+    def __init__(self, time_ns: _Optional[int] = ..., tick: _Optional[int] = ..., period_ns: _Optional[int] = ..., lockstep: bool = ..., published: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ...) -> None: ...
 
 class TopicMark(_message.Message):
     __slots__ = ("topic", "epoch", "sequence")
@@ -31,7 +31,7 @@ class TopicMark(_message.Message):
     def __init__(self, topic: _Optional[str] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ...) -> None: ...
 
 class TickDone(_message.Message):
-    __slots__ = ("node", "pid", "kind", "tick", "said")
+    __slots__ = ("node", "pid", "kind", "tick", "published")
     class Kind(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         KIND_UNSPECIFIED: _ClassVar[TickDone.Kind]
@@ -46,10 +46,10 @@ class TickDone(_message.Message):
     PID_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     TICK_FIELD_NUMBER: _ClassVar[int]
-    SAID_FIELD_NUMBER: _ClassVar[int]
+    PUBLISHED_FIELD_NUMBER: _ClassVar[int]
     node: str
     pid: int
     kind: TickDone.Kind
     tick: int
-    said: _containers.RepeatedCompositeFieldContainer[TopicMark]
-    def __init__(self, node: _Optional[str] = ..., pid: _Optional[int] = ..., kind: _Optional[_Union[TickDone.Kind, str]] = ..., tick: _Optional[int] = ..., said: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ...) -> None: ...
+    published: _containers.RepeatedCompositeFieldContainer[TopicMark]
+    def __init__(self, node: _Optional[str] = ..., pid: _Optional[int] = ..., kind: _Optional[_Union[TickDone.Kind, str]] = ..., tick: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicMark, _Mapping]]] = ...) -> None: ...

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n paramove/msgs/motor_status.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"s\n\x0bMotorStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12$\n\x06motors\x18\x02 \x03(\x0b\x32\x14.paramove.msgs.Motor\x12\x10\n\x08warnings\x18\x03 \x03(\t\"\xa1\x01\n\x05Motor\x12\r\n\x05joint\x18\x01 \x01(\t\x12\n\n\x02id\x18\x02 \x01(\r\x12\r\n\x05model\x18\x03 \x01(\t\x12\r\n\x05heard\x18\x04 \x01(\x08\x12\r\n\x05\x61ge_s\x18\x05 \x01(\x01\x12\x0e\n\x06torque\x18\x06 \x01(\x08\x12\x11\n\tvoltage_v\x18\x07 \x01(\x01\x12\x15\n\rtemperature_c\x18\x08 \x01(\x01\x12\x16\n\x0ehardware_error\x18\t \x01(\rb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n paramove/msgs/motor_status.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"s\n\x0bMotorStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12$\n\x06motors\x18\x02 \x03(\x0b\x32\x14.paramove.msgs.Motor\x12\x10\n\x08warnings\x18\x03 \x03(\t\"\xad\x01\n\x05Motor\x12\r\n\x05joint\x18\x01 \x01(\t\x12\n\n\x02id\x18\x02 \x01(\r\x12\r\n\x05model\x18\x03 \x01(\t\x12\x12\n\nresponding\x18\x04 \x01(\x08\x12\r\n\x05\x61ge_s\x18\x05 \x01(\x01\x12\x0e\n\x06torque\x18\x06 \x01(\x08\x12\x11\n\tvoltage_v\x18\x07 \x01(\x01\x12\x15\n\rtemperature_c\x18\x08 \x01(\x01\x12\x16\n\x0ehardware_error\x18\t \x01(\rR\x05heardb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,5 +35,5 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_MOTORSTATUS']._serialized_start=84
   _globals['_MOTORSTATUS']._serialized_end=199
   _globals['_MOTOR']._serialized_start=202
-  _globals['_MOTOR']._serialized_end=363
+  _globals['_MOTOR']._serialized_end=375
 # @@protoc_insertion_point(module_scope)

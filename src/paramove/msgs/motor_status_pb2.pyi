@@ -17,11 +17,11 @@ class MotorStatus(_message.Message):
     def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., motors: _Optional[_Iterable[_Union[Motor, _Mapping]]] = ..., warnings: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class Motor(_message.Message):
-    __slots__ = ("joint", "id", "model", "heard", "age_s", "torque", "voltage_v", "temperature_c", "hardware_error")
+    __slots__ = ("joint", "id", "model", "responding", "age_s", "torque", "voltage_v", "temperature_c", "hardware_error")
     JOINT_FIELD_NUMBER: _ClassVar[int]
     ID_FIELD_NUMBER: _ClassVar[int]
     MODEL_FIELD_NUMBER: _ClassVar[int]
-    HEARD_FIELD_NUMBER: _ClassVar[int]
+    RESPONDING_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     TORQUE_FIELD_NUMBER: _ClassVar[int]
     VOLTAGE_V_FIELD_NUMBER: _ClassVar[int]
@@ -30,10 +30,10 @@ class Motor(_message.Message):
     joint: str
     id: int
     model: str
-    heard: bool
+    responding: bool
     age_s: float
     torque: bool
     voltage_v: float
     temperature_c: float
     hardware_error: int
-    def __init__(self, joint: _Optional[str] = ..., id: _Optional[int] = ..., model: _Optional[str] = ..., heard: bool = ..., age_s: _Optional[float] = ..., torque: bool = ..., voltage_v: _Optional[float] = ..., temperature_c: _Optional[float] = ..., hardware_error: _Optional[int] = ...) -> None: ...
+    def __init__(self, joint: _Optional[str] = ..., id: _Optional[int] = ..., model: _Optional[str] = ..., responding: bool = ..., age_s: _Optional[float] = ..., torque: bool = ..., voltage_v: _Optional[float] = ..., temperature_c: _Optional[float] = ..., hardware_error: _Optional[int] = ...) -> None: ...

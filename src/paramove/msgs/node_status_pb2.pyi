@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class NodeStatus(_message.Message):
-    __slots__ = ("node", "state", "sentence", "pid", "captured", "processing_seconds", "processed", "said", "heard")
+    __slots__ = ("node", "state", "sentence", "pid", "captured", "processing_seconds", "processed", "published", "received")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[NodeStatus.State]
@@ -30,8 +30,8 @@ class NodeStatus(_message.Message):
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     PROCESSING_SECONDS_FIELD_NUMBER: _ClassVar[int]
     PROCESSED_FIELD_NUMBER: _ClassVar[int]
-    SAID_FIELD_NUMBER: _ClassVar[int]
-    HEARD_FIELD_NUMBER: _ClassVar[int]
+    PUBLISHED_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_FIELD_NUMBER: _ClassVar[int]
     node: str
     state: NodeStatus.State
     sentence: str
@@ -39,9 +39,9 @@ class NodeStatus(_message.Message):
     captured: _timestamp_pb2.Timestamp
     processing_seconds: float
     processed: int
-    said: _containers.RepeatedCompositeFieldContainer[TopicCount]
-    heard: _containers.RepeatedCompositeFieldContainer[TopicCount]
-    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., sentence: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., said: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., heard: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
+    published: _containers.RepeatedCompositeFieldContainer[TopicCount]
+    received: _containers.RepeatedCompositeFieldContainer[TopicCount]
+    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., sentence: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., received: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
 
 class TopicCount(_message.Message):
     __slots__ = ("topic", "messages", "lost", "repeated_", "refused")

@@ -21,7 +21,7 @@ from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize, Size
 from paramove.objects.openings import find_openings
 
-MOST_PIECES = 6
+MAX_PIECES = 6
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Colour:
     Attributes:
         name: Name of the colour, used as the object's name.
         hue_deg: Lower and upper hue, 0 to 360; lower > upper wraps over red.
-        saturation: Least saturation, (max - min)/max of RGB, 0 to 1.
+        saturation: Smallest saturation, (max - min)/max of RGB, 0 to 1.
         hand: True for the instructor's hand.
     """
 
@@ -80,7 +80,7 @@ class ColourTracker:
 
     Args:
         colours: What to look for.
-        least_area_px: Smaller regions are noise; an object of 20 x 50 mm has about 400 px.
+        min_area_px: Smaller regions are noise; an object of 20 x 50 mm has about 400 px.
         largest_share: Regions above this share of the image are background.
     """
 
@@ -88,13 +88,13 @@ class ColourTracker:
     STILL_FRAMES = 8  # half a second at 15 Hz
 
     def __init__(
-        self, colours: Sequence[Colour] = DEFAULT_COLOURS, least_area_px: float = 24.0, largest_share: float = 0.12
+        self, colours: Sequence[Colour] = DEFAULT_COLOURS, min_area_px: float = 24.0, largest_share: float = 0.12
     ) -> None:
         if not colours or len({colour.name for colour in colours}) != len(colours):
             raise ValueError(f"colours {[c.name for c in colours]}: at least one, each name once, expected")
         cv2.setNumThreads(1)  # images are small: threads cost more than they give, and other nodes need the cores
         self._colours = tuple(colours)
-        self._least_area = least_area_px
+        self._min_area = min_area_px
         self._largest_share = largest_share
         self._full_size = FullSize()
         self._recent: dict[str, deque[Region]] = {
@@ -110,12 +110,12 @@ class ColourTracker:
         tracked.captured.FromNanoseconds(captured_ns)
         small = cv2.resize(image_bgr, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
         hsv, chroma = _hue_and_chroma(small)
-        _, coloured = cv2.threshold(chroma, int(_least_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
+        _, coloured = cv2.threshold(chroma, int(_min_chroma(small, hsv)), 255, cv2.THRESH_BINARY)
         tracked.openings.extend(find_openings(hsv[:, :, 2]))
         for colour in self._colours:
             box = self._find(_of_colour(hsv, coloured, colour))
             region = None if box is None else _measure(image_bgr, box, colour)
-            if region is not None and region.area_px >= self._least_area:
+            if region is not None and region.area_px >= self._min_area:
                 tracked.objects.append(self._message(colour, region))
             else:
                 self._recent[colour.name].clear()
@@ -127,16 +127,16 @@ class ColourTracker:
         if width == 0:
             return None
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
-        least, most = self._least_area / 4, self._largest_share * mask.size
+        minimum, maximum = self._min_area / 4, self._largest_share * mask.size
         areas = stats[1:, cv2.CC_STAT_AREA]
-        pieces = stats[1:][(areas >= max(2.0, 0.1 * least)) & (areas <= most)]
-        pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MOST_PIECES]
-        if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < least:
+        pieces = stats[1:][(areas >= max(2.0, 0.1 * minimum)) & (areas <= maximum)]
+        pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MAX_PIECES]
+        if not len(pieces) or pieces[0][cv2.CC_STAT_AREA] < minimum:
             return None
         left, top, right, bottom = _corners(pieces[0])
         reach = max(right - left, bottom - top)
         for piece in pieces[1:]:  # an arm in front may cut a region into pieces
-            if piece[cv2.CC_STAT_AREA] < max(least, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
+            if piece[cv2.CC_STAT_AREA] < max(minimum, 0.1 * pieces[0][cv2.CC_STAT_AREA]):
                 break
             other = _corners(piece)
             if max(left - other[2], other[0] - right, top - other[3], other[1] - bottom) <= 0.5 * reach:
@@ -176,9 +176,9 @@ class ColourTracker:
     def _stands_still(self, recent: deque[Region]) -> bool:
         if len(recent) < self.STILL_FRAMES:
             return False
-        newest = recent[-1]
+        latest = recent[-1]
         return all(
-            abs(r.u_px - newest.u_px) < self.STILL_PX and abs(r.v_px - newest.v_px) < self.STILL_PX for r in recent
+            abs(r.u_px - latest.u_px) < self.STILL_PX and abs(r.v_px - latest.v_px) < self.STILL_PX for r in recent
         )
 
 
@@ -189,7 +189,7 @@ def _hue_and_chroma(image: Image) -> tuple[Image, Image]:
     return hsv, chroma
 
 
-def _least_chroma(image: Image, hsv: Image) -> float:
+def _min_chroma(image: Image, hsv: Image) -> float:
     """Chroma that neither noise nor a grey surface reaches, from this image alone.
 
     Grows with the scene's brightness (a colour's chroma is proportional to the light) and with the noise (max - min of
@@ -204,13 +204,13 @@ def _least_chroma(image: Image, hsv: Image) -> float:
 
 def _of_colour(hsv: Image, coloured: Image, colour: Colour) -> Image:
     low, high = colour.hue_deg[0] / 2, colour.hue_deg[1] / 2
-    least = 255 * colour.saturation
+    minimum = 255 * colour.saturation
     if low <= high:
-        mask: Any = cv2.inRange(hsv, (low, least, 0), (high, 255, 255))
+        mask: Any = cv2.inRange(hsv, (low, minimum, 0), (high, 255, 255))
     else:
         above, below = (
-            cv2.inRange(hsv, (low, least, 0), (180, 255, 255)),
-            cv2.inRange(hsv, (0, least, 0), (high, 255, 255)),
+            cv2.inRange(hsv, (low, minimum, 0), (180, 255, 255)),
+            cv2.inRange(hsv, (0, minimum, 0), (high, 255, 255)),
         )
         mask = cv2.bitwise_or(above, below)
     return cv2.bitwise_and(mask, coloured)

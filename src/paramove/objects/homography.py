@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats
 from paramove.msgs.plane_calibration_pb2 import PlaneCalibration, PlaneCorrespondence
 
-LEAST_FLATNESS = 0.03
+MIN_FLATNESS = 0.03
 """Three points count as collinear below this ratio of the triangle's height to its longest side."""
 
 
@@ -137,7 +137,7 @@ def _refuse_collinear(points: Floats, which: str) -> None:
     a, b = points[i], points[j]  # the farthest apart, then the farthest from their line, then the best fourth
     c = points[int(np.argmax([_flatness(a, b, p) for p in points]))]
     best = max(min(_flatness(a, b, c), _flatness(a, b, p), _flatness(a, c, p), _flatness(b, c, p)) for p in points)
-    if best < LEAST_FLATNESS:
+    if best < MIN_FLATNESS:
         raise HomographyError(
             f"{which} points {points.tolist()} are (nearly) collinear or coincide: "
             "four are needed of which no three lie on one line"

@@ -162,8 +162,8 @@ class ObjectMotion:
     def _still_samples(self, now_s: float) -> list[Sample]:
         """The samples of the last `rest_s`, or [] if any border moved."""
         recent = [s for s in self._history if s.time_s > now_s - self._limits.rest_s - 1e-6]
-        newest = recent[-1]
-        return recent if all(s.border_change_px(newest) <= self._limits.rest_px for s in recent) else []
+        latest = recent[-1]
+        return recent if all(s.border_change_px(latest) <= self._limits.rest_px for s in recent) else []
 
     def _while_not_resting(self, sample: Sample, now_s: float, hand_near: bool) -> list[Happening]:
         still = self._still_samples(now_s)

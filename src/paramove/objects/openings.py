@@ -93,7 +93,7 @@ class _Place:
 
 
 class SeenOpenings:
-    """Remembers openings, of each the newest sightings at which nothing hid it."""
+    """Remembers openings, of each the latest sightings at which nothing hid it."""
 
     def __init__(self) -> None:
         self._places: list[_Place] = []

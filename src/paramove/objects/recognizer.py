@@ -20,7 +20,7 @@ BLIND_S = 0.35
 """Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
 LONGEST_STEP_S = 0.2
 """More time than this between two images is no time of watching."""
-MOST_PX = 1e6
+MAX_PX = 1e6
 CLOCK_BACK_S = 5.0
 """An image older than this is no late one: the clock, or an image's time, was wrong."""
 
@@ -48,7 +48,7 @@ class Recognizer:
         self._pointing = Pointing(self._options.pointing)
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
-        self._newest_s: float | None = None
+        self._latest_s: float | None = None
         self._watched_s = 0.0
 
     def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
@@ -81,13 +81,13 @@ class Recognizer:
 
     def _step_s(self, captured_s: float) -> float:
         """Time since the image before; 0 for one that is not newer."""
-        newest_s, self._newest_s = self._newest_s, captured_s
-        if newest_s is None:
+        latest_s, self._latest_s = self._latest_s, captured_s
+        if latest_s is None:
             return LONGEST_STEP_S
-        if newest_s - CLOCK_BACK_S < captured_s <= newest_s:
-            self._newest_s = newest_s
+        if latest_s - CLOCK_BACK_S < captured_s <= latest_s:
+            self._latest_s = latest_s
             return 0.0
-        return abs(captured_s - newest_s)
+        return abs(captured_s - latest_s)
 
     def _follow_objects(
         self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float
@@ -184,7 +184,7 @@ def _in_some_image(seen: TrackedObject) -> bool:
     box = (seen.left_px, seen.top_px, seen.width_px, seen.height_px)
     outline = (number for point in seen.outline for number in (point.u_px, point.v_px))
     numbers = (seen.u_px, seen.v_px, seen.area_px, *box, *outline)
-    return all(abs(number) < MOST_PX for number in numbers)  # NaN is not below
+    return all(abs(number) < MAX_PX for number in numbers)  # NaN is not below
 
 
 def _touch(hand: TrackedObject, place: Sample) -> bool:

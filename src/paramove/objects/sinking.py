@@ -19,7 +19,7 @@ from paramove.objects.full_size import FullSize, Size
 
 BORDER_PX = 2.0
 """The lower border scatters by about 0.3 px; on the rim it stays within this range."""
-LEAST_HEIGHT_SHARE = 0.1
+MIN_HEIGHT_SHARE = 0.1
 """Below this share of the height before sinking, the border is scatter."""
 LAST_SAMPLES = 20
 """A second and a half: longer than any lowering into an opening."""
@@ -104,7 +104,7 @@ def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> tup
     full = full_size.expected(name, samples[-1].u_px, samples[-1].v_px) or tallest.size
     heights = sorted(s.height_px for s in samples[-LAST_SAMPLES:])
     carried_px = median(heights[len(heights) // 2 :])  # less than the full height where a hand holds the upper end
-    seen = [s for s in samples if s.height_px >= LEAST_HEIGHT_SHARE * carried_px] or [samples[-1]]
+    seen = [s for s in samples if s.height_px >= MIN_HEIGHT_SHARE * carried_px] or [samples[-1]]
     bottom_px = median(s.bottom_px for s in _on_rim(seen))
     full = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
     middle_px = bottom_px - full.lower_px

@@ -24,7 +24,7 @@ HAND = slice(6, 9)
 
 _DEMONSTRATOR = ArmLengths()
 _BACK_AND_DOWN = np.array([-1.0, 0.0, -1.0])
-_LEAST_BEND = 1e-9
+_MIN_BEND = 1e-9
 """An elbow nearer than this to the line from shoulder to hand, m, tells no plane."""
 
 
@@ -112,7 +112,7 @@ def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:
     lower = np.linalg.norm(sizes.forearm * _unit(wrist - elbow) + sizes.hand * _unit(hand - wrist), axis=1)
     arm = _elbow_fitted(points[:, :9], sizes.upper_arm, lower)
     line = arm[:, 6:9] - arm[:, 3:6]
-    along = (sizes.forearm**2 - sizes.hand**2 + lower**2) / (2.0 * np.maximum(lower, _LEAST_BEND))
+    along = (sizes.forearm**2 - sizes.hand**2 + lower**2) / (2.0 * np.maximum(lower, _MIN_BEND))
     away = np.sqrt(np.maximum(sizes.forearm**2 - along**2, 0.0))
     axis = _unit(line)
     off = wrist - elbow
@@ -125,9 +125,9 @@ def _elbow_fitted(points: Floats, upper: float, lower: Floats) -> Floats:
     shoulder, elbow, hand = points[:, 0:3], points[:, 3:6], points[:, 6:9]
     line = hand - shoulder
     distance = np.linalg.norm(line, axis=1)
-    axis = np.where((distance > _LEAST_BEND)[:, None], line / np.maximum(distance, _LEAST_BEND)[:, None], [1.0, 0, 0])
+    axis = np.where((distance > _MIN_BEND)[:, None], line / np.maximum(distance, _MIN_BEND)[:, None], [1.0, 0, 0])
     axis = np.where(np.isnan(distance)[:, None], np.nan, axis)
-    reached = np.clip(distance, np.maximum(np.abs(upper - lower), _LEAST_BEND), upper + lower)
+    reached = np.clip(distance, np.maximum(np.abs(upper - lower), _MIN_BEND), upper + lower)
     along = (upper**2 - lower**2 + reached**2) / (2.0 * reached)
     away = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     bent = shoulder + along[:, None] * axis + away[:, None] * _bend(elbow - shoulder, axis)
@@ -137,15 +137,15 @@ def _elbow_fitted(points: Floats, upper: float, lower: Floats) -> Floats:
 
 def _unit(vectors: Floats) -> Floats:
     """Of length 1, (M, 3); zeros stay."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), _LEAST_BEND))
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), _MIN_BEND))
 
 
 def _bend(to_elbow: Floats, axis: Floats) -> Floats:
     """Unit vectors at right angles to `axis` towards the elbow; back and down where the elbow lies on the axis."""
     off = to_elbow - (to_elbow * axis).sum(axis=1, keepdims=True) * axis
     size = np.linalg.norm(off, axis=1, keepdims=True)
-    result: Floats = off / np.maximum(size, _LEAST_BEND)
-    flat = (size < _LEAST_BEND)[:, 0]
+    result: Floats = off / np.maximum(size, _MIN_BEND)
+    flat = (size < _MIN_BEND)[:, 0]
     if flat.any():
         down = np.broadcast_to(_BACK_AND_DOWN, axis[flat].shape)
         along_it = np.abs((down * axis[flat]).sum(axis=1, keepdims=True)) > 0.999 * np.linalg.norm(_BACK_AND_DOWN)

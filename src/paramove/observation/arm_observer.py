@@ -35,7 +35,7 @@ from paramove.observation.presence import Presence, seen_presence
 from paramove.observation.segment_sums import LANES, NX, NY, SHARE
 from paramove.observation.silhouette_kernels import Camera, new_canvas
 
-LEAST_AREA_PX = 200.0
+MIN_AREA_PX = 200.0
 CHUNK = 50
 """Most postures that a thread takes at a time: their silhouettes share one canvas."""
 
@@ -179,7 +179,7 @@ class ArmObserver:
             for view, area in zip(views, areas, strict=True):
                 view.arm_area = float(area)
             weight = self.options.region_weight * (self.options.gamma / gamma) ** 2 / FULL
-            result[usable] += weight * (regions[:, 0] / np.maximum(areas, LEAST_AREA_PX)[:, None]).sum(axis=0)
+            result[usable] += weight * (regions[:, 0] / np.maximum(areas, MIN_AREA_PX)[:, None]).sum(axis=0)
         return result
 
     def change(self, view: int) -> NDArray[np.int8]:
@@ -196,7 +196,7 @@ class ArmObserver:
         fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
         found = [
             seen_presence(
-                fitted, view.small, view.kernel.table, view.background.change, max(view.arm_area, LEAST_AREA_PX)
+                fitted, view.small, view.kernel.table, view.background.change, max(view.arm_area, MIN_AREA_PX)
             )
             for view in self._views
             if view.background is not None and view.seen and np.isfinite(fitted).all()
@@ -244,7 +244,7 @@ class ArmObserver:
 
     @property
     def _numbers(self) -> tuple[float, float, float]:
-        return self.options.key_point_px, self.options.shift_unit, self.options.least_background
+        return self.options.key_point_px, self.options.shift_unit, self.options.min_background
 
     def _run(self, jobs: Sequence[Callable[[], None]]) -> None:
         """Do all jobs, which release the interpreter, on the threads; what one raises is raised."""
@@ -274,9 +274,9 @@ class ArmObserver:
         number = place_key_points(count, self.options.key_point_px, contour)
         points = fill_segments(number, len(edges.distances[0]), contour)
         shifts, values = new_shifts(number + 1), np.empty((SCRATCH, len(contour.lanes[0])), np.float32)
-        unit, least = self._numbers[1:]
+        unit, minimum = self._numbers[1:]
         energy = match(edges.distances.reshape(-1), edges.stride, number, points, unit, contour, shifts)
-        strengths(edges.intensities.reshape(-1), edges.stride, number, least, contour, shifts, values)
+        strengths(edges.intensities.reshape(-1), edges.stride, number, minimum, contour, shifts, values)
         return self._matched(view, number, contour, shifts.shift, values, energy)
 
     def _matched(self, view: int, number: int, contour: Contour, s: Any, values: Any, energy: float) -> ContourMatch:

@@ -10,7 +10,7 @@ from paramove.documents import Image
 from paramove.observation.background_kernels import changes, learn, samples
 
 KNOWN_AFTER_S, FOLLOWS_S, FOLLOWS_LARGE_S = 0.4, 3.0, 20.0
-LEAST_NOISE = 2.0
+MIN_NOISE = 2.0
 """Grey levels; a rendered or compressed image may have less."""
 SPARSE = 4
 """Every so many pixels along each axis tell noise and brightness."""
@@ -76,4 +76,4 @@ class Background:
         gain = min(max(gain, 0.5), 2.0)
         difference = now - np.float32(gain) * was
         distance = np.sqrt(np.einsum("ij,ij->i", difference, difference))
-        return gain, max(float(np.median(distance)) / DISTANCE_OF_NOISE, LEAST_NOISE)
+        return gain, max(float(np.median(distance)) / DISTANCE_OF_NOISE, MIN_NOISE)

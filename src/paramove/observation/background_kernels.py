@@ -21,8 +21,8 @@ SHIFTED_PX = 2
 def samples(image: Bytes, background: Floats32, known: Bytes, every: int) -> tuple[Floats32, Floats32]:
     """Colours of the background and of the image at one of `every` pixels along each axis where it is known, (n, 3)."""
     height, width = known.shape
-    most = (1 + (height - 1) // every) * (1 + (width - 1) // every)
-    was, now, count = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32), 0
+    maximum = (1 + (height - 1) // every) * (1 + (width - 1) // every)
+    was, now, count = np.empty((maximum, 3), np.float32), np.empty((maximum, 3), np.float32), 0
     for y in range(0, height, every):
         for x in range(0, width, every):
             if known[y, x] != 0:
@@ -38,7 +38,7 @@ def nearest_beside(
 ) -> np.float32:
     """Least squared distance of the colour of a pixel from those of the known background around it."""
     height, width = known.shape
-    least = np.float32(1e9)
+    minimum = np.float32(1e9)
     for y in range(max(row - SHIFTED_PX, 0), min(row + SHIFTED_PX + 1, height)):
         for x in range(max(column - SHIFTED_PX, 0), min(column + SHIFTED_PX + 1, width)):
             if known[y, x] != 0:
@@ -46,8 +46,8 @@ def nearest_beside(
                 for c in range(3):
                     difference = np.float32(image[row, column, c]) - scale * background[y, x, c]
                     squared += difference * difference
-                least = min(least, squared)
-    return least
+                minimum = min(minimum, squared)
+    return minimum
 
 
 @compiled

@@ -48,7 +48,7 @@ class BodyTracking:
         self._names = tuple(options.markers)
         self._watch = CameraWatch(cameras)
         self._seen_ns: dict[str, int] = {}
-        self._newest_ns = 0
+        self._latest_ns = 0
 
     @property
     def cameras(self) -> dict[str, CalibratedCamera]:
@@ -83,7 +83,7 @@ class BodyTracking:
 
     def _moment(self, views: Views) -> BodyMoment:
         points = self._tracker.located(views.images)
-        self._newest_ns = views.captured_ns
+        self._latest_ns = views.captured_ns
         for name in self._names:
             self._seen_ns.setdefault(name, views.captured_ns)
             if name in points:
@@ -91,7 +91,7 @@ class BodyTracking:
         return BodyMoment(views.captured_ns, points)
 
     def _unseen(self) -> list[str]:
-        names = [name for name, seen_ns in self._seen_ns.items() if self._newest_ns - seen_ns > UNSEEN_S * 1e9]
+        names = [name for name, seen_ns in self._seen_ns.items() if self._latest_ns - seen_ns > UNSEEN_S * 1e9]
         if not names:
             return []
         return [f"no two cameras see {', '.join(names)}: turn the markers to the cameras, or look at the light"]
@@ -104,7 +104,7 @@ class MarkerSetup(BaseModel):
         number: Of an ArUco marker, 60 to 99; `paramove calibrate markers` prints them.
         inset: How deep below the marker's middle the point lies, m.
         hue_deg: Lower and upper hue of a colour, degrees.
-        saturation: Its least saturation, 0 to 1.
+        saturation: Its smallest saturation, 0 to 1.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -137,7 +137,7 @@ class BodyTrackingSetup(BaseModel):
     Attributes:
         cameras: Calibration file; its cameras are camera_1, camera_2, … in their order.
         markers: Name of a point of the arm, as `ArmPose` has it -> what marks it.
-        most_residual_px: A point whose views disagree by more is left out.
+        max_residual_px: A point whose views disagree by more is left out.
         rate_hz: Of the cameras.
     """
 
@@ -148,12 +148,12 @@ class BodyTrackingSetup(BaseModel):
         default={"elbow": MarkerSetup(number=91), "wrist": MarkerSetup(number=92), "index": MarkerSetup(number=93)},
         min_length=1,
     )
-    most_residual_px: float = Field(default=BodyTrackerOptions.most_residual_px, gt=0.0, le=50.0)
+    max_residual_px: float = Field(default=BodyTrackerOptions.max_residual_px, gt=0.0, le=50.0)
     rate_hz: float = Field(default=15.0, gt=0.5, le=240.0)
 
     def body_tracking(self, run_folder: Path = Path()) -> BodyTracking:
         """Reads the calibration. Raises InputError."""
         cameras = measured_cameras(run_folder, self.cameras)
         markers = {name: one.marker(name) for name, one in self.markers.items()}
-        options = BodyTrackerOptions(markers=markers, most_residual_px=self.most_residual_px)
+        options = BodyTrackerOptions(markers=markers, max_residual_px=self.max_residual_px)
         return BodyTracking(cameras, options, 1.0 / self.rate_hz)

@@ -13,7 +13,7 @@ from paramove.observation.segment_sums import BASE, FIELDS, LANES, NX, NY, PX, P
 Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
-LEAST_POINTS = 24
+MIN_POINTS = 24
 """A shorter contour is none: the arm is as good as out of sight."""
 EVERY = 2
 """Of the contour pixels every second one is compared: in a smoothed image the one between says the same."""
@@ -62,11 +62,11 @@ class Contour(NamedTuple):
 @compiled
 def new_contour(width: int, height: int) -> Contour:
     """Room for a contour in an image of this size."""
-    most = 6 * (width + height)
-    segments = most // 3
+    maximum = 6 * (width + height)
+    segments = maximum // 3
     return Contour(
-        np.empty(most, np.int32),
-        np.empty(most, np.int32),
+        np.empty(maximum, np.int32),
+        np.empty(maximum, np.int32),
         np.empty(segments + 1, np.int32),
         np.empty((2, segments), np.float32),
         np.empty((2, segments), np.float32),
@@ -89,9 +89,9 @@ def trace(mask: Bytes, width: int, row: int, left: int, contour: Contour) -> int
         x, place = np.int32(x + 1), place + 1
     if x == width:
         return 0
-    most, count, first, first_step, turn = len(xs), 0, place, -1, 0
+    maximum, count, first, first_step, turn = len(xs), 0, place, -1, 0
     one, line = np.uint64(1), np.uint64(stride)  # unsigned: such an index is not tested for counting from the end
-    while count < most:
+    while count < maximum:
         here = np.uint64(place)
         above, below = here - line, here + line
         code = mask[here - one] | mask[below - one] << 1 | mask[below] << 2 | mask[below + one] << 3

@@ -70,7 +70,7 @@ class EdgeImages:
             self._along_x *= weights
             self._along_y *= weights
             reached = gradient_scale(self._along_x, self._along_y, count, self._sizes)
-        self.scale = max(reached, options.least_gradient)
+        self.scale = max(reached, options.min_gradient)
         gradient_factors(self._sizes, self.scale, self._factors)
 
     def fill(self, first: int, last: int) -> None:

@@ -19,7 +19,7 @@ DIRECTIONS = 10
 SINES, COSINES = (turn(np.arange(DIRECTIONS) * np.pi / DIRECTIONS).astype(np.float32) for turn in (np.sin, np.cos))
 BINS_PER_LEVEL = 4
 """Bins of the histogram of gradients in one grey level."""
-MOST_BINS = 361 * BINS_PER_LEVEL + 1
+MAX_BINS = 361 * BINS_PER_LEVEL + 1
 
 
 @compiled_sums
@@ -48,13 +48,13 @@ def strongest_gradients(red: Bytes, green: Bytes, blue: Bytes, along_x: Floats32
 @compiled
 def gradient_scale(along_x: Floats32, along_y: Floats32, count: int, sizes: Floats32) -> float:
     """n: the largest gradient (to a quarter of a grey level) that at least `count` pixels reach. Fills `sizes`."""
-    histogram = np.zeros(MOST_BINS, np.int64)
+    histogram = np.zeros(MAX_BINS, np.int64)
     flat_x, flat_y, flat = along_x.reshape(-1), along_y.reshape(-1), sizes.reshape(-1)
     for i in range(len(flat)):
         flat[i] = np.sqrt(flat_x[i] * flat_x[i] + flat_y[i] * flat_y[i])
     for i in range(len(flat)):
         histogram[np.int32(flat[i] * np.float32(BINS_PER_LEVEL))] += 1
-    reached, place = 0, MOST_BINS
+    reached, place = 0, MAX_BINS
     while place > 0 and reached < count:
         place -= 1
         reached += histogram[place]

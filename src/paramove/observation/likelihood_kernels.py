@@ -7,7 +7,7 @@ from paramove.documents import Bytes, Floats
 from paramove.hmm import compiled, compiled_arithmetic, compiled_sums
 from paramove.observation.background_kernels import covered
 from paramove.observation.contour_kernels import (
-    LEAST_POINTS,
+    MIN_POINTS,
     Contour,
     fill_segments,
     new_contour,
@@ -38,7 +38,7 @@ def outline(pose: Floats, body: Floats, camera: Camera, canvas: Canvas, contour:
     if bottom >= top:
         count = trace(canvas.mask, camera.width, start, canvas.left[start], contour)
         wipe(top, bottom, camera.width, canvas)
-    return count if count >= LEAST_POINTS else 0
+    return count if count >= MIN_POINTS else 0
 
 
 @compiled
@@ -52,7 +52,7 @@ def outline_over(
         count = trace(canvas.mask, camera.width, start, canvas.left[start], contour)
         total, area = covered(canvas.mask, change, top, bottom, camera.width, canvas.left, canvas.right)
         wipe(top, bottom, camera.width, canvas)
-    return count if count >= LEAST_POINTS else 0, total, area
+    return count if count >= MIN_POINTS else 0, total, area
 
 
 @compiled
@@ -68,7 +68,7 @@ def silhouette(pose: Floats, body: Floats, camera: Camera, canvas: Canvas, out: 
 
 @compiled_arithmetic
 def strengths(
-    images: Bytes, stride: int, number: int, least: float, contour: Contour, shifts: Shifts, out: Floats32
+    images: Bytes, stride: int, number: int, minimum: float, contour: Contour, shifts: Shifts, out: Floats32
 ) -> None:
     """G+ of every contour point after the matching, from the intensities g_b (corrected).
 
@@ -87,7 +87,7 @@ def strengths(
         taken = out[0] if row == 0 else out[2 + row]
         for i in range(LANES, end):
             taken[i] = np.float32(images[np.uint32(np.int32(out[2, i]))])
-    boosted(out[1], out[3], out[4], np.float32(255.0 * least), end, out[0])
+    boosted(out[1], out[3], out[4], np.float32(255.0 * minimum), end, out[0])
 
 
 @compiled_arithmetic
@@ -101,12 +101,12 @@ def addresses(lanes: Floats32, shift: Floats32, aside: np.float32, stride: np.fl
 
 
 @compiled_arithmetic
-def boosted(shift: Floats32, one: Floats32, other: Floats32, least: np.float32, end: int, values: Floats32) -> None:
+def boosted(shift: Floats32, one: Floats32, other: Floats32, minimum: np.float32, end: int, values: Floats32) -> None:
     """x of the matched points, 0 to 255, becomes G+ (corrected), 0 to 1, with z the larger of what lies beside."""
     full = np.float32(255.0)
     for i in range(LANES, end):
         x, far = values[i], shift[i] * BETA
-        ratio = max(x / max(max(one[i], other[i]), least), np.float32(1.0))
+        ratio = max(x / max(max(one[i], other[i]), minimum), np.float32(1.0))
         values[i] = min(full, x * ratio * ratio) / (full * (np.float32(1.0) + far * far))
 
 
@@ -148,7 +148,7 @@ def matched_errors(
     """Mean of (1 - G+)^2 of each posture (M, 9) in one view, into errors (M,); 1 if it is out of sight.
 
     intensities, distances: flat edge images of all directions;
-    numbers: spacing of key points, unit of the shifts, least background;
+    numbers: spacing of key points, unit of the shifts, smallest background;
     change: of each pixel from the background; its sum under the silhouette and the area go into regions (2, M).
     """
     stride = camera.width + 2 * MARGIN

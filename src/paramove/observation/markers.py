@@ -20,7 +20,7 @@ from paramove.objects import Colour, ColourTracker
 
 BOARD_IDS = SIZE_UNTOLD_ID + MARKERS
 """Smaller ids are those of calibration boards, which may lie on the table meanwhile."""
-LEAST_SIDE, MOST_SIDE = 0.005, 0.15
+MIN_SIDE, MAX_SIDE = 0.005, 0.15
 """m. What four corners in two views make of a marker outside these limits was a wrong match."""
 SQUARENESS = 0.25
 """Sides of a marker differ by less than this share of their mean."""
@@ -61,13 +61,13 @@ class BodyTrackerOptions:
 
     Attributes:
         markers: Name of a body point -> its marker, or its colour, which nothing else in view may have.
-        most_residual_px: A point whose views disagree by more (root mean square) was found wrongly, and is left out.
+        max_residual_px: A point whose views disagree by more (root mean square) was found wrongly, and is left out.
         sigma_px: Standard deviation of a marker's place in an image.
         frame: Name of the frame that the cameras were calibrated in.
     """
 
     markers: Mapping[str, ArucoMarker | Colour] = field(default_factory=lambda: dict(DEFAULT_MARKERS))
-    most_residual_px: float = 3.0
+    max_residual_px: float = 3.0
     sigma_px: float = 0.5
     frame: str = WORLD_FRAME
 
@@ -160,7 +160,7 @@ class StereoBodyTracker:
             own = slice(4 * row, 4 * row + 4)
             residual_px = float(np.sqrt(np.mean(triangulated.residuals_px[own] ** 2)))
             corners_3d = triangulated.points[own]
-            if not residual_px <= self._options.most_residual_px or not _is_square(corners_3d):
+            if not residual_px <= self._options.max_residual_px or not _is_square(corners_3d):
                 continue
             inwards = np.cross(corners_3d[2] - corners_3d[0], corners_3d[3] - corners_3d[1])
             place = corners_3d.mean(axis=0) + marker.inset * inwards / np.linalg.norm(inwards)
@@ -180,7 +180,7 @@ class StereoBodyTracker:
         return {
             name: MarkedPoint(place, float(deviation), float(residual_px))
             for name, place, deviation, residual_px in rows
-            if residual_px <= self._options.most_residual_px
+            if residual_px <= self._options.max_residual_px
         }
 
 
@@ -188,4 +188,4 @@ def _is_square(corners: Floats) -> bool:
     """Whether four points in space, [4, 3], m, can be the corners of a marker."""
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     mean = float(sides.mean())
-    return LEAST_SIDE < mean < MOST_SIDE and bool(np.all(np.abs(sides - mean) < SQUARENESS * mean))
+    return MIN_SIDE < mean < MAX_SIDE and bool(np.all(np.abs(sides - mean) < SQUARENESS * mean))

@@ -22,7 +22,7 @@ ITERATIONS = 15
 """The 16th would be the first with steps of 1/16 px, and images are compared by whole pixels."""
 GRADIENTS, SHIFTS, DISTORTIONS = 7.5, 1.0, 4.0
 """Factors of alpha_1(x) = 7.5 x^2, alpha_2(x) = x, alpha_3(x) = 4 x."""
-LEAST_GAIN = 1e-9
+MIN_GAIN = 1e-9
 """A smaller improvement of E is none."""
 LENGTHWISE = np.float32(0.11)
 """Factor of |q|^2 in c."""
@@ -50,14 +50,14 @@ class Shifts(NamedTuple):
 
 
 @compiled
-def new_shifts(most: int) -> Shifts:
+def new_shifts(maximum: int) -> Shifts:
     """Room for so many key points."""
     return Shifts(
-        np.zeros(most, np.float32),
-        np.zeros(most, np.int32),
-        np.zeros(most, np.float32),
-        np.zeros((4, most), np.float32),
-        np.zeros(most, np.int32),
+        np.zeros(maximum, np.float32),
+        np.zeros(maximum, np.int32),
+        np.zeros(maximum, np.float32),
+        np.zeros((4, maximum), np.float32),
+        np.zeros(maximum, np.int32),
     )
 
 
@@ -126,7 +126,7 @@ def match(images: Bytes, stride: int, number: int, points: int, unit: float, con
             up_cost = kept_cost + shift_cost * up * up + bend_cost * (up_c + up_d)
             down_cost = kept_cost + shift_cost * down * down + bend_cost * (down_c + down_d)
             higher, lower = gain * up_sum * up_sum - up_cost, gain * down_sum * down_sum - down_cost
-            if max(higher, lower) <= gradients - cost + LEAST_GAIN:
+            if max(higher, lower) <= gradients - cost + MIN_GAIN:
                 fruitless[k] |= bit
                 continue
             if higher >= lower:

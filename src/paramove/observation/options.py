@@ -21,7 +21,7 @@ class ObservationOptions:
         width_px, height_px: Size at which images are compared; camera images are scaled down to it.
         smoothing_px: Standard deviation of the slight smoothing of the image; 0 for none.
         normalised_pixels: N, so many pixels of a 320 x 240 image reach a gradient of 1; scales with the area.
-        least_gradient: Smallest gradient, grey levels per px, that counts as 1: below it an image is but noise.
+        min_gradient: Smallest gradient, grey levels per px, that counts as 1: below it an image is but noise.
         gamma: Of (6.21) and (6.27), for one view; 0.15 in the thesis.
         view_exponent: gamma grows with the number V of views by V to this power, since views err together.
         shift_unit: What a pixel counts in the penalties of (6.26), whose unit the thesis does not give.
@@ -30,7 +30,7 @@ class ObservationOptions:
             under which half has; 0 leaves the background out, as the thesis does.
         still_edges: Weight of edges where nothing has changed from the background.
         hidden_px: The background is not learned so near to the arm.
-        least_background: z of G+ is at least this, so that nothing is boosted beyond measure on an even background.
+        min_background: z of G+ is at least this, so that nothing is boosted beyond measure on an even background.
     """
 
     likelihood: Likelihood = "matched"
@@ -38,12 +38,12 @@ class ObservationOptions:
     height_px: int = 240
     smoothing_px: float = 0.8
     normalised_pixels: int = 1000
-    least_gradient: float = 2.0
+    min_gradient: float = 2.0
     gamma: float = 0.2
     view_exponent: float = 0.1
     shift_unit: float = 0.25
     key_point_px: float = 7.0
-    least_background: float = 0.03
+    min_background: float = 0.03
     region_weight: float = 24.0
     still_edges: float = 0.1
     hidden_px: int = 9
@@ -53,7 +53,7 @@ class ObservationOptions:
             raise InputError(f"likelihood {self.likelihood!r} found, 'matched' or 'simple' expected")
         if not (32 <= self.width_px <= 960 and 32 <= self.height_px <= 960):
             raise InputError(f"images of {self.width_px} x {self.height_px} px found, 32 to 960 px a side expected")
-        for name in ("normalised_pixels", "least_gradient", "gamma", "shift_unit", "least_background"):
+        for name in ("normalised_pixels", "min_gradient", "gamma", "shift_unit", "min_background"):
             if not getattr(self, name) > 0.0:
                 raise InputError(f"{name} is {getattr(self, name)}, a number above 0 expected")
         if not 3.0 <= self.key_point_px <= 7.0:

@@ -36,7 +36,7 @@ class ArmingKey:
         """A person wants the arm armed."""
         self._pressed_s, self._said_s = now_s, None
 
-    def hear(self, gate: SafetyState) -> None:
+    def handle(self, gate: SafetyState) -> None:
         """The gate's state; where it has just stopped the arm, that is told."""
         if gate.captured.ToNanoseconds() < self._stopped_ns:
             return

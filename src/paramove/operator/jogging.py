@@ -54,12 +54,12 @@ class Jogging:
         if 0 <= place < len(self.angles):
             self.chosen = place
 
-    def hear_states(self, message: JointStates) -> None:
+    def handle_states(self, message: JointStates) -> None:
         """Where the joints are."""
         self.angles = {joint.name: joint.position for joint in message.joints}
         self.chosen = min(self.chosen, max(len(self.angles) - 1, 0))
 
-    def hear_status(self, message: TrajectoryStatus) -> None:
+    def handle_status(self, message: TrajectoryStatus) -> None:
         """How the driver fares with a step."""
         if message.trajectory_id != self._waits_for or message.state not in OVER:
             return
@@ -80,7 +80,7 @@ class Jogging:
         """The trajectory of one step, 1 up or -1 down; None while the last is under way or no joint is known.
 
         It begins at the goal of the joint's last step, so that steps add up although the joint sags, and goes from rest
-        to rest with the least jerk.
+        to rest with the smallest jerk.
         """
         if self.is_moving or not self.angles:
             return None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import zmq
 
-from paramove.bus import BusVisitor, Subscriber, say_now, topics
+from paramove.bus import BusVisitor, Subscriber, publish_now, topics
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 
 LOOKS_EVERY_S = 0.02
@@ -27,7 +27,7 @@ def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | No
         timeout_s: To wait for the gate, and again for its answer.
 
     Returns:
-        The gate's newest state: armed or not as was asked for, or with the faults for which it refuses; that from
+        The gate's latest state: armed or not as was asked for, or with the faults for which it refuses; that from
         before the word if it changes nothing. None if there is no gate.
 
     Raises:
@@ -39,7 +39,7 @@ def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | No
         before = _until(gate, timeout_s, lambda state: True)
         if before is None or obeyed(before, armed):
             return before
-        say_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
+        publish_now(publisher, ArmRequest(source=TERMINAL, armed=armed, reason="enabled", by_person=True))
 
         def is_answer(state: SafetyState) -> bool:
             return obeyed(state, armed) or (armed and _faults(state) not in ([], _faults(before)))
@@ -63,9 +63,9 @@ def _until(
     is_it: Callable[[SafetyState], bool],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> SafetyState | None:
-    """The first state for which `is_it`, else the newest that is heard; None if none is."""
+    """The first state for which `is_it`, else the latest that is heard; None if none is."""
     end_s = time.monotonic() + timeout_s
-    newest: SafetyState | None = None
+    latest: SafetyState | None = None
     while time.monotonic() < end_s:
         meanwhile()
         gate.revive()
@@ -74,5 +74,5 @@ def _until(
             state: SafetyState = heard.message
             if is_it(state):
                 return state
-            newest = state
-    return newest
+            latest = state
+    return latest

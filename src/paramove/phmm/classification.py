@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
-from paramove.documents import Floats, Ints
+from paramove.documents import Floats, Ints, renamed_attribute
 from paramove.hmm import checked_sequence, checked_sequences
 from paramove.phmm.left_out import fold_numbers
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM
@@ -41,14 +41,16 @@ class Classification:
         action: the most probable action.
         posterior: probability of each action.
         estimates: of theta under each action.
-        typicality: probability that a genuine movement of this action is so strange or stranger; a small one says that
-            the movement is none of the known ones. 1 from models that do not know how performances vary.
+        p_value: probability that a genuine movement of this action has at least this outlier score; a small one is a
+            reason to reject the movement. 1 from models that do not know how performances vary.
     """
 
     action: str
     posterior: dict[str, float]
     estimates: dict[str, ParameterEstimate]
-    typicality: float
+    p_value: float
+
+    typicality = renamed_attribute("typicality", "p_value")
 
 
 class MovementClassifier:
@@ -187,22 +189,22 @@ class MovementClassifier:
                 "beginnings are told apart only by a classifier trained with `fit` on all actions together"
             )
         if not known:
-            least = self._beginnings[0].n_frames
+            minimum = self._beginnings[0].n_frames
             raise ValueError(
-                f"a beginning has at least {least} frames, found {n_frames}: wait for more of the movement"
+                f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement"
             )
         return known[-1]
 
 
 def _examined(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[ParameterEstimate, float, float]:
-    """Estimate of theta, score of a complete movement, and typicality.
+    """Estimate of theta, score of a complete movement, and p-value.
 
-    Scores of models with correlated residuals are their typicalities: densities of movements that lie far from every
-    model (another person's) would compare how wide the models are, not how far the movement is for each.
+    Scores of models with correlated residuals are logarithms of p-values: densities of movements that lie far from
+    every model (another person's) would compare how wide the models are, not how far the movement is for each.
     """
     if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
         found = model.examine(sequence, finished=finished)
-        return found.estimate, found.log_typicality, found.typicality
+        return found.estimate, found.log_p_value, found.p_value
     estimate = model.estimate(sequence, finished=finished)
     # Neighbouring frames say the same: the frames of a state count as one.
     frames = model.resampled_frames if model.resampled_frames is not None else len(sequence)

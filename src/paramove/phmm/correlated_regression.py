@@ -20,13 +20,13 @@ from paramove.documents import Floats, Ints
 from paramove.phmm.features import Monomials
 from paramove.phmm.left_out import folds_of, inflation_of
 from paramove.phmm.noise import distances_with_noise
+from paramove.phmm.predictive_distribution import PredictiveDistribution
 from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
-from paramove.phmm.typicality import PredictiveDistribution
 
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
 """Candidates for the share of each variance that is taken for independent."""
-LEAST_SHARE = 0.02
+MIN_SHARE = 0.02
 """Standard deviations below this share of the mean one are lifted to it: they are known no better."""
 NEWTON_STEPS = 12
 
@@ -98,7 +98,7 @@ class CorrelatedRegression:
         deviation = deviations_of(left_out)
         folds = _folds(y / deviation, theta, monomials, penalty, groups)
         shrinkage, excess, tested, error = chosen_shrinkage(folds, shrinkages)
-        inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), least=1e-6)
+        inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), minimum=1e-6)
         triangle = np.linalg.cholesky(shrunk(left_out / deviation, shrinkage))
         # What no fold could test is compared with a covariance that knows it.
         distances = (solve_triangular(triangle, (left_out / deviation).T, lower=True) ** 2).sum(axis=0)
@@ -154,7 +154,7 @@ class CorrelatedRegression:
         diagonal = np.diagonal(self.root)
         return float(-0.5 * distance - np.log(diagonal).sum() - 0.5 * len(y) * np.log(2.0 * np.pi))
 
-    def log_typicality(self, distance: float) -> float:
+    def log_p_value(self, distance: float) -> float:
         """Logarithm of the probability that a genuine movement lies as far from the model or farther.
 
         The logarithms of the distances of unseen training movements are taken for normally distributed, in a group that
@@ -242,19 +242,19 @@ def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, grou
 def chosen_shrinkage(
     folds: list[LeftOutFold], candidates: tuple[float, ...]
 ) -> tuple[float, Floats, list[Floats], float]:
-    """Shrinkage with the least error of theta on unseen movements.
+    """Shrinkage with the smallest error of theta on unseen movements.
 
     Those errors in predicted deviations, of all folds, the distances of the movements of each fold, and the mean error.
     """
-    best, least = (candidates[-1], np.zeros(0), list[Floats](), np.inf), np.inf
+    best, minimum = (candidates[-1], np.zeros(0), list[Floats](), np.inf), np.inf
     for shrinkage in candidates:
         found = [_tested(fold, shrinkage) for fold in folds]
         if not found:
             break
         error, excess, _ = np.concatenate(found, axis=1)
         total = float(np.sqrt(error + 1e-12).mean())
-        if total < least:
-            least = total
+        if total < minimum:
+            minimum = total
             best = shrinkage, excess, [np.maximum(distance, 0.0) for _, _, distance in found], total
     return best
 
@@ -285,7 +285,7 @@ def _solved_or_least(matrix: Floats, right: Floats) -> Floats:
 def deviations_of(residuals: Floats) -> Floats:
     """Standard deviations of residuals (K, n), none much below the mean one. Shape (n,)."""
     deviation = np.sqrt((residuals**2).mean(axis=0))
-    result: Floats = np.maximum(deviation, LEAST_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
+    result: Floats = np.maximum(deviation, MIN_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
     return result
 
 

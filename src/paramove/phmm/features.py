@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats, Ints
 from paramove.hmm import compiled
 
-MOST_MONOMIALS = 5000
-MOST_PARAMETERS = 12
+MAX_MONOMIALS = 5000
+MAX_PARAMETERS = 12
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Monomials:
         half = 0.5 * (upper - lower)
         scale = np.where(half > 0.0, half, 1.0)
         each = range(theta.shape[1])
-        if len(each) > MOST_PARAMETERS or degree > MOST_MONOMIALS or comb(len(each) + degree, degree) > MOST_MONOMIALS:
+        if len(each) > MAX_PARAMETERS or degree > MAX_MONOMIALS or comb(len(each) + degree, degree) > MAX_MONOMIALS:
             raise ValueError(
-                f"expected at most {MOST_PARAMETERS} parameters and {MOST_MONOMIALS} monomials, "
+                f"expected at most {MAX_PARAMETERS} parameters and {MAX_MONOMIALS} monomials, "
                 f"found degree {degree} of {len(each)} parameters"
             )
         factors = (f for total in range(degree + 1) for f in itertools.combinations_with_replacement(each, total))

@@ -12,7 +12,7 @@ from paramove.hmm import compiled
 from paramove.phmm.interpolation_kernels import expectation_at, value_at
 
 BORDER = 1e-9
-MOST_STEPS, TOLERANCE = 40, 1e-3
+MAX_STEPS, TOLERANCE = 40, 1e-3
 PROMISE = 1e-5
 """A step that promises a smaller gain is not tried."""
 COARSE = 30.0
@@ -39,7 +39,7 @@ def cell_of(region: Ints, counts: Ints) -> Ints:
 
 @compiled
 def region_bounds(region: Ints, knots: Floats, counts: Ints, margin: float) -> tuple[Floats, Floats]:
-    """Least and greatest coordinates of a region. Shapes (P,)."""
+    """Minimum and maximum coordinates of a region. Shapes (P,)."""
     lower, upper = np.empty(len(region)), np.empty(len(region))
     for p in range(len(region)):
         lower[p] = -margin if region[p] < 0 else knots[p, region[p]]
@@ -88,7 +88,7 @@ def climbed(
     value, gradient, curvature = expectation_at(
         place, cell, smoothing, columns, knots, counts, means, covariances, durations, d_min
     )
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         if not value > -np.inf:
             break
         step = _step(place, gradient, curvature, lower, upper)
@@ -169,7 +169,7 @@ def likeliest(
     margin: float, smoothing: float, columns: Floats, knots: Floats, counts: Ints, means: Floats, covariances: Floats,
     durations: Floats, d_min: int,
 ) -> tuple[Floats, float, Ints]:  # fmt: skip
-    """The place (P,) with the greatest ln p, its value, and the cell that holds there.
+    """The place (P,) with the largest ln p, its value, and the cell that holds there.
 
     The search begins in the cell whose middle is likeliest, with widened covariances (paper 5.3). Between cells the
     likelihood has kinks, and a sequence that could be aligned in two ways has two summits side by side (corrected

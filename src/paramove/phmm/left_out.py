@@ -7,17 +7,17 @@ from scipy.special import chdtri  # scipy.stats would take half a second to impo
 
 from paramove.documents import Floats, Ints
 
-MOST_FOLDS = 10
+MAX_FOLDS = 10
 
 
 def fold_numbers(groups: Ints) -> Ints:
-    """Number below `MOST_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
+    """Number below `MAX_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
 
     Of one or two groups, parts of their movements.
     """
     different = np.unique(groups)
     numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(groups))
-    return np.asarray(numbers % MOST_FOLDS, dtype=np.int64)
+    return np.asarray(numbers % MAX_FOLDS, dtype=np.int64)
 
 
 def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
@@ -29,16 +29,16 @@ def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
             yield tested, others
 
 
-def inflation_of(excess: Floats, dimension: int, n_groups: int, least: float) -> float:
+def inflation_of(excess: Floats, dimension: int, n_groups: int, minimum: float) -> float:
     """What a covariance of theta must be multiplied by so that regions hold what they promise.
 
     Args:
         excess: squared errors of left-out movements in predicted deviations, (K,); none if nothing could be left out.
-        dimension: P. n_groups: how many different groups those are from. least: what is never gone below.
+        dimension: P. n_groups: how many different groups those are from. minimum: lower bound of the result.
     """
     few = (n_groups + dimension) / max(1, n_groups - 1)  # few groups know little of the tails
     if not len(excess):
         return few
     level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))
     tail = float(np.quantile(excess, level)) / float(chdtri(dimension, 0.05))
-    return few * max(least, float(excess.mean()) / dimension, tail)
+    return few * max(minimum, float(excess.mean()) / dimension, tail)

@@ -32,10 +32,10 @@ def check_local_models(means: Floats, covariances: Floats, durations: Floats, d_
     bad = np.argwhere(np.abs(covariances - np.swapaxes(covariances, -1, -2)).max(axis=(-2, -1)) > ROUNDING * size)
     if len(bad):
         raise ValueError(f"expected symmetric covariances, found one that is not {_where(bad[0])}")
-    least = np.linalg.eigvalsh(covariances)[..., 0]
-    bad = np.argwhere(least <= 0)
+    minimum = np.linalg.eigvalsh(covariances)[..., 0]
+    bad = np.argwhere(minimum <= 0)
     if len(bad):
-        found = f"the eigenvalue {least[tuple(bad[0])]:.3g} {_where(bad[0])}"
+        found = f"the eigenvalue {minimum[tuple(bad[0])]:.3g} {_where(bad[0])}"
         raise ValueError(f"expected covariances that are positive definite, found {found}")
 
 

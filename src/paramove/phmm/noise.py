@@ -21,7 +21,7 @@ MEDIAN_OF_SQUARES = 0.4549364
 """Of a standard normal variable; a median since reversals, impacts and gaps make a few great differences."""
 FEWEST_DIFFERENCES = 20
 CLEARLY = 9.0
-"""Noise counts if its variance is more than so many times the greatest of the training: three times the deviation.
+"""Noise counts if its variance is more than so many times the largest of the training: three times the deviation.
 Below that it hardly matters, and movements sampled at an eighth of the rate stay below."""
 
 
@@ -50,11 +50,11 @@ class NoiseLevel:
     """How noisy training movements are.
 
     Attributes:
-        usual: median of their `noise_variance`. greatest: of them.
+        usual: median of their `noise_variance`. maximum: of them.
     """
 
     usual: float
-    greatest: float
+    maximum: float
 
     @classmethod
     def of(cls, sequences: Sequence[Floats]) -> NoiseLevel:
@@ -65,19 +65,16 @@ class NoiseLevel:
     def added(self, recorded: Floats, n_frames: int | None = None) -> AddedNoise | None:
         """What a recorded sequence (T, D) has in addition; None if that is not clear. `n_frames`: see `AddedNoise`."""
         # A median is at most twice the mean, which takes a tenth of the time.
-        if (
-            len(recorded) < 4
-            or _mean_squared_difference(recorded) <= 10.0 * MEDIAN_OF_SQUARES * CLEARLY * self.greatest
-        ):
+        if len(recorded) < 4 or _mean_squared_difference(recorded) <= 10.0 * MEDIAN_OF_SQUARES * CLEARLY * self.maximum:
             return None
         found = noise_variance(recorded)
-        if found <= CLEARLY * self.greatest:
+        if found <= CLEARLY * self.maximum:
             return None
         return AddedNoise(found - self.usual, recorded, n_frames)
 
     def array(self) -> Floats:
         """For a file."""
-        return np.array([self.usual, self.greatest])
+        return np.array([self.usual, self.maximum])
 
     @classmethod
     def from_array(cls, array: Floats) -> NoiseLevel:

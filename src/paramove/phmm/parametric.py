@@ -34,7 +34,7 @@ from paramove.phmm.noise import AddedNoise, NoiseLevel
 from paramove.phmm.performance import groups_of
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
-MOST_FRAMES = 100_000
+MAX_FRAMES = 100_000
 
 
 class ParameterEstimate(NamedTuple):
@@ -72,7 +72,7 @@ class ParametricHMM(ABC):
         description: labels that are saved with the model.
 
     Attributes:
-        parameter_bounds_: least and greatest theta of the training, shape (2, P).
+        parameter_bounds_: minimum and maximum theta of the training, shape (2, P).
         training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
         training_noise_: how noisy the training is; None in files of earlier releases, where noise is not looked for.
         training_: what training did.
@@ -272,8 +272,8 @@ class ParametricHMM(ABC):
         if not all(type(count) is int for count in counts.values()) or not 1 <= self.d_min <= self.d_max:
             raise ValueError(f"expected whole numbers with 1 <= d_min <= d_max, found {counts}")
         frames = self.resampled_frames
-        if frames is not None and (type(frames) is not int or not 2 <= frames <= MOST_FRAMES):
-            raise ValueError(f"expected resampled_frames from 2 to {MOST_FRAMES}, found {frames!r:.40}")
+        if frames is not None and (type(frames) is not int or not 2 <= frames <= MAX_FRAMES):
+            raise ValueError(f"expected resampled_frames from 2 to {MAX_FRAMES}, found {frames!r:.40}")
         if self.n_states < 1 or not isinstance(self.description, MovementDescription | None):
             raise ValueError(f"expected at least one state, found {self.n_states}")
 

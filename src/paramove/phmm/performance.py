@@ -15,7 +15,7 @@ from paramove.hmm import resample
 from paramove.phmm.correlated_regression import CorrelatedRegression
 from paramove.phmm.features import Monomials
 from paramove.phmm.noise import AddedNoise, distances_with_noise, moving_average
-from paramove.phmm.typicality import PredictiveDistribution
+from paramove.phmm.predictive_distribution import PredictiveDistribution
 
 FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""
@@ -58,7 +58,7 @@ class Pace:
     def expecting(self, noise: float, sequence: Floats) -> Pace:
         """The same for a sequence with noise of that variance on each coordinate of each frame."""
         seen, own = noisy_pace(sequence, noise), self.root @ self.root.T
-        mean = np.maximum(self.mean, seen.least)
+        mean = np.maximum(self.mean, seen.minimum)
         # As a genuine movement has it: a person who rests is seen to rest as well as noise allows.
         squared = np.exp(2.0 * mean)
         errors = (squared * seen.of_steps + 0.5 * seen.of_steps**2) / (sequence.shape[1] * squared**2)
@@ -117,27 +117,27 @@ class Performances:
         """In how many parts complete movements of so many coordinates are described."""
         return len(self.complete.coefficients) // dimension - 1
 
-    def strangeness(self, distance: float, pace_distance: float) -> float:
+    def outlier_score(self, distance: float, pace_distance: float) -> float:
         """How unlike the training a complete movement is; genuine ones have about 1.3.
 
         Args:
             distance: of its parts from the model at the best theta. pace_distance: of its pace.
         """
-        return float(_strangeness(distance, pace_distance, self.complete.distances, self.pace.distances))
+        return float(_outlier_score(distance, pace_distance, self.complete.distances, self.pace.distances))
 
-    def log_typicality(self, strangeness: float) -> float:
-        """Logarithm of the probability that a genuine movement is so strange or stranger, from unseen training ones.
+    def log_p_value(self, outlier_score: float) -> float:
+        """Logarithm of the p-value: the probability that a genuine movement has at least this outlier score.
 
-        The logarithms of their strangeness are taken for normally distributed, in a group that was not seen about
-        another mean.
+        The logarithms of the scores of left-out training movements are taken for normally distributed, in a group that
+        was left out about another mean.
         """
-        return self._usual.log_above(float(np.log(strangeness + 1e-9)))
+        return self._usual.log_above(float(np.log(outlier_score + 1e-9)))
 
     @cached_property
     def _usual(self) -> PredictiveDistribution:
-        """Of the logarithm of the strangeness of a genuine movement."""
+        """Of the logarithm of the outlier score of a genuine movement."""
         distances, paces = self.complete.distances, self.pace.distances
-        known = np.log(_strangeness(distances, paces, distances, paces) + 1e-9)
+        known = np.log(_outlier_score(distances, paces, distances, paces) + 1e-9)
         return PredictiveDistribution.of(known, self.complete.groups)
 
     def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
@@ -179,7 +179,7 @@ class Performances:
         return cls(complete, beginnings, pace)
 
 
-def _strangeness(distance: Any, pace_distance: Any, known: Floats, known_pace: Floats) -> Any:
+def _outlier_score(distance: Any, pace_distance: Any, known: Floats, known_pace: Floats) -> Any:
     """Both distances in units of their medians. Roots, so that one outlier in pace does not outweigh all else."""
     usual = np.median(known) + 1e-9, np.median(known_pace) + 1e-9
     return np.sqrt(distance / usual[0]) + PACE_SHARE * np.sqrt(pace_distance / usual[1])
@@ -197,7 +197,7 @@ class NoisyPace(NamedTuple):
     """`pace_features` of a sequence without its noise, the least that is seen of them, and the noise of its steps."""
 
     features: Floats
-    least: Floats
+    minimum: Floats
     of_steps: Floats
 
 
@@ -214,10 +214,10 @@ def noisy_pace(sequence: Floats, noise: float) -> NoisyPace:
         squared = (np.diff(resample(averages, PACE_PARTS + 1), axis=0) ** 2).mean(axis=1)
         if of_steps.mean() < 0.1 * squared.mean():
             break
-    least = of_steps * np.sqrt(2.0 / sequence.shape[1])
-    without = np.maximum(squared - of_steps, least)
+    minimum = of_steps * np.sqrt(2.0 / sequence.shape[1])
+    without = np.maximum(squared - of_steps, minimum)
     small = 0.02 * np.sqrt(without).mean() + 1e-12
-    return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(least) + small), of_steps)
+    return NoisyPace(np.log(np.sqrt(without) + small), np.log(np.sqrt(minimum) + small), of_steps)
 
 
 def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:

@@ -18,7 +18,7 @@ from paramove.phmm.left_out import inflation_of
 
 SHRINKAGE = 0.05
 """Share of each variance that is taken for independent."""
-MOST_ROWS = 150
+MAX_ROWS = 150
 """Directions of variation that are kept in full; the rest is taken for independent."""
 
 
@@ -82,15 +82,15 @@ class PerformanceSpread:
                 own = gain @ residuals[k]
                 without = (without - (1.0 - SHRINKAGE) * np.outer(own, own) / count) * count / (count - 1.0)
             excess[k] = moves[k] @ np.linalg.solve(without + 1e-12 * np.trace(without) * np.eye(len(gain)), moves[k])
-        return cls(everything.factor, everything.own, inflation_of(excess, moves.shape[1], n_groups, least=1.0))
+        return cls(everything.factor, everything.own, inflation_of(excess, moves.shape[1], n_groups, minimum=1.0))
 
     @classmethod
     def _of(cls, residuals: Floats) -> PerformanceSpread:
         factor = residuals * np.sqrt((1.0 - SHRINKAGE) / len(residuals))
         own = SHRINKAGE * (residuals**2).mean(axis=0) + 1e-300
-        if len(factor) > MOST_ROWS:
+        if len(factor) > MAX_ROWS:
             _, values, directions = np.linalg.svd(factor, full_matrices=False)
-            kept = values[:MOST_ROWS, None] * directions[:MOST_ROWS]
+            kept = values[:MAX_ROWS, None] * directions[:MAX_ROWS]
             own = own + (factor**2).sum(axis=0) - (kept**2).sum(axis=0)
             factor = kept
         return cls(factor, own, 1.0)

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paramove.documents import Floats
+from paramove.documents import Floats, renamed_attribute
 from paramove.hmm import (
     Evaluator,
     LeftRightHMM,
@@ -37,7 +37,7 @@ from paramove.phmm.regression import RegressedParameters, train_regressed, with_
 from paramove.phmm.ridge import smoothed
 
 Residuals = Literal["independent", "correlated"]
-MOST_STEPS = 40
+MAX_STEPS = 40
 STEP_TOLERANCE = 1e-5
 """Predicted gain in nats below which the search ends."""
 ALIGNMENTS = 3
@@ -48,21 +48,25 @@ class Examination(NamedTuple):
 
     Attributes:
         estimate: of theta.
-        strangeness: how unlike the training movements it is, see `Performances.strangeness`; of a beginning the root of
-            its distance in units of the usual one.
+        outlier_score: how far it is from the training movements, see `Performances.outlier_score`; of a beginning the
+            root of its distance in units of the median one.
         log_density: of `part_averages`, or of the features of a beginning.
-        log_typicality: logarithm of the probability that a genuine movement is so strange or stranger.
+        log_p_value: logarithm of `p_value`.
     """
 
     estimate: ParameterEstimate
-    strangeness: float
+    outlier_score: float
     log_density: float
-    log_typicality: float
+    log_p_value: float
 
     @property
-    def typicality(self) -> float:
-        """Probability that a genuine movement is so strange or stranger; a small one is a reason to reject."""
-        return float(np.exp(self.log_typicality))
+    def p_value(self) -> float:
+        """Probability that a genuine movement has at least this outlier score; a small one is a reason to reject."""
+        return float(np.exp(self.log_p_value))
+
+
+for _old, _new in (("strangeness", "outlier_score"), ("typicality", "p_value"), ("log_typicality", "log_p_value")):
+    setattr(Examination, _old, renamed_attribute(_old, _new))
 
 
 class PolynomialPHMM(ParametricHMM):
@@ -74,7 +78,7 @@ class PolynomialPHMM(ParametricHMM):
         smoothness: over which share of the movement the dependence on theta changes little: length of the prior that
             couples the slopes of neighbouring states, its strength found by the evidence. None: no prior, plain EM.
         residuals: "correlated" learns how whole performances vary: `estimate` then knows that frames are not
-            independent, its covariance is honest, beginnings and untypical movements are recognised, and the means are
+            independent, its covariance is honest, beginnings and outliers are recognised, and the means are
             those that predict left-out groups best. "independent" is the thesis: maximum likelihood of frames.
         search_margin: how far outside the training's bounds `estimate` looks, as a share of their width.
 
@@ -200,7 +204,7 @@ class PolynomialPHMM(ParametricHMM):
         return ParameterEstimate(self.monomials_.centre + scale * best, covariance, value)
 
     def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
-        """Estimate of theta, and how typical of this movement the sequence is.
+        """Estimate of theta, outlier score and p-value of the sequence.
 
         Raises ValueError for a model with independent residuals, which does not know how performances vary, and for a
         beginning of fewer frames than are modelled.
@@ -217,14 +221,14 @@ class PolynomialPHMM(ParametricHMM):
             theta, covariance = regression.estimate(features, self.search_margin)
             distance = regression.distance(features, theta)
             density = regression.log_density(features, distance)
-            strangeness = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
+            outlier_score = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
             found = ParameterEstimate(theta, covariance, density)
-            return Examination(found, strangeness, density, regression.log_typicality(distance))
+            return Examination(found, outlier_score, density, regression.log_p_value(distance))
         found, parts = self._refined(self._checked(recorded), self.performances_)
         distance = self.performances_.complete.distance(parts, found.theta)
-        strangeness = self.performances_.strangeness(distance, self.performances_.pace.distance(recorded))
+        outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
         density = self.performances_.complete.log_density(parts, distance)
-        return Examination(found, strangeness, density, self.performances_.log_typicality(strangeness))
+        return Examination(found, outlier_score, density, self.performances_.log_p_value(outlier_score))
 
     def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
         """Estimate by whole performances, and the averages of the parts of this one.
@@ -251,10 +255,10 @@ class PolynomialPHMM(ParametricHMM):
         return 1.0 + 2.0 * self.search_margin
 
     def _likeliest(self, prepared: search_kernels.Movement) -> tuple[Floats, float, Floats]:
-        """Scaled theta with the greatest likelihood, its logarithm, and the gradient there."""
+        """Scaled theta with the largest likelihood, its logarithm, and the gradient there."""
         bounds = np.full(len(self.monomials_.centre), self._widest)
         best, value, gradient = search_kernels.best_climbed(
-            self.monomials_.starts, -bounds, bounds, MOST_STEPS, STEP_TOLERANCE, prepared
+            self.monomials_.starts, -bounds, bounds, MAX_STEPS, STEP_TOLERANCE, prepared
         )
         return best, float(value), gradient
 

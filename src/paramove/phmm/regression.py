@@ -32,7 +32,7 @@ from paramove.hmm import (
     root_mean_deviation,
 )
 
-LEAST_STRENGTH, GREATEST_STRENGTH = 1e-8, 1e8
+MIN_STRENGTH, MAX_STRENGTH = 1e-8, 1e8
 CONJUGATE_STEPS = 6
 EVIDENCE_ITERATIONS = 8
 """The prior's strength follows the evidence while covariances anneal, but at least so long; then it is constant."""
@@ -46,7 +46,7 @@ class RegressedParameters:
         coefficients: Z, shape (N, D, F).
         covariances: shape (N, D, D).
         durations: p_i(d) in column d - 1, shape (N, d_max).
-        d_min: least number of frames of a state.
+        d_min: smallest number of frames of a state.
     """
 
     coefficients: Floats
@@ -273,7 +273,7 @@ class SlopePrior:
         for degree in range(1, int(degrees.max()) + 1):
             same = degrees == degree
             found = n_states * dim * same.sum() / (size[same].sum() + remaining[same].sum())
-            strength[same] = np.clip(found, LEAST_STRENGTH, GREATEST_STRENGTH)
+            strength[same] = np.clip(found, MIN_STRENGTH, MAX_STRENGTH)
         return SlopePrior(self.coupling, strength, self.whitening, self.frames)
 
     def improved(self, coefficients: Floats, weights: Floats, crossed: Floats, covariances: Floats) -> Floats:

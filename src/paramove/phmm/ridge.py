@@ -11,7 +11,7 @@ from paramove.documents import Floats, Ints
 
 STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
 """Candidates for the ridge of each degree, as a share of the number of movements."""
-MOST_ROUNDS = 4
+MAX_ROUNDS = 4
 SIMPLER = 0.005
 """A degree above 1 is held back as far as possible while errors grow by no more than this share."""
 OFFSETS = (0.0, 0.1, 0.3, 1.0, 3.0)
@@ -110,7 +110,7 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
                 known[candidate] = 2.0 * float(np.log(np.sqrt(squared.sum(axis=1)).mean() + 1e-12))
         return known[candidate]
 
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         before = ridge
         for place in range(len(ridge)):
             allowed: list[tuple[float, ...]] = [
@@ -118,9 +118,9 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
                 for strength in STRENGTHS
                 if strength >= max(ridge[:place], default=0.0) and strength <= min(ridge[place + 1 :], default=np.inf)
             ]
-            least = min(map(error, allowed))
+            minimum = min(map(error, allowed))
             slack = SIMPLER if place else 0.0
-            ridge = [one for one in allowed if error(one) <= least + slack][-1]
+            ridge = [one for one in allowed if error(one) <= minimum + slack][-1]
         if ridge == before:
             break
     return ridge
@@ -129,7 +129,7 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
 def _chosen_offsets(y: Floats, features: Floats, degrees: Ints, groups: Ints) -> tuple[GroupOffsets, tuple[float, ...]]:
     """Offsets with which left-out groups are predicted best, and the ridge per degree.
 
-    Errors of few groups differ by chance: the least variance within one standard error of the best, group by group.
+    Errors of few groups differ by chance: the smallest variance within one standard error of the best, group by group.
 
     None where theta does not vary within groups: nothing tells offsets from an effect of theta. Errors are relative
     then, since to leave out a place at the border is to extrapolate, and centimetres there would decide all.

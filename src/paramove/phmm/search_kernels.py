@@ -165,7 +165,7 @@ def expectation_at(u: Floats, movement: Movement) -> tuple[float, Floats, Floats
 
 @compiled
 def climbed(
-    start: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, movement: Movement
+    start: Floats, lower: Floats, upper: Floats, max_steps: int, tolerance: float, movement: Movement
 ) -> tuple[Floats, float, Floats]:
     """EM (linear models) or generalised EM from a start, within bounds: the place reached, its log-likelihood, and the
     gradient there.
@@ -175,7 +175,7 @@ def climbed(
     """
     place = np.minimum(np.maximum(start, lower), upper)
     value, gradient, information = expectation_at(place, movement)
-    for _ in range(most_steps):
+    for _ in range(max_steps):
         if not value > -np.inf:
             break
         step = bounded_step(place, gradient, information, lower, upper)
@@ -239,15 +239,15 @@ def _likeliest_start(starts: Floats, movement: Movement) -> tuple[int, float]:
 
 @compiled
 def best_climbed(
-    starts: Floats, lower: Floats, upper: Floats, most_steps: int, tolerance: float, movement: Movement
+    starts: Floats, lower: Floats, upper: Floats, max_steps: int, tolerance: float, movement: Movement
 ) -> tuple[Floats, float, Floats]:
     """`climbed` from the best of the starts (S, P); from the first one where the likelihood contradicts."""
     best, first = 0, -np.inf
     if len(starts) > 1:
         best, first = _likeliest_start(starts, movement)
-    found = climbed(starts[best], lower, upper, most_steps, tolerance, movement)
+    found = climbed(starts[best], lower, upper, max_steps, tolerance, movement)
     if best > 0 and not found[1] >= first:
-        found = climbed(starts[0], lower, upper, most_steps, tolerance, movement)
+        found = climbed(starts[0], lower, upper, max_steps, tolerance, movement)
     return found
 
 
@@ -266,7 +266,7 @@ def information_at(u: Floats, gradient: Floats, movement: Movement) -> Floats:
 
 @compiled
 def nearest(
-    starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, most_steps: int
+    starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, max_steps: int
 ) -> tuple[Floats, Floats]:
     """The place u within +-bound with the least |right - triangle phi(u)|^2, and triangle dphi/du there.
 
@@ -280,7 +280,7 @@ def nearest(
         found = ((right - triangle @ features) ** 2).sum()
         if found < misfit:
             place, misfit = starts[s].copy(), found
-    for _ in range(most_steps):
+    for _ in range(max_steps):
         monomials_at(place, exponents, features, slopes)
         moved = triangle @ slopes
         matrix = moved.T @ moved
@@ -306,7 +306,7 @@ def nearest(
 @compiled
 def aligned_parts(
     sequence: Floats, movement: Movement, begins: Ints, alignments: int, starts: Floats, bound: float,
-    projector: Floats, triangle: Floats, most_steps: int,
+    projector: Floats, triangle: Floats, max_steps: int,
 ) -> Floats:  # fmt: skip
     """Averages of the parts of a movement and its last frame, ((parts + 1) D,).
 
@@ -314,14 +314,14 @@ def aligned_parts(
 
     Args:
         sequence: the frames, (T, D). begins: first state of each part. alignments: how often states are found.
-        starts, bound, triangle, most_steps: of `nearest`; projector: makes its `right` of the averages.
+        starts, bound, triangle, max_steps: of `nearest`; projector: makes its `right` of the averages.
     """
     parts, place = np.empty((len(begins) + 1, sequence.shape[1])), starts[0]
     parts[-1] = sequence[-1]
     for alignment in range(alignments):
         if alignment > 0:
             right = np.dot(projector, parts.ravel())
-            place = nearest(starts, bound, movement.exponents, right, triangle, most_steps)[0]
+            place = nearest(starts, bound, movement.exponents, right, triangle, max_steps)[0]
         gamma = responsibilities_at(place, movement)
         parts[:-1] = 0.0
         for part in range(len(begins)):

@@ -14,11 +14,11 @@ from paramove.hmm import TrainingOptions, TrainingSummary
 from paramove.phmm.description import MovementDescription
 
 FORMAT_VERSION = 1
-MOST_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 """Of all arrays together; the reaching model of 8 local models has 8 MB."""
-MOST_ARRAYS = 500
+MAX_ARRAYS = 500
 """Every modelled beginning has seven; of movements of a minute there are 25."""
-MOST_LETTERS = 100_000
+MAX_LETTERS = 100_000
 """Of the header; that of a model with a description has 1 000."""
 
 
@@ -53,7 +53,7 @@ def write_record(path: Path, record: ModelRecord) -> None:
 
 def read_record(path: Path) -> ModelRecord:
     """Read a record. Raises ModelFileError with what was expected and found."""
-    content = read_arrays(path, "model file (.npz)", ModelFileError, most_bytes=MOST_BYTES, most_arrays=MOST_ARRAYS)
+    content = read_arrays(path, "model file (.npz)", ModelFileError, max_bytes=MAX_BYTES, max_arrays=MAX_ARRAYS)
     missing = sorted({"format_version", "header"} - set(content))
     if missing:
         found = ", ".join(sorted(content)) or "nothing"
@@ -64,8 +64,8 @@ def read_record(path: Path) -> ModelRecord:
         if value.dtype != np.float64 or not np.isfinite(value).all():
             raise ModelFileError(f"{path}: expected finite numbers in {name!r}, found NaN, infinity or {value.dtype}")
     try:
-        if content["header"].dtype.itemsize > 4 * MOST_LETTERS:
-            raise ValueError(f"it has more than {MOST_LETTERS} characters")
+        if content["header"].dtype.itemsize > 4 * MAX_LETTERS:
+            raise ValueError(f"it has more than {MAX_LETTERS} characters")
         header = json.loads(str(content["header"]), parse_constant=_refuse_constant)
         parameters = {name: _rich(name, value) for name, value in header["parameters"].items()}
         training = _summary(header["training"])

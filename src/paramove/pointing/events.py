@@ -19,13 +19,13 @@ class PointingEventOptions:
     Attributes:
         actions: that point.
         settled_s: after the hand has come to rest; the target grows more certain meanwhile.
-        least_certainty: of the target, 0 to 1; a less certain one is no gesture.
+        min_certainty: of the target, 0 to 1; a less certain one is no gesture.
         latest_s: after the hand has come to rest; what grows certain later, or is seen again, is no gesture any more.
     """
 
     actions: tuple[str, ...] = ("pointing",)
     settled_s: float = 0.2
-    least_certainty: float = 0.3
+    min_certainty: float = 0.3
     latest_s: float = 3.0
 
 
@@ -52,7 +52,7 @@ class PointingEvents:
         if not (abs(place.x) < FARTHEST_M and abs(place.y) < FARTHEST_M):  # NaN is not below either
             return None
         sure = certainty((place.x_deviation, place.y_deviation, place.z_deviation))
-        if not sure >= options.least_certainty:
+        if not sure >= options.min_certainty:
             return None
         self._said = target.number
         gesture = Gesture(

@@ -2,8 +2,8 @@
 
 "A PHMM is trained for the last part of pointing movements. The recognition of the position is estimated as the most
 likely parameter of the PHMM over a recent time window of the elbow and wrist positions, which is recognized as pointing
-by simple thresholding." The threshold is on the probability that a genuine last part is so strange or stranger (thesis
-2.2.5), and reaching, which looks alike, competes.
+by simple thresholding." The threshold is on the p-value, the probability that a genuine last part has at least this
+outlier score (thesis 2.2.5), and reaching, which looks alike, competes.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ class Judgement:
 
     Attributes:
         theta: coordinates (u, v) on the table of the place that is pointed at, (2,). covariance: of these, (2, 2).
-        strangeness: how unlike the last part of a pointing movement.
-        typicality: probability that a genuine one is so strange or stranger.
+        outlier_score: how far it is from the last part of a pointing movement.
+        p_value: probability that a genuine one has at least this outlier score.
         log_density: of the window as pointing.
     """
 
     theta: Floats
     covariance: Floats
-    strangeness: float
-    typicality: float
+    outlier_score: float
+    p_value: float
     log_density: float
 
 
@@ -73,7 +73,7 @@ class LastPartModel:
         """Of points over time (FRAMES, 3 n), m, in the models' frame."""
         examined = self._pointing.examine(window)
         found = examined.estimate
-        return Judgement(found.theta, found.covariance, examined.strangeness, examined.typicality, examined.log_density)
+        return Judgement(found.theta, found.covariance, examined.outlier_score, examined.p_value, examined.log_density)
 
     def lead(self, window: Floats, judged: Judgement) -> float:
         """Logarithm of a window's density as pointing over that as reaching; infinite if reaching does not compete."""

@@ -62,7 +62,7 @@ class PointingSource:
         self._gestures = gestures
         self.topic = topics.ACTION_ESTIMATE if isinstance(gestures, PointingEvents) else topics.HUMAN_ARM_POSE
 
-    def hear(self, topic: Topic, message: Any) -> Iterator[tuple[Topic, Any]]:
+    def handle(self, topic: Topic, message: Any) -> Iterator[tuple[Topic, Any]]:
         """What a message makes known; nothing from messages of another topic than that listened to."""
         if topic.name != self.topic.name:
             return

@@ -25,15 +25,15 @@ from paramove.pointing.last_part_model import Judgement, LastPartModel
 
 LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 """Of the windows that are tried, over the mean duration of the demonstrated last parts."""
-LEAST_PERIOD_S = 0.03
+MIN_PERIOD_S = 0.03
 """A tracker may be faster; windows are not judged more often than this."""
 RESTARTED_S = 1.0
-"""A sample that is so much older than the newest is the first of a tracker that was started again."""
+"""A sample that is so much older than the latest is the first of a tracker that was started again."""
 
 
 @dataclass(frozen=True)
 class WindowBelief:
-    """What the newest window says.
+    """What the latest window says.
 
     Attributes:
         captured_ns: of its last sample.
@@ -53,7 +53,7 @@ class WindowBelief:
     @property
     def likeness(self) -> float:
         """0 of what is no pointing to 1 of what is as pointing usually is."""
-        return float(self.judgement.typicality**0.25) if self.pointing else 0.0
+        return float(self.judgement.p_value**0.25) if self.pointing else 0.0
 
 
 class PointingWindow:
@@ -64,7 +64,7 @@ class PointingWindow:
         placement: where the person sits, and how large the person is.
 
     Attributes:
-        belief: what the window that ends with the newest pose says; None if there is none without a gap.
+        belief: what the window that ends with the latest pose says; None if there is none without a gap.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class PointingWindow:
         self.belief = None
         if sample is None or (self._times_ns and captured_ns <= self._times_ns[-1]):
             return None
-        if self._times_ns and captured_ns - self._times_ns[-1] > self._options.most_gap_s * 1e9:
+        if self._times_ns and captured_ns - self._times_ns[-1] > self._options.max_gap_s * 1e9:
             self._times_ns.clear()
             self._samples.clear()
             self._best = None
@@ -105,14 +105,14 @@ class PointingWindow:
         while captured_ns - self._times_ns[1 if len(self._times_ns) > 1 else 0] > self._lengths_s[-1] * 1e9:
             self._times_ns.popleft()
             self._samples.popleft()
-        if captured_ns - self._judged_ns < LEAST_PERIOD_S * 1e9:
+        if captured_ns - self._judged_ns < MIN_PERIOD_S * 1e9:
             return None
         self._judged_ns = captured_ns
         self.belief = self._judged(captured_ns)
         return self._told(captured_ns, sample[-3:])
 
     def ball(self) -> SceneUpdate | None:
-        """A ball where the newest window points; green if it is like pointing, red if it is not (figure 16)."""
+        """A ball where the latest window points; green if it is like pointing, red if it is not (figure 16)."""
         if self.belief is None:
             return None
         message = SceneUpdate()
@@ -145,7 +145,7 @@ class PointingWindow:
         placed = self._placement.in_model(samples)
         windows = [at_times(np.linspace(-length, 0.0, FRAMES), times, placed) for length in lengths]
         judged = [self._model.judged(window) for window in windows]
-        chosen = int(np.argmin([one.strangeness for one in judged]))
+        chosen = int(np.argmin([one.outlier_score for one in judged]))
         best = judged[chosen]
         place = self._placement.in_world(table_place(best.theta))
         slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
@@ -155,9 +155,9 @@ class PointingWindow:
     def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
         options = self._options
         beside = np.maximum(-judged.theta, judged.theta - 1.0).max()
-        if judged.typicality < options.level or beside > options.margin:
+        if judged.p_value < options.level or beside > options.margin:
             return False
-        return self._model.lead(window, judged) >= options.least_lead
+        return self._model.lead(window, judged) >= options.min_lead
 
     def _told(self, now_ns: int, hand: Floats) -> Gesture | None:
         """The best window of this stay at a place once it is over."""
@@ -166,8 +166,8 @@ class PointingWindow:
                 return None
             self._said_at = None
         belief, best = self.belief, self._best
-        least = np.inf if best is None else best.judgement.strangeness
-        if belief is not None and belief.pointing and belief.judgement.strangeness < least:
+        minimum = np.inf if best is None else best.judgement.outlier_score
+        if belief is not None and belief.pointing and belief.judgement.outlier_score < minimum:
             self._best = best = belief
         if best is None or now_ns - best.captured_ns < self._options.settled_s * 1e9:
             return None
@@ -189,18 +189,18 @@ class PointingWindowOptions:
         points: of the arm, as `ArmPose` names them. ("elbow", "wrist") are the paper's; they do not tell pointing from
             reaching, which ("elbow", "wrist", "index") do.
         level: a window of which a genuine pointing is stranger with less probability than this is none.
-        least_lead: logarithm of how much denser the window is as pointing than as reaching, at least.
+        min_lead: logarithm of how much denser the window is as pointing than as reaching, at least.
         settled_s: no window has been more like pointing for so long: it is over.
-        most_gap_s: without samples, or without one of the points, nothing is known of what happened meanwhile.
+        max_gap_s: without samples, or without one of the points, nothing is known of what happened meanwhile.
         margin: how far beside the demonstrated places, as a share of their extent, a place may lie.
         apart_m: the hand must have been so far away from where it was before it points again.
     """
 
     points: tuple[str, ...] = ("elbow", "wrist", "index")
     level: float = 0.01
-    least_lead: float = 7.0
+    min_lead: float = 7.0
     settled_s: float = 0.12
-    most_gap_s: float = 0.25
+    max_gap_s: float = 0.25
     margin: float = 0.15
     apart_m: float = 0.12
 
@@ -208,6 +208,6 @@ class PointingWindowOptions:
         """Raises InputError for points and numbers that cannot be used."""
         if not 2 <= len(self.points) == len(set(self.points)):
             raise InputError(f"points: at least two different points of the arm expected, found {self.points}")
-        for name in ("level", "settled_s", "most_gap_s", "apart_m"):
+        for name in ("level", "settled_s", "max_gap_s", "apart_m"):
             if not 0.0 < getattr(self, name) < inf:
                 raise InputError(f"{name} is positive and finite, found {getattr(self, name)}")

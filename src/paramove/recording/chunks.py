@@ -20,7 +20,7 @@ MESSAGE_HEAD = struct.Struct("<HIQQ")
 RECORD_BYTES = 128 * 2**20
 """Of one record in a file, and of a chunk decompressed. Our chunks have 64 KiB, those of other writers some MiB."""
 ALWAYS_BYTES = 16 * 2**20
-MOST_RATIO = 100
+MAX_RATIO = 100
 """All chunks together may be so many times as large as their file; measured: 2 to 20."""
 WRONG = (McapError, ValueError, EOFError, struct.error, ZstdError, OverflowError, MemoryError, KeyError, RuntimeError)
 """What a record that is damaged makes its reader raise."""
@@ -28,12 +28,12 @@ WRONG = (McapError, ValueError, EOFError, struct.error, ZstdError, OverflowError
 
 def allowance(file_bytes: int) -> int:
     """Bytes to which all chunks of a file of that size may decompress together."""
-    return ALWAYS_BYTES + MOST_RATIO * file_bytes
+    return ALWAYS_BYTES + MAX_RATIO * file_bytes
 
 
-def whole(chunk: Chunk, most_bytes: int) -> bytes:
-    """What is in a chunk; raises one of WRONG if it is not what was written, or more than `most_bytes`."""
-    if chunk.uncompressed_size > min(most_bytes, RECORD_BYTES):
+def whole(chunk: Chunk, max_bytes: int) -> bytes:
+    """What is in a chunk; raises one of WRONG if it is not what was written, or more than `max_bytes`."""
+    if chunk.uncompressed_size > min(max_bytes, RECORD_BYTES):
         raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
     data = begin(chunk.compression, chunk.data, chunk.uncompressed_size + 1)
     if len(data) != chunk.uncompressed_size:
@@ -43,15 +43,15 @@ def whole(chunk: Chunk, most_bytes: int) -> bytes:
     return data
 
 
-def begin(compression: str, data: bytes, most_bytes: int) -> bytes:
+def begin(compression: str, data: bytes, max_bytes: int) -> bytes:
     """The first bytes of what was compressed, as many as `data` gives and are allowed; raises one of WRONG."""
     if compression == "zstd":
-        return bytes(ZstdDecompressor().stream_reader(data).read(most_bytes))
+        return bytes(ZstdDecompressor().stream_reader(data).read(max_bytes))
     if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=most_bytes))
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=max_bytes))
     if compression:
         raise ValueError(f"compressed with {compression}, which is not read")
-    return data[:most_bytes]
+    return data[:max_bytes]
 
 
 def records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Message]]:

@@ -93,7 +93,7 @@ class Survey:
         notes: Metadata, without those that the writer of recordings makes for itself.
         statistics: Of a file that was finished.
         finished: Whether the file ends as a finished one does.
-        indexed: What the index of the newest chunk has to say of each channel: log time and offset of its messages.
+        indexed: What the index of the latest chunk has to say of each channel: log time and offset of its messages.
         allowed: Bytes to which further chunks may decompress.
     """
 
@@ -276,7 +276,7 @@ def _records_at(content: Content, at: int) -> Iterator[tuple[int, Channel | Sche
         yield from records(_data_of(content, at, RECORD_BYTES), cut=end > len(content))
 
 
-def _data_of(content: Content, at: int, most_bytes: int) -> bytes:
+def _data_of(content: Content, at: int, max_bytes: int) -> bytes:
     """What is in the chunk at `at`; of one that is cut off, as much as its bytes that were written give."""
     end = at + HEAD_BYTES + _length(content, at)
     if min(end, len(content)) - at > RECORD_BYTES:
@@ -284,8 +284,8 @@ def _data_of(content: Content, at: int, most_bytes: int) -> bytes:
     missing = max(0, end - len(content))
     chunk = Chunk.read(ReadDataStream(BytesIO(content[at + HEAD_BYTES : end] + bytes(min(missing, 1)))))
     if not missing:
-        return whole(chunk, most_bytes)
-    return begin(chunk.compression, content[end - _data_bytes(content, at) :], min(most_bytes, RECORD_BYTES))
+        return whole(chunk, max_bytes)
+    return begin(chunk.compression, content[end - _data_bytes(content, at) :], min(max_bytes, RECORD_BYTES))
 
 
 def _data_bytes(content: Content, at: int) -> int:

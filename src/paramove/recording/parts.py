@@ -63,9 +63,9 @@ class PartedRecording:
         A latched value that a later part was told again is left out.
         """
         self.gaps = []
-        newest: dict[str, tuple[int, int]] = {}
+        latest: dict[str, tuple[int, int]] = {}
         for part in self.parts:
-            before, first = dict(newest), True
+            before, first = dict(latest), True
             for recorded in read(part, only):
                 said = (recorded.publish_ns, recorded.sequence)
                 if said <= before.get(recorded.topic, (-1, -1)):
@@ -73,7 +73,7 @@ class PartedRecording:
                 if before and first:
                     self.gaps.append(Gap(max(time_ns for time_ns, _ in before.values()), recorded.publish_ns))
                 first = False
-                newest[recorded.topic] = max(said, newest.get(recorded.topic, said))
+                latest[recorded.topic] = max(said, latest.get(recorded.topic, said))
                 yield recorded
 
 

@@ -46,7 +46,7 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
 
     Args:
         path: The file.
-        only: Names of topics; empty for all.
+        only: Names of topics; empty for all. A topic that was renamed has its present name.
         raising: Class of what is raised for a message that is none.
 
     Raises:
@@ -59,8 +59,9 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
     with path.open("rb") as file:
         for record in _records(file, path.stat().st_size):
             if isinstance(record, Channel):
-                if not only or record.topic in only:
-                    types[record.id], names[record.id] = topics.by_name(record.topic).type, record.topic
+                name = topics.OLD_NAMES.get(record.topic, record.topic)
+                if not only or name in only or record.topic in only:
+                    types[record.id], names[record.id] = topics.by_name(name).type, name
             elif isinstance(record, Message) and record.channel_id in types:
                 topic = names[record.channel_id]
                 yield Recorded(

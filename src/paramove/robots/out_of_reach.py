@@ -27,5 +27,5 @@ def describe_miss(names: tuple[str, ...], lower: Floats, upper: Floats, solution
     beyond = np.maximum(lower - long_enough, long_enough - upper)
     best = beyond.max(axis=-1).argmin()
     joint = int(beyond[best].argmax())
-    angle, least, most = np.rad2deg([long_enough[best, joint], lower[joint], upper[joint]])
-    return f"{names[joint]} would have to turn to {angle:.1f} deg, its range is {least:.1f} to {most:.1f} deg"
+    angle, minimum, maximum = np.rad2deg([long_enough[best, joint], lower[joint], upper[joint]])
+    return f"{names[joint]} would have to turn to {angle:.1f} deg, its range is {minimum:.1f} to {maximum:.1f} deg"

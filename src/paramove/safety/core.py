@@ -104,7 +104,7 @@ class SafetyCore:
             return None
         targets: Targets | None = None
         if inputs.word is not None:
-            targets = self._hear(now_ns, inputs.word, measured, inputs)
+            targets = self._handle_request(now_ns, inputs.word, measured, inputs)
         if self.state is State.ARMED:
             targets = self._armed(now_ns, measured, inputs)
         elif inputs.stop is not None:
@@ -160,7 +160,7 @@ class SafetyCore:
         self._disarm_after_stop = False
         self._accepted.clear()
 
-    def _hear(self, now_ns: int, word: ArmingRequest, measured: Measured, inputs: Inputs) -> Targets | None:
+    def _handle_request(self, now_ns: int, word: ArmingRequest, measured: Measured, inputs: Inputs) -> Targets | None:
         if word.captured_ns <= self._heard_ns:
             return None
         # One from the future must not silence those to come.

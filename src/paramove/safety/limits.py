@@ -99,7 +99,7 @@ class MotionLimits:
 
         Args:
             rows: Shape [N, J], rad, N >= 1.
-            before: The rows commanded just before, [B, J], newest last, B >= 1; what lies before them is taken as rest.
+            before: The rows commanded just before, [B, J], latest last, B >= 1; what lies before them is taken as rest.
             rest_at_end: Judge as if the last row were held after the end.
             stopping: Judge by what a controlled stop may use, with rest at the end.
         """
@@ -158,7 +158,7 @@ class MotionLimits:
         if not bad.any():
             return None
         row, joint = (int(i) for i in np.argwhere(bad)[0])
-        most = np.broadcast_to(limit, bad.shape)[row, joint]
-        low, high, most, asked = np.rad2deg([self.lower[joint], self.upper[joint], most, values[row, joint]])
+        maximum = np.broadcast_to(limit, bad.shape)[row, joint]
+        low, high, maximum, asked = np.rad2deg([self.lower[joint], self.upper[joint], maximum, values[row, joint]])
         texts = {"not_finite": "a finite number", "joint_limit": f"{low:.4g} to {high:.4g} deg"}
-        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{most:.4g} {unit}"), unit)
+        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{maximum:.4g} {unit}"), unit)

@@ -23,7 +23,7 @@ class EmergencyWatch:
         self._pressed = False
 
     def fault(self, now_ns: int, pressed: bool | None) -> Fault | None:
-        """Hear what the source says, None: nothing; the newest word stays until the next."""
+        """Hear what the source says, None: nothing; the latest word stays until the next."""
         if pressed is not None:
             self._heard_ns, self._pressed = now_ns, pressed
         self._heard_ns = min(self._heard_ns, now_ns)

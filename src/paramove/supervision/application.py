@@ -18,7 +18,7 @@ from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.supervision.run_folder import RunFolder
 from paramove.supervision.supervisor import Outcome, Supervisor, View
-from paramove.supervision.wiring import check_wiring, clock_speaker, read_interfaces
+from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
 from paramove.workspace import Workspace
 
 _log = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ def run(
         begun = datetime.datetime.now().astimezone()
         folder = RunFolder.create((runs or workspace.root / "runs").resolve(), begun)
         folder.write_effective(launch)
-        folder.write_configs(launch, domain.folder, domain.truth_folder, clock_speaker(interfaces))
+        folder.write_configs(launch, domain.folder, domain.truth_folder, clock_publisher(interfaces))
         facts = _facts(launch, workspace, domain.name, begun)
         folder.write_run(facts)
         supervisor = Supervisor(launch, workspace, folder, domain, make_view(folder))

@@ -14,24 +14,24 @@ from paramove.supervision.launch_file import Launch
 from paramove.supervision.wiring import on_bus
 
 MANY = 10
-"""A node that hears so many topics is a collector, such as the recorder: what it hears is counted, not drawn."""
+"""A node with so many subscriptions is a collector, such as the recorder: they are counted, not drawn."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A topic with all who say and hear it.
+    """A topic with all its publishers and subscribers.
 
     Attributes:
         topic: Name on the bus.
         rate_hz: Nominal or measured; None where messages come with events.
-        said_by: Nodes; none where nobody says what somebody hears.
-        heard_by: Nodes.
+        publishers: Nodes; none where a topic has subscribers only.
+        subscribers: Nodes.
     """
 
     topic: str
     rate_hz: float | None
-    said_by: tuple[str, ...]
-    heard_by: tuple[str, ...]
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
 
     @property
     def label(self) -> str:
@@ -47,65 +47,68 @@ class Graph:
         title: Name of the launch file, or of the domain.
         nodes: Name -> what it is: its module, or its state.
         edges: In the order of the topic table.
-        collectors: Nodes that hear nearly everything.
-        all_hear: Topics that go to every node, such as the clock.
+        collectors: Nodes that subscribe to nearly everything.
+        to_all: Topics that go to every node, such as the clock.
     """
 
     title: str
     nodes: Mapping[str, str]
     edges: tuple[Edge, ...]
     collectors: frozenset[str]
-    all_hear: frozenset[str] = frozenset()
+    to_all: frozenset[str] = frozenset()
 
-    def between(self, speaker: str, hearer: str) -> list[Edge]:
-        """What one node says and the other hears."""
-        return [edge for edge in self.edges if speaker in edge.said_by and hearer in edge.heard_by]
+    def between(self, publisher: str, subscriber: str) -> list[Edge]:
+        """Topics that one node publishes and the other subscribes to."""
+        return [edge for edge in self.edges if publisher in edge.publishers and subscriber in edge.subscribers]
 
     def only_collected(self, edge: Edge) -> bool:
-        """Whether nobody but collectors hears a topic."""
-        return self.collectors.issuperset(edge.heard_by)
+        """Whether only collectors subscribe to a topic."""
+        return self.collectors.issuperset(edge.subscribers)
 
     @property
-    def unsaid(self) -> list[Edge]:
-        """Topics that are heard and that nobody says."""
-        return [edge for edge in self.edges if not edge.said_by]
+    def unpublished(self) -> list[Edge]:
+        """Topics with subscribers and no publisher."""
+        return [edge for edge in self.edges if not edge.publishers]
 
 
 def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
     """Graph of a checked launch file; remaps are followed."""
-    said: dict[str, list[str]] = {}
-    heard: dict[str, list[str]] = {}
+    publishers: dict[str, list[str]] = {}
+    subscribers: dict[str, list[str]] = {}
     table: dict[str, Topic] = {}
     for name, interface in interfaces.items():
-        for there, side in ((said, interface.publishes), (heard, interface.subscribes)):
+        for there, side in ((publishers, interface.publishes), (subscribers, interface.subscribes)):
             for topic in side:
                 there.setdefault(on_bus(launch, name, topic), []).append(name)
                 table[on_bus(launch, name, topic)] = topic
     rates = {name: topic.rate_hz for name, topic in table.items()}
     modules = {name: launch.file.nodes[name].module for name in interfaces}
     title = " with ".join([launch.name, *([", ".join(launch.overlays)] if launch.overlays else [])])
-    all_hear = {CLOCK.name} if launch.file.bus.clock == "simulated" else set()
-    return _graph(title, modules, said, heard, rates, all_hear)
+    to_all = {CLOCK.name} if launch.file.bus.clock == "simulated" else set()
+    return _graph(title, modules, publishers, subscribers, rates, to_all)
 
 
 def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
     """Graph of the nodes on a bus, with rates measured for `seconds`; empty where nothing runs."""
-    said: dict[str, list[str]] = {}
-    heard: dict[str, list[str]] = {}
+    publishers: dict[str, list[str]] = {}
+    subscribers: dict[str, list[str]] = {}
     states: dict[str, str] = {}
     for node, status in inspection.statuses(folder, 2.0).items():
         states[node] = _state(status)
-        for there, counts in ((said, status.said if status else ()), (heard, status.heard if status else ())):
+        for there, counts in (
+            (publishers, status.published if status else ()),
+            (subscribers, status.received if status else ()),
+        ):
             for count in counts:
                 if not count.topic.startswith("status/"):
                     there.setdefault(count.topic, []).append(node)
     known = {topic.name: topic for topic in topics.TOPICS}
     measured = inspection.measure(
-        folder, [known[name] for name in said if name in known and not known[name].truth], seconds
+        folder, [known[name] for name in publishers if name in known and not known[name].truth], seconds
     )
     rates = {item.topic.name: item.rate_hz if item.topic.rate_hz else None for item in measured}
-    all_hear = {CLOCK.name} if CLOCK.name in said else set()
-    return _graph(f"domain {domain}", states, said, heard, rates, all_hear)
+    to_all = {CLOCK.name} if CLOCK.name in publishers else set()
+    return _graph(f"domain {domain}", states, publishers, subscribers, rates, to_all)
 
 
 def _state(status: Any) -> str:
@@ -117,26 +120,28 @@ def _state(status: Any) -> str:
 def _graph(
     title: str,
     nodes: Mapping[str, str],
-    said: Mapping[str, list[str]],
-    heard: Mapping[str, list[str]],
+    publishers: Mapping[str, list[str]],
+    subscribers: Mapping[str, list[str]],
     rates: Mapping[str, float | None],
-    all_hear: Iterable[str],
+    to_all: Iterable[str],
 ) -> Graph:
     order = {topic.name: index for index, topic in enumerate(topics.TOPICS)}
-    names = sorted({*said, *heard}, key=lambda name: (order.get(name, len(order)), name))
-    edges = tuple(Edge(name, rates.get(name), tuple(said.get(name, ())), tuple(heard.get(name, ()))) for name in names)
-    collectors = frozenset(node for node in nodes if sum(node in edge.heard_by for edge in edges) >= MANY)
-    # A collector hears the topics of every application; those that only it would hear here are of another one.
-    edges = tuple(edge for edge in edges if edge.said_by or not collectors.issuperset(edge.heard_by))
+    names = sorted({*publishers, *subscribers}, key=lambda name: (order.get(name, len(order)), name))
+    edges = tuple(
+        Edge(name, rates.get(name), tuple(publishers.get(name, ())), tuple(subscribers.get(name, ()))) for name in names
+    )
+    collectors = frozenset(node for node in nodes if sum(node in edge.subscribers for edge in edges) >= MANY)
+    # A collector subscribes to the topics of every application; those with no other subscriber are of another one.
+    edges = tuple(edge for edge in edges if edge.publishers or not collectors.issuperset(edge.subscribers))
     ordered = {node: nodes[node] for node in _flow(list(nodes), edges, collectors)}
-    return Graph(title, ordered, edges, collectors, frozenset(all_hear))
+    return Graph(title, ordered, edges, collectors, frozenset(to_all))
 
 
 def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -> list[str]:
     """Nodes ordered so that few topics go backwards (Eades, Lin and Smyth 1993), collectors last."""
-    world = [node for edge in edges if edge.topic == CLOCK.name for node in edge.said_by]
+    world = [node for edge in edges if edge.topic == CLOCK.name for node in edge.publishers]
     left = [node for node in nodes if node not in (*collectors, *world)]
-    to = {(a, b) for edge in edges for a in edge.said_by for b in edge.heard_by if a != b}
+    to = {(a, b) for edge in edges for a in edge.publishers for b in edge.subscribers if a != b}
     begin = world[:1]  # what keeps the time is where data comes from
     end: list[str] = []
     while left:
@@ -156,16 +161,16 @@ def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -
 
 
 def as_text(graph: Graph) -> str:
-    """Node by node: what it hears and from whom, what it says and to whom."""
+    """Node by node: topics that it subscribes to, with publishers; topics that it publishes, with subscribers."""
     lines = [f"{graph.title}: {len(graph.nodes)} nodes, {len(graph.edges)} topics"]
     width = max((len(edge.label) for edge in graph.edges), default=0)
     for node, about in graph.nodes.items():
         lines += ["", f"{node}  ({about})"]
-        lines += _numbered("hears", list(_heard(graph, node, width)))
-        lines += _numbered("says ", list(_said(graph, node, width)))
-    if graph.unsaid:
-        lines += ["", "Heard, but said by nobody:"]
-        lines += [f"  {edge.topic}  by {', '.join(_without(edge.heard_by, graph))}" for edge in graph.unsaid]
+        lines += _numbered("subscribes", list(_subscribed(graph, node, width)))
+        lines += _numbered("publishes ", list(_published(graph, node, width)))
+    if graph.unpublished:
+        lines += ["", "Subscribed, no publisher:"]
+        lines += [f"  {edge.topic}  by {', '.join(_without(edge.subscribers, graph))}" for edge in graph.unpublished]
     return "\n".join(lines) + "\n"
 
 
@@ -179,48 +184,48 @@ def _without(nodes: tuple[str, ...], graph: Graph) -> list[str]:
     return [node for node in nodes if node not in graph.collectors] or list(nodes)
 
 
-def _heard(graph: Graph, node: str, width: int) -> Iterator[str]:
-    heard = [edge for edge in graph.edges if node in edge.heard_by]
+def _subscribed(graph: Graph, node: str, width: int) -> Iterator[str]:
+    subscribers = [edge for edge in graph.edges if node in edge.subscribers]
     if node in graph.collectors:
-        yield f"{len(heard)} of {len(graph.edges)} topics"
+        yield f"{len(subscribers)} of {len(graph.edges)} topics"
         return
-    for edge in heard:
-        yield f"{edge.label:<{width}}  <- {', '.join(edge.said_by) or 'nobody (!)'}"
+    for edge in subscribers:
+        yield f"{edge.label:<{width}}  <- {', '.join(edge.publishers) or 'no publisher (!)'}"
 
 
-def _said(graph: Graph, node: str, width: int) -> Iterator[str]:
+def _published(graph: Graph, node: str, width: int) -> Iterator[str]:
     for edge in graph.edges:
-        if node in edge.said_by:
+        if node in edge.publishers:
             yield f"{edge.label:<{width}}  -> {_to(graph, edge)}"
 
 
 def _to(graph: Graph, edge: Edge) -> str:
-    if edge.topic in graph.all_hear:
+    if edge.topic in graph.to_all:
         return "all nodes"
-    return ", ".join(_without(edge.heard_by, graph)) or "nobody"
+    return ", ".join(_without(edge.subscribers, graph)) or "no subscriber"
 
 
 def as_mermaid(graph: Graph) -> str:
     """A `flowchart LR`; topics from one node to another share an arrow, collectors get one dotted arrow each."""
     lines = ["flowchart LR"]
     lines += [f'    {_id(node)}["{node}"]' for node in graph.nodes]
-    for speaker in graph.nodes:
-        for hearer in graph.nodes:
-            edges = graph.between(speaker, hearer)
+    for publisher in graph.nodes:
+        for subscriber in graph.nodes:
+            edges = graph.between(publisher, subscriber)
             if not edges:
                 continue
-            if hearer in graph.collectors:
+            if subscriber in graph.collectors:
                 edges = [edge for edge in edges if graph.only_collected(edge)]
             if edges:
-                arrow = "-.->" if hearer in graph.collectors else "-->"
+                arrow = "-.->" if subscriber in graph.collectors else "-->"
                 label = "<br/>".join(edge.label for edge in edges)
-                lines.append(f'    {_id(speaker)} {arrow}|"{label}"| {_id(hearer)}')
-    for edge in graph.unsaid:
+                lines.append(f'    {_id(publisher)} {arrow}|"{label}"| {_id(subscriber)}')
+    for edge in graph.unpublished:
         ghost = _id(f"nobody_{edge.topic}")
-        lines.append(f'    {ghost}(["{edge.topic}: said by nobody"]):::unsaid')
-        lines += [f"    {ghost} -.-> {_id(hearer)}" for hearer in _without(edge.heard_by, graph)]
+        lines.append(f'    {ghost}(["{edge.topic}: no publisher"]):::unsaid')
+        lines += [f"    {ghost} -.-> {_id(subscriber)}" for subscriber in _without(edge.subscribers, graph)]
     lines += [f"    {_id(node)}:::collector" for node in graph.collectors]
-    if graph.unsaid:
+    if graph.unpublished:
         lines.append("    classDef unsaid stroke:#c00,color:#c00,stroke-dasharray:4 3")
     if graph.collectors:
         lines.append("    classDef collector stroke-dasharray:4 3")

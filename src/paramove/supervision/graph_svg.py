@@ -16,7 +16,7 @@ from paramove.supervision.graph import Edge, Graph
 LETTER_PX = 6.4
 """Width of a letter of the sans-serif at 11 px, on the wide side."""
 LINE_PX, PAD_PX, BOX_PX, MARGIN_PX, TITLE_PX = 14.0, 9.0, 34.0, 16.0, 40.0
-NOBODY = "said by nobody"
+NO_PUBLISHER = "no publisher"
 
 _STYLE = """
     text { font: 11px "DejaVu Sans", Verdana, sans-serif; fill: #1f2933; }
@@ -60,8 +60,8 @@ def as_svg(graph: Graph) -> str:
     width = chart.left.get(last, 300.0) + chart.width.get(last, 0.0) + MARGIN_PX
     height = chart.top.get(last, TITLE_PX) + chart.height.get(last, 0.0) + MARGIN_PX + LINE_PX
     body = [*_lines(chart), *_labels(chart), *_boxes(chart)]
-    remark = "right and down: onwards; left and up (brown): back; dashed: collected, or said by nobody (red)"
-    remark += "".join(f"; {escape(topic)}: to all nodes" for topic in sorted(graph.all_hear))
+    remark = "right and down: onwards; left and up (brown): back; dashed: collected, or without publisher (red)"
+    remark += "".join(f"; {escape(topic)}: to all nodes" for topic in sorted(graph.to_all))
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
@@ -79,17 +79,17 @@ def as_svg(graph: Graph) -> str:
 
 
 def _laid_out(graph: Graph) -> _Chart:
-    names = [*([NOBODY] if graph.unsaid else []), *graph.nodes]
+    names = [*([NO_PUBLISHER] if graph.unpublished else []), *graph.nodes]
     chart = _Chart(graph, names)
-    for speaker in names:
-        for hearer in names:
-            found = _written(graph, speaker, hearer)
-            if found and speaker != hearer:
-                chart.cells[speaker, hearer] = found
+    for publisher in names:
+        for subscriber in names:
+            found = _written(graph, publisher, subscriber)
+            if found and publisher != subscriber:
+                chart.cells[publisher, subscriber] = found
     x, y = MARGIN_PX, TITLE_PX
     for name in names:
-        column = [line for (_, hearer), lines in chart.cells.items() if hearer == name for line in lines]
-        row = [len(lines) for (speaker, _), lines in chart.cells.items() if speaker == name]
+        column = [line for (_, subscriber), lines in chart.cells.items() if subscriber == name for line in lines]
+        row = [len(lines) for (publisher, _), lines in chart.cells.items() if publisher == name]
         chart.left[name], chart.top[name] = x, y
         chart.width[name] = LETTER_PX * max(1.25 * len(name), *map(len, column), 8) + 2 * PAD_PX
         chart.height[name] = max(BOX_PX, LINE_PX * max(row, default=0)) + 2 * PAD_PX
@@ -98,14 +98,18 @@ def _laid_out(graph: Graph) -> _Chart:
     return chart
 
 
-def _written(graph: Graph, speaker: str, hearer: str) -> list[str]:
+def _written(graph: Graph, publisher: str, subscriber: str) -> list[str]:
     """What stands in a cell."""
-    if speaker == NOBODY:
-        return [edge.label for edge in graph.unsaid if hearer in edge.heard_by and hearer not in graph.collectors]
-    if hearer == NOBODY:
+    if publisher == NO_PUBLISHER:
+        return [
+            edge.label
+            for edge in graph.unpublished
+            if subscriber in edge.subscribers and subscriber not in graph.collectors
+        ]
+    if subscriber == NO_PUBLISHER:
         return []
-    edges = graph.between(speaker, hearer)
-    if hearer not in graph.collectors:
+    edges = graph.between(publisher, subscriber)
+    if subscriber not in graph.collectors:
         return [edge.label for edge in edges]
     only: list[Edge] = [edge for edge in edges if graph.only_collected(edge)]
     more = len(edges) - len(only)
@@ -113,32 +117,32 @@ def _written(graph: Graph, speaker: str, hearer: str) -> list[str]:
     return [edge.label for edge in only] + ([rest] if more else [])
 
 
-def _kind(chart: _Chart, speaker: str, hearer: str) -> str:
-    if speaker == NOBODY:
+def _kind(chart: _Chart, publisher: str, subscriber: str) -> str:
+    if publisher == NO_PUBLISHER:
         return "line unsaid"
-    if hearer in chart.graph.collectors:
+    if subscriber in chart.graph.collectors:
         return "line collected"
-    return "line back" if chart.names.index(hearer) < chart.names.index(speaker) else "line"
+    return "line back" if chart.names.index(subscriber) < chart.names.index(publisher) else "line"
 
 
 def _lines(chart: _Chart) -> Iterator[str]:
     """From the side of one box along its row, then along the column of the other to its upper or lower edge."""
-    for speaker, hearer in sorted(chart.cells, key=lambda cell: cell[1] not in chart.graph.collectors):
-        from_x, from_y = chart.middle(speaker)
-        to_x, to_y = chart.middle(hearer)
+    for publisher, subscriber in sorted(chart.cells, key=lambda cell: cell[1] not in chart.graph.collectors):
+        from_x, from_y = chart.middle(publisher)
+        to_x, to_y = chart.middle(subscriber)
         onwards = to_x > from_x
-        start = from_x + (1 if onwards else -1) * (chart.width[speaker] / 2 - PAD_PX / 2)
+        start = from_x + (1 if onwards else -1) * (chart.width[publisher] / 2 - PAD_PX / 2)
         end = to_y - (1 if onwards else -1) * (BOX_PX / 2 + 1)
         yield (
-            f'<path class="{_kind(chart, speaker, hearer)}" marker-end="url(#tip)" '
+            f'<path class="{_kind(chart, publisher, subscriber)}" marker-end="url(#tip)" '
             f'd="M{start:.1f} {from_y:.1f} H{to_x:.1f} V{end:.1f}"/>'
         )
 
 
 def _labels(chart: _Chart) -> Iterator[str]:
-    for (speaker, hearer), lines in chart.cells.items():
-        x, _ = chart.middle(hearer)
-        _, y = chart.middle(speaker)
+    for (publisher, subscriber), lines in chart.cells.items():
+        x, _ = chart.middle(subscriber)
+        _, y = chart.middle(publisher)
         wide = LETTER_PX * max(map(len, lines)) + 4
         high = LINE_PX * len(lines)
         yield (
@@ -156,7 +160,7 @@ def _boxes(chart: _Chart) -> Iterator[str]:
     for name in chart.names:
         x, y = chart.middle(name)
         wide = chart.width[name] - PAD_PX
-        kind = "nobody" if name == NOBODY else "collector" if name in chart.graph.collectors else "box"
+        kind = "nobody" if name == NO_PUBLISHER else "collector" if name in chart.graph.collectors else "box"
         yield (
             f'<rect class="{kind}" x="{x - wide / 2:.1f}" y="{y - BOX_PX / 2:.1f}" width="{wide:.1f}" '
             f'height="{BOX_PX}" rx="6"/>'

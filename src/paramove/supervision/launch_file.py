@@ -11,6 +11,7 @@ from typing import get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from paramove.bus import topics
 from paramove.documents import (
     MAX_CHARACTERS,
     Document,
@@ -76,7 +77,8 @@ def load(
     """
     path = _typed(workspace, (_FOLDER,), name, "launch file")
     document, chosen = _with_overlays(workspace, path.stem, _read(path), overlays)
-    document, findings = with_values(document, settings, seed, headless, overlays is not None)
+    given = [topics.present_names(setting) for setting in settings]
+    document, findings = with_values(document, given, seed, headless, overlays is not None)
     try:
         file = validated(document)
     except DocumentError as error:
@@ -176,10 +178,10 @@ def _typed(workspace: Workspace, folders: Sequence[Path], name: str, kind: str) 
 
 def _read(path: Path) -> Document:
     try:
-        text = read_text(path, "launch file", most_bytes=4 * MAX_CHARACTERS)
+        text = read_text(path, "launch file", max_bytes=4 * MAX_CHARACTERS)
     except InputError as error:
         raise DocumentError(Position(str(path)), str(error).removeprefix(f"{path}: ")) from error
-    return read_mapping(text, str(path))
+    return read_mapping(topics.present_names(text), str(path))
 
 
 def _finding(document: Document, details: ErrorDetails) -> DocumentError:

@@ -29,7 +29,7 @@ class StatusSubscriber:
         self._exchange = Exchange("supervisor", BusSettings(folder=folder))
         self._topics = [topics.SPEECH, topics.APPLICATION_STAGE, *map(topics.status, nodes)]
         for topic in self._topics:
-            self._exchange.hear(topic)
+            self._exchange.subscribe(topic)
         self._on_status = on_status
         self._on_story = on_story
         self._told = ""

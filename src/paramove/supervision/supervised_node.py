@@ -131,7 +131,7 @@ class SupervisedNode:
         self.pid = self.process.pid
         self._become(State.STARTING, f"pid {self.process.pid}", "started")
 
-    def hear(self, status: NodeStatus) -> None:
+    def handle(self, status: NodeStatus) -> None:
         """Takes in what the node says of itself; words of an earlier process are passed over."""
         if self.process is None or status.pid != self.process.pid:
             return

@@ -94,7 +94,7 @@ class Supervisor:
         self.nodes = {
             name: SupervisedNode(name, node, self._spawn_node, self._changed) for name, node in self._file.nodes.items()
         }
-        self._listener_folder = domain.folder
+        self._status_folder = domain.folder
         self._environment = node_environment(os.environ, workspace)
         self._ending = False
 
@@ -103,8 +103,8 @@ class Supervisor:
 
         An interrupted run is not judged: `after_run` is left out.
         """
-        listener = StatusSubscriber(self._listener_folder, self.nodes, self._hear, self._view.story)
-        control = ControlServer(self._listener_folder, self._by_hand)
+        statuses = StatusSubscriber(self._status_folder, self.nodes, self._handle_status, self._view.story)
+        control = ControlServer(self._status_folder, self._by_hand)
         with (
             EventLog(self._folder.events) as self._events,
             Guard() as self._guard,
@@ -113,12 +113,12 @@ class Supervisor:
         ):
             self._events.write("run_begins", pid=os.getpid())
             try:
-                outcome = self._supervise(listener)
+                outcome = self._supervise(statuses)
                 self._events.write("run_stops", sentence=outcome.reason, exit_code=outcome.code)
-                self._stop_all(listener)
+                self._stop_all(statuses)
             finally:
                 self._kill_all()
-                listener.close()
+                statuses.close()
                 self._view.close()
             if self._file.after_run and self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
                 outcome = self._judge(self._file.after_run, outcome)
@@ -142,12 +142,12 @@ class Supervisor:
         )
         self._view.changed(node)
 
-    def _supervise(self, listener: StatusSubscriber) -> Outcome:
+    def _supervise(self, statuses: StatusSubscriber) -> Outcome:
         """Runs until something ends the run; the reason is the outcome."""
         limit_s = time.monotonic() + (self._file.time_limit_s or float("inf"))
         while True:
             self._start_due()
-            for node, code in self._turn(listener):
+            for node, code in self._turn(statuses):
                 node.conclude(code, time.monotonic())
                 if node.state is State.GIVEN_UP and node.event == "ended":
                     self._show_log(node)
@@ -160,7 +160,7 @@ class Supervisor:
             if node.state is State.WAITING and all(self.nodes[other].is_up for other in node.settings.after):
                 node.start(time.monotonic())
 
-    def _turn(self, listener: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
+    def _turn(self, statuses: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
         """Waits up to `TURN_S` for an end, a stop (SIGSTOP) or a signal, and listens.
 
         Returns the nodes that have just ended, with exit codes.
@@ -176,7 +176,7 @@ class Supervisor:
             _drain(self._interrupts.wake_fd)
         self._refuse_suspension()
         self._control.serve()
-        listener.listen()
+        statuses.listen()
         now_s = time.monotonic()
         checked = [(node, node.check(now_s)) for node in self.nodes.values()]
         self._view.refresh(self.nodes.values())
@@ -216,7 +216,7 @@ class Supervisor:
         waiting = [node for node in self.nodes.values() if node.state is State.WAITING]
         return [node.name for node in waiting if given_up.intersection(node.settings.after)]
 
-    def _stop_all(self, listener: StatusSubscriber) -> None:
+    def _stop_all(self, statuses: StatusSubscriber) -> None:
         self._ending = True
         end_s = time.monotonic() + STOP_ALL_S
         for node in self.nodes.values():
@@ -233,7 +233,7 @@ class Supervisor:
                 elif time.monotonic() > wave_end_s:
                     for name in wave:
                         self.nodes[name].kill()
-                for node, code in self._turn(listener):
+                for node, code in self._turn(statuses):
                     if node.state is not State.STOPPING:  # ended by itself while others were being stopped
                         self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was asked to end")
                     node.stopped(code, time.monotonic() - begun_s)
@@ -276,9 +276,9 @@ class Supervisor:
         process.prioritise(NICE[self._file.nodes[name].priority])
         return process
 
-    def _hear(self, status: NodeStatus) -> None:
+    def _handle_status(self, status: NodeStatus) -> None:
         if status.node in self.nodes:
-            self.nodes[status.node].hear(status)
+            self.nodes[status.node].handle(status)
 
     def _show_log(self, node: SupervisedNode) -> None:
         path = self._folder.log(node.name)

@@ -146,7 +146,7 @@ class _Gauge:
         if node.status.processed != self._processed:
             self._rate_hz = (node.status.processed - self._processed) / max(now_s - self._read_s, 1e-3)
             self._processed, self._read_s = node.status.processed, now_s
-        self._lost = sum(count.lost for count in node.status.heard)
+        self._lost = sum(count.lost for count in node.status.received)
         try:
             if self._process is None:
                 self._process = psutil.Process(self._pid)

@@ -38,8 +38,8 @@ def read_interfaces(launch: Launch, workspace: Workspace) -> dict[str, Interface
 def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace) -> None:
     """Checks topics, parameters and access to ground truth.
 
-    Every topic that is heard has a speaker, no topic has two, only nodes with `truth: true` know a truth topic, topics
-    that the file names exist, and each node's own Config takes its parameters.
+    Every topic with a subscriber has a publisher, no topic has two, only nodes with `truth: true` know a truth topic,
+    topics that the file names exist, and each node's own Config takes its parameters.
 
     Raises DocumentError with all that is wrong, each at its place in the launch file.
     """
@@ -49,13 +49,13 @@ def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace:
 def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     """What is wrong with the clock and the topics."""
     yield from _clock(launch, interfaces)
-    yield from _speakers(launch, interfaces)
-    yield from _hearers(launch, interfaces)
+    yield from _publishers(launch, interfaces)
+    yield from _subscribers(launch, interfaces)
     yield from _named_topics(launch, interfaces)
 
 
-def clock_speaker(interfaces: Mapping[str, Interface]) -> str | None:
-    """Node that says the clock; None where there is none."""
+def clock_publisher(interfaces: Mapping[str, Interface]) -> str | None:
+    """Node that publishes the clock; None where there is none."""
     return next((name for name, interface in interfaces.items() if CLOCK in interface.publishes), None)
 
 
@@ -64,49 +64,49 @@ def on_bus(launch: Launch, node: str, topic: Topic) -> str:
     return launch.file.nodes[node].remaps.get(topic.name, topic.name)
 
 
-def unsaid(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
-    """Each node with a topic that it hears and that no node says; status topics come from every node."""
-    said = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
+def unpublished(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[tuple[str, Topic]]:
+    """Each node with a topic that it subscribes to and that no node publishes; status topics come from every node."""
+    published = {on_bus(launch, name, topic) for name, interface in interfaces.items() for topic in interface.publishes}
     for name, interface in interfaces.items():
         for topic in interface.subscribes:
-            heard = on_bus(launch, name, topic)
-            if heard not in said and not heard.startswith("status/"):
+            subscribed = on_bus(launch, name, topic)
+            if subscribed not in published and not subscribed.startswith("status/"):
                 yield name, topic
 
 
 def _clock(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     bus = launch.file.bus
-    if bus.clock == "simulated" and clock_speaker(interfaces) is None:
-        yield launch.error(("bus", "clock"), "the clock is simulated, but no node of this launch file says it")
+    if bus.clock == "simulated" and clock_publisher(interfaces) is None:
+        yield launch.error(("bus", "clock"), "the clock is simulated, but no node of this launch file publishes it")
     if bus.lockstep and bus.clock != "simulated":
         yield launch.error(("bus", "lockstep"), "lockstep needs 'clock: simulated'")
 
 
-def _speakers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
-    speakers: dict[str, str] = {}
+def _publishers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+    publishers: dict[str, str] = {}
     for name, interface in interfaces.items():
         for topic in interface.publishes:
-            said = on_bus(launch, name, topic)
-            other = speakers.setdefault(said, name)
+            published = on_bus(launch, name, topic)
+            other = publishers.setdefault(published, name)
             if other != name:
                 yield launch.error(
                     ("nodes", name),
-                    f"'{name}' and '{other}' both say {said}; a topic has one speaker (remap one of them)",
+                    f"'{name}' and '{other}' both publish {published}; a topic has one publisher (remap one of them)",
                 )
 
 
-def _hearers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
+def _subscribers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
     for name, interface in interfaces.items():
         for topic in (*interface.subscribes, *interface.publishes):
             if topic.truth and not launch.file.nodes[name].truth:
                 yield launch.error(("nodes", name), f"'{name}' uses {topic.name} but has no 'truth: true'")
-    for name, topic in unsaid(launch, interfaces):
+    for name, topic in unpublished(launch, interfaces):
         optional = launch.file.nodes[name].optional_topics
         if topic.name not in optional and "*" not in optional:
             yield launch.error(
                 ("nodes", name),
-                f"'{name}' hears {on_bus(launch, name, topic)}, which no node of this launch file says; "
-                "add its speaker, or name it in 'optional_topics' of the node",
+                f"'{name}' subscribes to {on_bus(launch, name, topic)}, which no node of this launch file publishes; "
+                "add its publisher, or name it in 'optional_topics' of the node",
             )
 
 

@@ -20,7 +20,7 @@ FRAMES = 100
 def distance_between(first: ParametricHMM, second: ParametricHMM) -> dict[str, float]:
     """How far apart the movements of two models are: over a raster of the theta that both were trained for.
 
-    Root mean square over body points, frames and theta, and the greatest distance of a body point, m.
+    Root mean square over body points, frames and theta, and the largest distance of a body point, m.
 
     Raises InputError if they have other points or parameters, or no theta in common.
     """

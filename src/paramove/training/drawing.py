@@ -67,7 +67,7 @@ def dimension(model: ParametricHMM) -> int:
 
 
 def bounds(model: ParametricHMM) -> Floats:
-    """Least and greatest theta of the training. Shape (2, P). Raises InputError for a model without."""
+    """Minimum and maximum theta of the training. Shape (2, P). Raises InputError for a model without."""
     if model.parameter_bounds_ is None:
         raise InputError("this model is not trained yet")
     return model.parameter_bounds_

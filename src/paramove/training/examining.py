@@ -10,14 +10,14 @@ import numpy as np
 from scipy.stats import chi2
 
 from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_frame, mirrored, resampled
-from paramove.documents import Floats, InputError
+from paramove.documents import Floats, InputError, renamed_attribute
 from paramove.phmm import MovementClassifier, MovementDescription, ParameterEstimate, ParametricHMM
 from paramove.training.drawing import bounds, parameter_names
 from paramove.training.kinds import kind_of
 from paramove.training.leaving_out import REGION, covers
 
-LEAST_TYPICALITY = 0.01
-"""A movement less typical than this is taken for none of the known ones."""
+SIGNIFICANCE_LEVEL = 0.01
+"""A movement with a smaller p-value is rejected as none of the known actions."""
 UNKNOWN_FRAMES = ("", "laboratory", "unspecified")
 """Names of frames that files of motion capture get, which say nothing."""
 
@@ -29,11 +29,11 @@ class Recognition:
     Attributes:
         movement: as it was asked, in the frame and at the rate of the models.
         action: the most probable one.
-        known: whether the movement is typical enough to be any of the known actions.
+        known: whether the movement is one of the known actions, by its p-value.
         posterior: probability of each action.
         estimate: of the action's parameters.
         parameter_names: of the components of theta.
-        typicality: probability that a genuine movement is so strange or stranger; None if the model cannot tell.
+        p_value: probability that a genuine movement has at least this outlier score; None from models that have none.
         outside: names of the parameters that are estimated outside the bounds of the training.
         labelled: theta of the label, as far as the model has its parameters; None without a label.
     """
@@ -44,9 +44,11 @@ class Recognition:
     posterior: dict[str, float]
     estimate: ParameterEstimate
     parameter_names: tuple[str, ...]
-    typicality: float | None
+    p_value: float | None
     outside: tuple[str, ...]
     labelled: Floats | None
+
+    typicality = renamed_attribute("typicality", "p_value")
 
     @property
     def half_widths(self) -> Floats:
@@ -67,7 +69,8 @@ class Recognition:
             "theta_region_95": dict(zip(self.parameter_names, self.half_widths.tolist(), strict=True)),
             "theta_covariance": self.estimate.covariance.tolist(),
             "theta_outside_bounds": list(self.outside),
-            "typicality": self.typicality,
+            "p_value": self.p_value,
+            "typicality": self.p_value,  # as it was called before; the next release has p_value only
             "log_likelihood": self.estimate.log_likelihood,
         }
         if self.movement.action:
@@ -130,43 +133,41 @@ class Examiner:
             found = self._classified(asked, finished)
         except ValueError as error:
             raise DemonstrationError(f"{movement.source}: {error}") from error
-        action, posterior, estimate, typicality = found
+        action, posterior, estimate, p_value = found
         model = self.models[action]
         names = parameter_names(model)
         low, high = bounds(model)
         outside = tuple(
             name
-            for name, value, least, most in zip(names, estimate.theta, low, high, strict=True)
-            if not least <= value <= most
+            for name, value, minimum, maximum in zip(names, estimate.theta, low, high, strict=True)
+            if not minimum <= value <= maximum
         )
-        known = typicality is None or typicality >= LEAST_TYPICALITY
-        return Recognition(
-            asked, action, known, posterior, estimate, names, typicality, outside, _labelled(asked, names)
-        )
+        known = p_value is None or p_value >= SIGNIFICANCE_LEVEL
+        return Recognition(asked, action, known, posterior, estimate, names, p_value, outside, _labelled(asked, names))
 
     def _classified(
         self, asked: Movement, finished: bool
     ) -> tuple[str, dict[str, float], ParameterEstimate, float | None]:
-        knows = {action: tells_typical(model) for action, model in self.models.items()}
+        knows = {action: has_p_values(model) for action, model in self.models.items()}
         if len(self.models) == 1 and not finished:  # no other action whose beginning it could be
             ((action, model),) = self.models.items()
             if not knows[action]:
                 return action, {action: 1.0}, model.estimate(asked.frames, finished=False), None
             seen = model.examine(asked.frames, finished=False)  # type: ignore[attr-defined]
-            return action, {action: 1.0}, seen.estimate, seen.typicality
+            return action, {action: 1.0}, seen.estimate, seen.p_value
         found = self.classifier.classify(asked.frames, finished=finished)
-        typicality = found.typicality if knows[found.action] else None
-        return found.action, found.posterior, found.estimates[found.action], typicality
+        p_value = found.p_value if knows[found.action] else None
+        return found.action, found.posterior, found.estimates[found.action], p_value
 
 
-def tells_typical(model: ParametricHMM) -> bool:
-    """Whether a model knows how performances vary, and so which movements are untypical."""
+def has_p_values(model: ParametricHMM) -> bool:
+    """Whether a model knows how demonstrations vary, and so which movements are outliers."""
     return getattr(model, "performances_", None) is not None
 
 
 def _scored_by(model: ParametricHMM) -> tuple[object, ...]:
     """What has to be the same for the scores of two models to be comparable."""
-    return ("typicality",) if tells_typical(model) else (model.n_states, model.resampled_frames)
+    return ("p_value",) if has_p_values(model) else (model.n_states, model.resampled_frames)
 
 
 def percent(share: float) -> str:

@@ -51,12 +51,12 @@ def untrained(
     mean = frames / n_states
     if mean < 1.0:
         raise ValueError(f"{frames} frames are fewer than {n_states} states: give more --frames or fewer --states")
-    least = d_min if d_min is not None else max(1, math.floor(mean) - 1)
-    most = d_max if d_max is not None else math.ceil(mean) + 1
-    if not least <= mean <= most:
+    minimum = d_min if d_min is not None else max(1, math.floor(mean) - 1)
+    maximum = d_max if d_max is not None else math.ceil(mean) + 1
+    if not minimum <= mean <= maximum:
         raise ValueError(
-            f"{frames} frames in {n_states} states are {mean:g} a state, but d_min is {least} and d_max is {most}: "
-            "the mean lies between them"
+            f"{frames} frames in {n_states} states are {mean:g} a state, but d_min is {minimum} and d_max is "
+            f"{maximum}: the mean lies between them"
         )
     kind_class: Any = getattr(phmm, CLASSES[kind])
     more: dict[str, Any] = {} if residuals is None else {"residuals": residuals}
@@ -64,7 +64,9 @@ def untrained(
         raise ValueError(f"a model '{kind}' has no choice of residuals; linear, quadratic and cubic ones have")
     if floor_deviation:
         more["options"] = TrainingOptions(floor_deviation=floor_deviation)
-    made: ParametricHMM = kind_class(n_states, least, most, resampled_frames=frames, description=description, **more)
+    made: ParametricHMM = kind_class(
+        n_states, minimum, maximum, resampled_frames=frames, description=description, **more
+    )
     return made
 
 

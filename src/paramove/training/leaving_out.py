@@ -18,7 +18,7 @@ from paramove.training.examples import Examples, is_place
 
 LeftOutBy = Literal["theta", "subject", "repetition"]
 
-MOST_FOLDS = 10
+MAX_FOLDS = 10
 HULL_DIMENSIONS = 4
 FRAMES = 100
 """Movements are compared at so many frames."""
@@ -137,7 +137,7 @@ def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
     else:
         names = examples.subjects if by == "subject" else None
         groups = groups_of(names, examples.theta).tolist()
-    count = min(MOST_FOLDS, len(set(groups)))
+    count = min(MAX_FOLDS, len(set(groups)))
     return [[one for one, group in enumerate(groups) if group % count == fold] for fold in range(count)]
 
 

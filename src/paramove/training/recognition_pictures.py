@@ -24,7 +24,7 @@ from paramove.training.drawing import (
     space_axes,
     with_unit,
 )
-from paramove.training.examining import LEAST_TYPICALITY, Recognition, confusion, percent
+from paramove.training.examining import SIGNIFICANCE_LEVEL, Recognition, confusion, percent
 
 
 def plot_recognition(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:
@@ -63,7 +63,7 @@ def _plot_many(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]
     figure = new_figure(13.0, 5.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.4, 1.0])
     _plane(left, models, found)
-    left.set_title("theta with 95 % regions; crosses: labels; red: not typical", fontsize=10)
+    left.set_title("theta with 95 % regions; crosses: labels; red: rejected", fontsize=10)
     if len(table) > 1:
         _matrix(right, table, [*models, "none"])
     else:
@@ -125,11 +125,11 @@ def _posterior(axes: Axes, found: Recognition) -> None:
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.set(xlim=(0, 100), xlabel="probability, %")
     axes.invert_yaxis()
-    if found.typicality is None:
-        told, colour = "this model cannot tell how typical it is", INK
+    if found.p_value is None:
+        told, colour = "no p-value from this model", INK
     else:
-        told = f"typicality {percent(found.typicality)}" + ("" if found.known else ": none of the known")
-        colour = INK if found.typicality >= LEAST_TYPICALITY else WARN
+        told = f"p-value {percent(found.p_value)}" + ("" if found.known else ": none of the known")
+        colour = INK if found.p_value >= SIGNIFICANCE_LEVEL else WARN
     axes.set_title(told, fontsize=10, color=colour)
 
 

@@ -123,13 +123,13 @@ def jogged(monkeypatch, arm, first):
     read, write = os.pipe()
     arm.write = lambda text: os.write(write, text.encode())
     os.write(write, first.encode())
-    hear = Jogging.hear_status
+    handle = Jogging.handle_status
 
     def hear_and_press(jogging, message):
-        hear(jogging, message)
+        handle(jogging, message)
         arm.seen()
 
-    monkeypatch.setattr(Jogging, "hear_status", hear_and_press)
+    monkeypatch.setattr(Jogging, "handle_status", hear_and_press)
     with os.fdopen(read) as source:
         monkeypatch.setattr("paramove.cli.arm.jog.TerminalPerson", lambda: TerminalPerson(source))
         done = CliRunner().invoke(build("arm"), ["arm", "jog", "--step", "3"])

@@ -43,8 +43,8 @@ def hands(emulator: DynamixelEmulator) -> list[Step]:
         return act
 
     def share(part: float) -> dict[str, float]:
-        most = NEARLY_HALF_A_TURN
-        ends = {one.joint: (max(one.lower, -most), min(one.upper, most)) for one in PLAN.servos}
+        maximum = NEARLY_HALF_A_TURN
+        ends = {one.joint: (max(one.lower, -maximum), min(one.upper, maximum)) for one in PLAN.servos}
         return {joint: low + part * (high - low) for joint, (low, high) in ends.items()}
 
     steps: list[Step] = [(rest, "\n")]

@@ -38,7 +38,7 @@ class RobotBus:
         self.robot = FakeRobot()
         self.operator = Operator(arms_at_start=True)
         self.pending: list[tuple[Topic, Any]] = []
-        self.said: list[tuple[Topic, Any]] = []
+        self.published: list[tuple[Topic, Any]] = []
 
     def ready(self, sentence: str) -> None:
         assert sentence
@@ -46,7 +46,7 @@ class RobotBus:
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         assert topic in arm_driver.PUBLISHES
         assert isinstance(message, topic.type)
-        self.said.append((topic, message))
+        self.published.append((topic, message))
         if topic is topics.WIRE_HOAP3_STREAM:
             assert self.robot.reader.offer(message), self.robot.reader.refusal
         if topic is topics.ARM_SAFETY and (word := self.operator.update(message, self.now_ns)):
@@ -72,18 +72,18 @@ def test_operator_arms_and_the_driver_plays_a_trajectory(monkeypatch: Any) -> No
     monkeypatch.chdir(WORKSPACE)
     bus = RobotBus(by_person=True)
     arm_driver.run(bus, arm_driver.Config())
-    statuses = [message for topic, message in bus.said if topic is topics.ARM_TRAJECTORY_STATUS]
+    statuses = [message for topic, message in bus.published if topic is topics.ARM_TRAJECTORY_STATUS]
     assert statuses[0].state == TrajectoryStatus.STATE_ACCEPTED
     assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED
-    assert sum(topic is topics.ARM_SAFETY for topic, _ in bus.said) == 60
-    assert sum(topic is topics.ARM_JOINT_STATES for topic, _ in bus.said) == 60
+    assert sum(topic is topics.ARM_SAFETY for topic, _ in bus.published) == 60
+    assert sum(topic is topics.ARM_JOINT_STATES for topic, _ in bus.published) == 60
 
 
 def test_a_driver_started_by_hand_takes_no_program_for_a_person(monkeypatch: Any) -> None:
     monkeypatch.chdir(WORKSPACE)
     bus = RobotBus(by_person=False)
     arm_driver.run(bus, arm_driver.Config())
-    states = [message for topic, message in bus.said if topic is topics.ARM_SAFETY]
+    states = [message for topic, message in bus.published if topic is topics.ARM_SAFETY]
     assert {state.state for state in states} == {SafetyState.STATE_DISARMED}
     assert [fault.code for fault in states[-1].faults] == ["arming_program"]
     assert "operator node is a program" in states[-1].faults[0].sentence

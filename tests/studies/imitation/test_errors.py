@@ -35,7 +35,7 @@ def test_each_error_is_the_distance_that_the_thesis_defines() -> None:
         (found.gripper, 8.0),
         (found.elbow, 25.0),
         (found.effective, 6.0),
-        (found.least_imitation, 10.0),
+        (found.min_imitation, 10.0),
         (found.imitation, 16.0),
     ):
         np.testing.assert_allclose(values, expected, rtol=0, atol=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 from paramove.documents.array_types import Floats
 from paramove.hmm import resample
-from studies.movements.method import BEGINNINGS, CLASSES, SYNTHESIS, THETA, TYPICALITY, Estimate, Examples, NotAble
+from studies.movements.method import BEGINNINGS, CLASSES, OUTLIERS, SYNTHESIS, THETA, Estimate, Examples, NotAble
 from studies.movements.tasks import Fold, real_tasks
 from tests.demonstrations.synthetic_recordings import write_pointing, write_table
 
@@ -15,7 +15,7 @@ from tests.demonstrations.synthetic_recordings import write_pointing, write_tabl
 class MeanPath(NotAble):
     """The mean movement; theta is the mean of the training; the action is that of the nearest mean."""
 
-    can = frozenset({SYNTHESIS, THETA, CLASSES, BEGINNINGS, TYPICALITY})
+    can = frozenset({SYNTHESIS, THETA, CLASSES, BEGINNINGS, OUTLIERS})
 
     def fit(self, examples: Examples) -> None:
         self.means = {

@@ -27,7 +27,7 @@ def test_actions_and_their_beginnings(tasks: dict[str, list[Fold]]) -> None:
 
 def test_a_method_is_not_asked_what_it_cannot(tasks: dict[str, list[Fold]]) -> None:
     class OnlyScores(MeanPath):
-        can = frozenset({"typicality"})
+        can = frozenset({"outliers"})
 
     fold = tasks["table/across"][0]
     assert set(measure(OnlyScores(), fold)["values"]) == {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from studies.movements.method import BEGINNINGS, CLASSES, SYNTHESIS, THETA, TYPICALITY, Examples
+from studies.movements.method import BEGINNINGS, CLASSES, OUTLIERS, SYNTHESIS, THETA, Examples
 from studies.movements.sweep import Row, missing_libraries
 from studies.peers.catalogue import peer_rows
 from studies.peers.library import PeerMissingError, library
@@ -52,7 +52,7 @@ def test_one_action(row: Row) -> None:
         for estimate in estimates:
             if estimate.covariance is not None:
                 assert np.linalg.eigvalsh(estimate.covariance).min() > -1e-9
-    if TYPICALITY in method.can:
+    if OUTLIERS in method.can:
         other = bows("under", np.random.default_rng(2), repetitions=1)
         assert min(method.score(x) for x in asked.sequences) > max(method.score(x) for x in other.sequences)
 

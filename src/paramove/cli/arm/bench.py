@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from paramove.robots.dynamixel import BusBench
 
 FINDING = 3
-LEAST_COMPLETE = 0.99
+MIN_COMPLETE = 0.99
 
 
 def bench(
@@ -52,7 +52,7 @@ def bench(
         _tell(found)
     if finding:
         typer.echo(finding, err=True)
-    if found.complete < LEAST_COMPLETE * found.rounds:
+    if found.complete < MIN_COMPLETE * found.rounds:
         finding = "answers are missing or damaged: `paramove arm scan` shows who answers, and how"
         typer.echo(finding, err=True)
     if rate and rate > max(found.rates_hz, default=0):

@@ -103,7 +103,7 @@ class _Link:
 
     def press(self, key: str) -> None:
         """Does what a key stands for."""
-        from paramove.bus import say_now
+        from paramove.bus import publish_now
         from paramove.operator import TERMINAL, stop_arm
 
         if key.isdecimal():
@@ -111,7 +111,7 @@ class _Link:
         elif key in ("+", "-"):
             message = self.jogging.step(1 if key == "+" else -1, time.monotonic_ns())
             if message is not None:
-                say_now(self._trajectories, message)
+                publish_now(self._trajectories, message)
         elif key == "a":
             self._arming.press(time.monotonic())
             self._told = ""  # what keeps it from being armed is told again
@@ -127,14 +127,14 @@ class _Link:
             if publisher is not None:
                 publisher.serve()
         states, statuses, safety = self._subscribers
-        for subscriber, hear in ((states, self.jogging.hear_states), (statuses, self.jogging.hear_status)):
+        for subscriber, handle in ((states, self.jogging.handle_states), (statuses, self.jogging.handle_status)):
             subscriber.revive()
             while (heard := subscriber.receive()) is not None:
-                hear(heard.message)
+                handle(heard.message)
         safety.revive()
         now_s = time.monotonic()
         while (heard := safety.receive()) is not None:
-            self._arming.hear(heard.message)
+            self._arming.handle(heard.message)
             self._heard_s = now_s
         self.jogging.tick(time.monotonic_ns())
         if self._arming.tick(now_s):
@@ -172,7 +172,7 @@ class _Link:
         self._shown = what
 
     def _arm(self) -> None:
-        from paramove.bus import TopicTakenError, say_now
+        from paramove.bus import TopicTakenError, publish_now
         from paramove.msgs.safety_state_pb2 import ArmRequest
         from paramove.operator import TERMINAL
 
@@ -181,4 +181,4 @@ class _Link:
         except TopicTakenError as error:
             self._arming.refuse(f"{error}, and only one program may arm an arm")
             return
-        say_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging", by_person=self._by_person))
+        publish_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging", by_person=self._by_person))

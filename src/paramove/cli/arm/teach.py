@@ -110,7 +110,7 @@ def _lead(torque_off: TorqueOffArm, teacher: KinestheticTeacher, person: Termina
         while True:
             heard = torque_off.measured()
             if heard is not None:
-                teacher.hear(*heard)
+                teacher.handle(*heard)
             due_s = max(due_s + PERIOD_S, time.monotonic())
             _press(pressed(max(0.0, due_s - time.monotonic())), teacher)
 

@@ -21,8 +21,8 @@ from paramove.demonstrations import DemonstrationError
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.documents import Floats, read_text
 
-MOST_LEVELS = 200
-MOST_JOINTS = 1000
+MAX_LEVELS = 200
+MAX_JOINTS = 1000
 LINE_LETTERS = 2**20
 FRAMES_AT_ONCE = 10_000
 """Of which the turns of all joints are in memory."""
@@ -128,8 +128,8 @@ class _Parser:
         return Motion(tuple(self._joints), self._values(frames), frame_time)
 
     def _joint(self, name: str, parent: int, level: int) -> None:
-        if level > MOST_LEVELS or len(self._joints) == MOST_JOINTS:
-            raise self._wrong(f"more than {MOST_LEVELS} joints below each other, or than {MOST_JOINTS} altogether")
+        if level > MAX_LEVELS or len(self._joints) == MAX_JOINTS:
+            raise self._wrong(f"more than {MAX_LEVELS} joints below each other, or than {MAX_JOINTS} altogether")
         if any(joint.name == name for joint in self._joints):
             raise self._wrong(f"a second joint '{name:.80}'; each needs a name of its own")
         number = len(self._joints)

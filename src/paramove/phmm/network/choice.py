@@ -16,7 +16,7 @@ from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_in
 NUMBERS_OF_UNITS = (1, 2, 4, 8)
 DECAYS = (1e-4, 1e-2)
 """Ridge of the outer weights, as a share of the number of movements."""
-MOST_FOLDS = 5
+MAX_FOLDS = 5
 STEPS = 40
 WORTH = 0.05
 """More units must miss left-out movements by so much less, as a share: noise would choose some as well."""
@@ -113,7 +113,7 @@ def _left_out_errors(targets: StateTargets, groups: Ints, choice: Choice) -> Flo
     Dimensions are those of the movements: which way the targets are turned is arbitrary where covariances are alike.
     """
     different = np.unique(groups)
-    folds = np.searchsorted(different, groups) % MOST_FOLDS
+    folds = np.searchsorted(different, groups) % MAX_FOLDS
     whole, back = with_decay(targets, choice), np.linalg.inv(targets.rotation)
     missed = []
     for fold in np.unique(folds):

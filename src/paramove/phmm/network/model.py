@@ -34,9 +34,9 @@ from paramove.phmm.ridge import chosen_ridge
 
 SMOOTHNESS = 0.05
 """Of the polynomial model whose alignment of frames and states the networks begin with."""
-MOST_STARTS = 32
+MAX_STARTS = 32
 CLIMBED = 3
-MOST_STEPS, TOLERANCE = 40, 1e-6
+MAX_STEPS, TOLERANCE = 40, 1e-6
 REALIGNMENTS = 2
 
 
@@ -224,7 +224,7 @@ class NeuralPHMM(ParametricHMM):
     def _starts(self) -> Floats:
         """A raster over the bounds of the training, finer where theta has few components. Shape (S, P)."""
         dimension = len(self.monomials_.centre)
-        lines = max(2, int(MOST_STARTS ** (1.0 / dimension) + 1e-9))
+        lines = max(2, int(MAX_STARTS ** (1.0 / dimension) + 1e-9))
         line = np.linspace(-1.0, 1.0, 2 * lines + 1)[1::2]
         return np.array(list(itertools.product(line, repeat=dimension)) if dimension < 6 else [np.zeros(dimension)])
 
@@ -232,7 +232,7 @@ class NeuralPHMM(ParametricHMM):
         """Gauss-Newton steps with exact gradients, shortened while the likelihood would fall, within the bounds."""
         bounds = np.full(len(place), self._widest)
         value, gradient, information = self._expectation(place, prepared)
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             step = search_kernels.bounded_step(place, gradient, information, -bounds, bounds)
             for share in 0.4 ** np.arange(8):
                 candidate = np.clip(place + share * step, -bounds, bounds)

@@ -16,7 +16,7 @@ from paramove.documents import Floats
 
 INNER_DEVIATION = 3.0
 """Standard deviation of the prior on W1 and b1, for theta scaled to [-1, 1]: steps as steep as a fifth of the range."""
-MEMORY, MOST_HALVINGS = 10, 12
+MEMORY, MAX_HALVINGS = 10, 12
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class StateTargets:
             if not descent < 0.0:
                 break
             share = 1.0 if moves else min(1.0, 1.0 / float(np.abs(gradient).max()))
-            for _ in range(MOST_HALVINGS):
+            for _ in range(MAX_HALVINGS):
                 tried = best + share * direction
                 found, slope = self.loss_and_gradient(tried)
                 if found <= loss + 1e-4 * share * descent:

@@ -28,7 +28,7 @@ from paramove.phmm.ridge import residuals_left_out
 Missed = Callable[[Floats], tuple[Floats, Floats]]
 
 PARTS = 10
-MOST_STEPS, TOLERANCE = 20, 1e-8
+MAX_STEPS, TOLERANCE = 20, 1e-8
 SHARES = (1.0, 0.4, 0.16, 0.06)
 
 
@@ -117,7 +117,7 @@ class NetworkPerformances:
             for tested, others in folds_of(shown.groups)
         ]
         shrinkage, excess, _, _ = chosen_shrinkage(folds, SHRINKAGES)
-        inflation = inflation_of(excess, shown.places.shape[1], len(np.unique(shown.groups)), least=1e-6)
+        inflation = inflation_of(excess, shown.places.shape[1], len(np.unique(shown.groups)), minimum=1e-6)
         triangle = np.linalg.cholesky(shrunk(missed / deviation, shrinkage))
         whole = shown.networks(inner)
         last = StateNetworks(*(np.ascontiguousarray(one[-1:]) for one in (whole.skip, whole.outer, whole.inner)))
@@ -132,7 +132,7 @@ class NetworkPerformances:
             missed: parts of the movement minus those of the networks at a place, (n,), and slopes of the latter (n, P).
         """
         right, wide = self._white(missed(place))
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             step = np.linalg.solve(wide.T @ wide + np.eye(len(place)) / bound**2, wide.T @ right)
             for share in SHARES:
                 candidate = np.clip(place + share * step, -bound, bound)

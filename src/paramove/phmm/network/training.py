@@ -34,7 +34,7 @@ class NetworkParameters:
 
     Attributes:
         networks: of the states. covariances: (N, D, D). durations: p_i(d) in column d - 1, (N, d_max).
-        d_min: least number of frames of a state.
+        d_min: smallest number of frames of a state.
     """
 
     networks: StateNetworks

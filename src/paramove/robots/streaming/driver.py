@@ -1,7 +1,7 @@
 """The arm driver's logic: accepted trajectories to batches of the robot's stream, through the safety gate.
 
 One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it is heard (thesis 5.2.1:
-the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the newest
+the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the latest
 known index on, about 300 ms of them, and the gate adds the stop ramp. If ticks or batches stop, the robot rests by
 itself.
 """
@@ -182,7 +182,7 @@ class ArmDriver:
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
         """Hear a trajectory: `tick` accepts or refuses it by its own time.
 
-        The same id again is answered with its newest status and not played twice.
+        The same id again is answered with its latest status and not played twice.
         """
         self._asked.append((message, captured_ns))
 

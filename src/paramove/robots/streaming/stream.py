@@ -72,7 +72,7 @@ class StreamReader:
         epoch: Of the stream being played; 0 before any.
         next_index: Of the frame to be played next.
         refused_batches: How many batches were refused.
-        refusal: Why the newest of them was.
+        refusal: Why the latest of them was.
     """
 
     def __init__(self, description: RobotDescription, held_counts: Frames) -> None:

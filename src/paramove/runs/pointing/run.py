@@ -57,7 +57,7 @@ class PointingRun:
         folder: Of the run.
         time_s: of the estimates, (T,).
         hand, true_hand: (T, 3), m; NaN where it was not seen, and in `true_hand` where no truth was recorded.
-        hand_deviation: greatest standard deviation of the hand, (T,), m; 0 where a body tracker tells none.
+        hand_deviation: largest standard deviation of the hand, (T,), m; 0 where a body tracker tells none.
         pointed_deviation: of the believed target, (T,), m; NaN where a body tracker tells none.
         effective: effective sample sizes, (T,); NaN without particles.
         unsure: whether the estimate was lost or degraded, or a body tracker did not see the hand, (T,).

@@ -35,7 +35,7 @@ FRAMES_PER_S = 10.0
 EVERY = 3
 """So many-th image; at 15 Hz the video is twice as fast as the run."""
 LINGER_FRAMES = 20
-MOST_LETTERS = 104
+MAX_LETTERS = 104
 CAMERA = topics.CAMERA_IMAGES[0].name
 
 
@@ -54,10 +54,10 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
         for time_ns, camera, outline, view in moments:
             picture = composed(camera, outline, view)
             paste(picture, label(title, 15, TEXT, bold=True), 12, 9)
-            paste(picture, label(f"{_newest(states, time_ns)}", 15, ACCENT), 420, 9)
+            paste(picture, label(f"{_latest(states, time_ns)}", 15, ACCENT), 420, 9)
             clock = label(f"{time_ns * 1e-9:6.1f} s   2× speed", 14, FAINT)
             paste(picture, clock, SIZE[0] - clock.shape[1] - 12, 10)
-            said = label(_shown(_newest(words, time_ns)), 16, TEXT, bold=True)
+            said = label(_shown(_latest(words, time_ns)), 16, TEXT, bold=True)
             paste(picture, said, 14, TOP_PX + PANEL[1] + 14)
             writer.write(picture)
         for _ in range(LINGER_FRAMES):
@@ -91,11 +91,11 @@ def _moments(folder: Path) -> Iterator[tuple[int, Image, Any | None, Image]]:
                 outlines = {following.log_ns: following.message}
             following = next(recorded_images, None)
         if place % EVERY == 0 and image is not None:
-            newest = next(iter(outlines.values()), None)
-            yield view.log_ns, decode(image.message), newest, decode(view.message)[:, :, ::-1]
+            latest = next(iter(outlines.values()), None)
+            yield view.log_ns, decode(image.message), latest, decode(view.message)[:, :, ::-1]
 
 
-def _newest(said: list[tuple[int, str]], time_ns: int) -> str:
+def _latest(said: list[tuple[int, str]], time_ns: int) -> str:
     at = bisect_right(said, time_ns, key=lambda one: one[0])
     return said[at - 1][1] if at else ""
 
@@ -103,4 +103,4 @@ def _newest(said: list[tuple[int, str]], time_ns: int) -> str:
 def _shown(sentence: str) -> str:
     if not sentence:
         return ""
-    return f"“{sentence if len(sentence) <= MOST_LETTERS else sentence[: MOST_LETTERS - 1] + '…'}”"
+    return f"“{sentence if len(sentence) <= MAX_LETTERS else sentence[: MAX_LETTERS - 1] + '…'}”"

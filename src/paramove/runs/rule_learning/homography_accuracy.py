@@ -81,7 +81,7 @@ def grid_error(run: RecordedRun) -> MappedPoints | None:
 
 
 def calibration_of(run: RecordedRun) -> PlaneHomography | None:
-    """The newest homography that the robot published."""
+    """The latest homography that the robot published."""
     said = run.heard(topics.CALIBRATION_PLANE)
     return PlaneHomography.from_message(said[-1].message) if said else None
 

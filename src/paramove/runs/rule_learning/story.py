@@ -33,8 +33,8 @@ class Moment:
         sentence: What it said last.
         rules: Object -> believed place (x, y), m.
         goal: The goal under way, else None; `phase` of its motion.
-        gesture: The newest gesture if it is fresh, else None.
-        tracked: The newest `TrackedObjects`, else None.
+        gesture: The latest gesture if it is fresh, else None.
+        tracked: The latest `TrackedObjects`, else None.
         homography: The robot's calibration, once it has one.
     """
 
@@ -65,7 +65,7 @@ class Moment:
 
 
 class Story:
-    """Looks up the newest of everything.
+    """Looks up the latest of everything.
 
     Args:
         run: The run.
@@ -74,7 +74,7 @@ class Story:
 
     def __init__(self, run: RecordedRun, relocations: list[Relocation]) -> None:
         self._said = {
-            topic: _Newest(run.heard(topic))
+            topic: _Latest(run.heard(topic))
             for topic in (
                 topics.APPLICATION_STAGE,
                 topics.SPEECH,
@@ -86,17 +86,17 @@ class Story:
         }
         # What is drawn onto an image belongs to the time at which the image was taken.
         tracked = run.heard(topics.OBJECTS_TRACKED)
-        self._said[topics.OBJECTS_TRACKED] = _Newest(tracked, [recorded.log_ns for recorded in tracked])
+        self._said[topics.OBJECTS_TRACKED] = _Latest(tracked, [recorded.log_ns for recorded in tracked])
         self._relocations = relocations
 
     def at(self, time_s: float) -> Moment:
         """The robot's mind at a time, s."""
-        newest = {topic: found.at(time_s) for topic, found in self._said.items()}
-        stage, speech, rules = (newest[topic] for topic in (topics.APPLICATION_STAGE, topics.SPEECH, topics.RULES))
+        latest = {topic: found.at(time_s) for topic, found in self._said.items()}
+        stage, speech, rules = (latest[topic] for topic in (topics.APPLICATION_STAGE, topics.SPEECH, topics.RULES))
         gesture, tracked, status = (
-            newest[topic] for topic in (topics.GESTURES, topics.OBJECTS_TRACKED, topics.RELOCATION_STATUS)
+            latest[topic] for topic in (topics.GESTURES, topics.OBJECTS_TRACKED, topics.RELOCATION_STATUS)
         )
-        plane = newest[topics.CALIBRATION_PLANE]
+        plane = latest[topics.CALIBRATION_PLANE]
         goal = next((g for g in self._relocations if g.begun_s <= time_s < g.ended_s and g.result != "refused"), None)
         of_goal = goal is not None and status is not None and status.message.goal_id == goal.goal.id
         fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_SHOWN_S
@@ -112,7 +112,7 @@ class Story:
         )
 
 
-class _Newest:
+class _Latest:
     def __init__(self, messages: list[Recorded], times_ns: list[int] | None = None) -> None:
         self._messages = messages
         self._times = [1e-9 * t for t in times_ns or [recorded.publish_ns for recorded in messages]]

@@ -211,13 +211,13 @@ class RunEvaluation:
 
     def _wall(self) -> dict[str, Any]:
         facts, verdict = self.run.facts, self.run.verdict
-        newest = {name: messages[-1].message for name, messages in self.run.said.items() if name.startswith("status/")}
+        latest = {name: messages[-1].message for name, messages in self.run.said.items() if name.startswith("status/")}
         return {
             "realtime_factor": verdict.get("realtime_factor"),
             "seconds": verdict.get("wall_s"),
             "begun": str(facts.get("begun", "")),
             "run_folder": str(self.run.folder),
-            "processing_s": {status.node: status.processing_seconds for status in newest.values()},
+            "processing_s": {status.node: status.processing_seconds for status in latest.values()},
         }
 
 

@@ -61,14 +61,14 @@ def view_times(folder: Path) -> Iterator[float]:
 
 
 def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Image, Image]]:
-    """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the newest one by then."""
+    """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the latest one by then."""
     cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
-    newest, following = None, next(cameras, None)
+    latest, following = None, next(cameras, None)
     for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
         while following is not None and following.log_ns <= view.log_ns:
-            newest, following = following, next(cameras, None)
-        if place % every == 0 and newest is not None:
-            yield view.log_ns * 1e-9, _decoded(newest.message.data), _decoded(view.message.data)
+            latest, following = following, next(cameras, None)
+        if place % every == 0 and latest is not None:
+            yield view.log_ns * 1e-9, _decoded(latest.message.data), _decoded(view.message.data)
 
 
 def _decoded(data: bytes) -> Image:

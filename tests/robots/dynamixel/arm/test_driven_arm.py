@@ -95,7 +95,7 @@ def test_it_moves_as_it_is_told(person):
     assert (steps < 0.1).all()  # it began where it stood and jumped nowhere
     person.hears_until(lambda: person.motors is not None)
     assert [motor.id for motor in person.motors.motors] == [11, 12, 13, 14, 15]
-    assert all(motor.heard and motor.voltage_v == pytest.approx(12.0, abs=0.01) for motor in person.motors.motors)
+    assert all(motor.responding and motor.voltage_v == pytest.approx(12.0, abs=0.01) for motor in person.motors.motors)
 
 
 def test_an_arm_with_a_joint_at_its_stop_a_little_beyond_its_range_moves(person):

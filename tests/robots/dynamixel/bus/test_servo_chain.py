@@ -156,7 +156,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(chain, emulator
     ids=["now and then", "most of them"],
 )
 def test_an_answer_that_comes_several_questions_too_late_is_not_taken_for_another_ones(
-    chain, emulator, faults, rounds, least
+    chain, emulator, faults, rounds, minimum
 ):
     """Of different registers, in turn: what a joint's position says is no torque."""
     chain.port.latency_s = 0.01
@@ -174,7 +174,7 @@ def test_an_answer_that_comes_several_questions_too_late_is_not_taken_for_anothe
         ):
             heard += len(found)
             assert set(found.values()) <= {right}
-    assert heard >= least
+    assert heard >= minimum
 
 
 def silenced(chain: ServoChain) -> None:
@@ -240,8 +240,8 @@ def test_answers_to_all_attempts_may_come_together(chain, emulator, ask, answer_
     chain.port.latency_s = 0.005
     read, kept = chain.port.readPort, bytearray()
 
-    def read_together(most):
-        kept.extend(read(most))
+    def read_together(maximum):
+        kept.extend(read(maximum))
         return bytes(kept) if len(kept) == len(ATTEMPTS_S) * answer_bytes else b""
 
     monkeypatch.setattr(chain.port, "readPort", read_together)

@@ -3,7 +3,7 @@
 import pytest
 
 from paramove.robots.dynamixel.bus import servo_chain as late_answers
-from paramove.robots.dynamixel.bus.servo_chain import MANY_OWED, MOST_OWED, REST_S, LateAnswers
+from paramove.robots.dynamixel.bus.servo_chain import MANY_OWED, MAX_OWED, REST_S, LateAnswers
 
 
 @pytest.fixture
@@ -33,9 +33,9 @@ def test_without_silence_nothing_more_is_asked_for(clock):
 
 def test_no_question_has_a_length_that_is_owed(clock):
     late = LateAnswers()
-    assert silent(late, MOST_OWED + 1) == list(range(4, 4 + MOST_OWED + 1))
+    assert silent(late, MAX_OWED + 1) == list(range(4, 4 + MAX_OWED + 1))
     assert silent(late, 1) == [4]  # the one that is longest ago
-    assert late.length_for(7) == 7 + MOST_OWED - 2  # all others from there on are owed
+    assert late.length_for(7) == 7 + MAX_OWED - 2  # all others from there on are owed
 
 
 def test_an_answer_to_the_last_question_ends_what_is_owed(clock):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paramove.robots.dynamixel.bus.packets import BROADCAST, Instruction, Packet, PacketReader, encoded
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.emulated.bus import EmulatedBus
-from paramove.robots.dynamixel.emulated.protocol_checker import MOST_FINDINGS, RATE_WINDOW_S, ProtocolChecker
+from paramove.robots.dynamixel.emulated.protocol_checker import MAX_FINDINGS, RATE_WINDOW_S, ProtocolChecker
 from paramove.robots.dynamixel.emulated.servo import EmulatedServo
 
 BAUD = 57600
@@ -216,9 +216,9 @@ def test_the_bare_header_that_the_sdk_sends_is_found():
 
 def test_only_the_first_findings_are_kept_but_all_are_counted():
     bus = a_bus()
-    for number in range(MOST_FINDINGS + 5):
+    for number in range(MAX_FINDINGS + 5):
         bus.receive(write(132, number, 4), BAUD, 1.0)
-    assert (len(bus.judge.findings), bus.judge.counts["register"]) == (MOST_FINDINGS, MOST_FINDINGS + 5)
+    assert (len(bus.judge.findings), bus.judge.counts["register"]) == (MAX_FINDINGS, MAX_FINDINGS + 5)
 
 
 packets = st.builds(Packet, st.integers(0, 254), st.integers(0, 255), st.binary(max_size=30))

@@ -151,7 +151,7 @@ def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:
         health = arm.health[servo.joint]
         motor = message.motors.add(joint=servo.joint, id=servo.number, model=servo.model.name)
         if health.answers is not None:
-            motor.heard, motor.age_s = True, 1e-9 * (now_ns - health.answers.at_ns)
+            motor.responding, motor.age_s = True, 1e-9 * (now_ns - health.answers.at_ns)
         motor.torque = bool(health.torque)
         motor.voltage_v, motor.temperature_c = health.voltage or 0.0, health.temperature or 0.0
         motor.hardware_error = health.hardware_error

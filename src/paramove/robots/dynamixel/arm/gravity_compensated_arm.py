@@ -69,7 +69,7 @@ class GravityCompensatedArm(TorqueOffArm):
             amperes = model.stall_amperes / model.stall_torque
             sign = np.sign(description.units.counts_per_rad[place])
             self._per_torque[place] = sign * amperes / model.current_unit
-        self._most: dict[int, int] = {}
+        self._maximum: dict[int, int] = {}
         self._modes: dict[int, int] = {}
         self._commanded_s = 0.0
 
@@ -82,7 +82,7 @@ class GravityCompensatedArm(TorqueOffArm):
             registers = self._models[place].registers
             if place in self._carrying:
                 self._modes[number] = self._chain.read(number, registers["Operating Mode"])
-                self._most[number] = int(SHARE * self._chain.read(number, registers["Current Limit"]))
+                self._maximum[number] = int(SHARE * self._chain.read(number, registers["Current Limit"]))
             self._chain.write(number, registers["Torque Enable"], 0)
             if place in self._carrying:
                 self._chain.write(number, registers["Operating Mode"], CURRENT_MODE)
@@ -125,8 +125,8 @@ class GravityCompensatedArm(TorqueOffArm):
 
     def _current(self, place: int, torques: Floats) -> int:
         """Of one servo, in its units."""
-        most = self._most[self._numbers[place]]
-        return max(-most, min(most, round(float(self._per_torque[place] * torques[place]))))
+        maximum = self._maximum[self._numbers[place]]
+        return max(-maximum, min(maximum, round(float(self._per_torque[place] * torques[place]))))
 
     def _renew_watchdogs(self) -> None:
         """One that has tripped keeps the goals locked until it is told 0."""

@@ -63,9 +63,9 @@ class ArmReading:
     """What the servos said last; arrays [J].
 
     Attributes:
-        at_ns: When the newest answer came, of the monotonic clock.
+        at_ns: When the latest answer came, of the monotonic clock.
         counts: Positions, pulses; of a joint that was never heard there is no reading at all.
-        ages_s: Of each joint's newest answer.
+        ages_s: Of each joint's latest answer.
     """
 
     at_ns: int
@@ -211,9 +211,9 @@ class ServoArm:
         for servo in self.servos:
             if servo.number in answers:
                 self.health[servo.joint].answers = answers[servo.number]
-        newest = [one.answers for one in self.health.values()]
-        known = [answer for answer in newest if answer is not None]
-        if len(known) < len(newest):
+        latest = [one.answers for one in self.health.values()]
+        known = [answer for answer in latest if answer is not None]
+        if len(known) < len(latest):
             return None
         now_ns = time.monotonic_ns()
         positions = [answer.values[POSITION] for answer in known]

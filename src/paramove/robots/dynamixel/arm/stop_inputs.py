@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-MOST_BYTES = 16
+MAX_BYTES = 16
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,6 @@ def _first_bytes(path: Path) -> str:
     """Waits for nobody, whatever lies there. Raises OSError."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
-        return os.read(descriptor, MOST_BYTES).decode("ascii", "backslashreplace").strip()
+        return os.read(descriptor, MAX_BYTES).decode("ascii", "backslashreplace").strip()
     finally:
         os.close(descriptor)

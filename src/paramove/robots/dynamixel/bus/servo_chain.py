@@ -33,12 +33,12 @@ from paramove.robots.dynamixel.bus.packets import StatusError as Status
 from paramove.robots.dynamixel.bus.servo_models import Register
 from paramove.robots.dynamixel.bus.servo_port import BITS_PER_BYTE, ServoPort
 
-MOST_OWED, MANY_OWED, REST_S = 16, 8, 0.05
+MAX_OWED, MANY_OWED, REST_S = 16, 8, 0.05
 """So many lengths are remembered; when many are owed, one question in a while is enough: an arm that comes back has
 little to answer, and a length is used again after half a second."""
 PACKET_BYTES = 11
 """Of an answer without data."""
-MOST_BYTES = 4096
+MAX_BYTES = 4096
 ATTEMPTS_S = (0.0, 0.02, 0.2)
 """So much longer than an answer needs, each attempt waits: machines and adapters make pauses, servos do not."""
 PING_DATA = 3
@@ -140,7 +140,7 @@ class ServoChain:
     def has_room(self) -> bool:
         """Whether a read asks at once; behind many questions that nobody answered it waits for its turn."""
         if self._late.many:
-            self._hear_late(0.0)
+            self._read_late_replies(0.0)
         return not self._late.rest_s
 
     def ping(self, number: int, patient: bool = True) -> PingedServo | None:
@@ -218,7 +218,7 @@ class ServoChain:
 
     def _read(self, numbers: Sequence[int], address: int, size: int, timeout_s: float = 0.0) -> dict[int, Packet]:
         while not self.has_room():
-            self._hear_late(self._late.rest_s)
+            self._read_late_replies(self._late.rest_s)
         wide = self._late.length_for(size)
         if len(numbers) == 1:
             asked = [*address.to_bytes(2, "little"), *wide.to_bytes(2, "little")]
@@ -229,9 +229,9 @@ class ServoChain:
             lambda: self._sdk.syncReadTx(self.port, address, wide, list(numbers), len(numbers), False), sizes
         )
 
-    def _hear_late(self, wait_s: float) -> None:
+    def _read_late_replies(self, wait_s: float) -> None:
         self.port.setPacketTimeoutMillis(1e3 * wait_s)
-        for packet in PacketReader().feed(self.port.readPort(MOST_BYTES)):
+        for packet in PacketReader().feed(self.port.readPort(MAX_BYTES)):
             if isinstance(packet, Packet) and packet.instruction == Instruction.STATUS:
                 self._late.heard(len(packet.parameters) - 1)
 
@@ -289,7 +289,7 @@ class ServoChain:
         waited_for = set(sizes)
         noise = 0
         while waited_for or not sizes:
-            data = self.port.readPort(MOST_BYTES)
+            data = self.port.readPort(MAX_BYTES)
             noise += len(data)
             for packet in reader.feed(data):
                 if isinstance(packet, DamagedPacket):
@@ -371,7 +371,7 @@ class LateAnswers:
     """Lengths of the data that is owed, oldest first."""
 
     def __init__(self) -> None:
-        self._lengths: deque[int] = deque(maxlen=MOST_OWED)
+        self._lengths: deque[int] = deque(maxlen=MAX_OWED)
         self._asked_s = 0.0
 
     def __bool__(self) -> bool:
@@ -390,7 +390,7 @@ class LateAnswers:
 
     def length_for(self, size: int) -> int:
         """As few bytes as possible, from `size` on, that no late answer has."""
-        return next(one for one in range(size, size + MOST_OWED + 1) if one not in self._lengths)
+        return next(one for one in range(size, size + MAX_OWED + 1) if one not in self._lengths)
 
     def asked(self) -> None:
         """A question goes out now."""

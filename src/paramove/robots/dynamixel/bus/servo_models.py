@@ -33,7 +33,7 @@ class Register:
         name: As in the manual.
         address, size: Bytes.
         initial: After a factory reset, or in RAM after a reboot.
-        allowed: Least and greatest value that may be written; None where it is not writable at all.
+        allowed: Minimum and maximum value that may be written; None where it is not writable at all.
     """
 
     name: str

@@ -11,7 +11,7 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentErr
 
 TIMEOUT_S = 3.0
 LOADED_SHARE = 0.05
-"""Of the greatest load or current: more is a joint that carries something."""
+"""Of the largest load or current: more is a joint that carries something."""
 FULL_LOAD = 1000
 """Present Load (126) in units of 0.1 %."""
 
@@ -45,8 +45,8 @@ def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
     if "Present Load" in model.registers:
         share = abs(chain.read(servo.number, model.registers["Present Load"])) / FULL_LOAD
     else:
-        most = chain.read(servo.number, model.registers["Current Limit"])
-        share = abs(chain.read(servo.number, model.registers["Present Current"])) / max(most, 1)
+        maximum = chain.read(servo.number, model.registers["Current Limit"])
+        share = abs(chain.read(servo.number, model.registers["Present Current"])) / max(maximum, 1)
     if share > LOADED_SHARE:
         raise ServoLoadedError(
             f"servo {servo.number} holds its joint with {100.0 * share:.0f} % of its force, which would fall: hold the "

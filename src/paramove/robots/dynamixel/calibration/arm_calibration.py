@@ -84,7 +84,7 @@ class JointCalibration(_Part):
 
     @property
     def travel(self) -> tuple[float, float]:
-        """Least and greatest angle, rad."""
+        """Minimum and maximum angle, rad."""
         ends = [self.sign * (end - self.zero_counts) / COUNTS_PER_RAD for end in (self.min_counts, self.max_counts)]
         return min(ends), max(ends)
 
@@ -183,16 +183,16 @@ class ArmCalibration(_Part):
             )
         joints = [self.joints[name] for name in joint_names]
         travels = np.array([joint.travel for joint in joints], dtype=np.float64).reshape(-1, 2)
-        least, most = np.maximum(travels[:, 0], lower), np.minimum(travels[:, 1], upper)
-        for name, low, high in zip(joint_names, least, most, strict=True):
+        minimum, maximum = np.maximum(travels[:, 0], lower), np.minimum(travels[:, 1], upper)
+        for name, low, high in zip(joint_names, minimum, maximum, strict=True):
             if not low < high:
                 raise CalibrationError(f"joint {name}: its calibrated travel lies outside of its range; {_REMEDY}")
         return JointUnits(
             names=tuple(joint_names),
             counts_per_rad=np.array([joint.sign * COUNTS_PER_RAD for joint in joints]),
             zero_counts=np.array([joint.zero_counts for joint in joints], dtype=np.float64),
-            lower=least,
-            upper=most,
+            lower=minimum,
+            upper=maximum,
         )
 
 

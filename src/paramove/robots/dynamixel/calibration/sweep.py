@@ -33,7 +33,7 @@ SMALLEST_MOVE = 34
 """Counts, 3 degrees, that show a direction."""
 SHOWN_TOLERANCE = float(np.deg2rad(3.0))
 """By which the travel that was shown may fall short of the described range without a remark."""
-LEAST_SHARE = 0.5
+MIN_SHARE = 0.5
 """Of the described range that must lie in the travel: less, and posture or direction were not as described."""
 
 
@@ -134,7 +134,7 @@ def calibrated_joint(
     zero = round(counts - joint.sign * planned.posture * COUNTS_PER_RAD)
     joint = joint.model_copy(update={"zero_counts": zero})
     low, high = joint.travel
-    if min(high, planned.upper) - max(low, planned.lower) < LEAST_SHARE * (planned.upper - planned.lower):
+    if min(high, planned.upper) - max(low, planned.lower) < MIN_SHARE * (planned.upper - planned.lower):
         raise CalibrationError(
             f"joint {planned.joint} would reach from {_degrees(low, high)}, its description says "
             f"{_degrees(planned.lower, planned.upper)}: the posture was not the described one, the joint was moved the "

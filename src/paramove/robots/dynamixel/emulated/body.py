@@ -93,7 +93,7 @@ class ServoBody:
         """Whether an error that Shutdown (63) names has switched torque off, until a reboot."""
         return bool(self.memory["Hardware Error Status"] & self.memory["Shutdown"])
 
-    def hear(self, now_s: float) -> None:
+    def packet_received(self, now_s: float) -> None:
         """A packet is on the bus, for whomever; the servo has moved until then."""
         self._heard_s = now_s
 

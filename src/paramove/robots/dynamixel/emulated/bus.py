@@ -89,7 +89,7 @@ class EmulatedBus:
         for packet in self._reader.feed(data):
             hearing = [servo for servo in self.servos if servo.listens and servo.hears_at(baud_rate)]
             for servo in hearing:
-                servo.hear(self.now_s)
+                servo.packet_received(self.now_s)
             yield from self._answers(packet, hearing)
 
     def run_to(self, now_s: float) -> None:

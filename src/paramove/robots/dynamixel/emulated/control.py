@@ -66,9 +66,9 @@ class ControlSocket:
             if ready:
                 caller, _ = self._listener.accept()
                 with caller, contextlib.suppress(ConnectionError):
-                    self._hear(caller)
+                    self._read(caller)
 
-    def _hear(self, caller: socket.socket) -> None:
+    def _read(self, caller: socket.socket) -> None:
         heard = b""
         while not self._stopped.is_set():
             ready, _, _ = select.select([caller], [], [], IDLE_S)

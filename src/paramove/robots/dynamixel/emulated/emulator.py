@@ -33,7 +33,7 @@ PSEUDO_TERMINALS = "/dev/pts/"
 LATE_S = 0.02
 """So much the servos' time may be behind; what the system does not let them have beyond, passes them by."""
 FIRST = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-MOST_BYTES = 4096
+MAX_BYTES = 4096
 TCGETS2 = 0x802C542A
 """Settings of a line with its rates as numbers (Linux, asm-generic/ioctls.h). Python's `termios` reads only rates that
 have a name; pyserial sets those, programs in Rust set numbers."""
@@ -167,7 +167,7 @@ class DynamixelEmulator:
                 self._open() if self._wanted else self._close()
                 self._moved.set()
             behind_s = self._now_s() - lost_s - self.bus.now_s
-            heard, now_s = self._hear(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
+            heard, now_s = self._read(max(0.0, min(IDLE_S, IDLE_S - behind_s))), self._now_s()
             with self.lock:
                 behind_s = now_s - lost_s - self.bus.now_s
                 if behind_s > LATE_S:
@@ -178,7 +178,7 @@ class DynamixelEmulator:
             if heard:
                 self._say(heard, self.faults.told(heard, answers), now_s)
 
-    def _hear(self, within_s: float) -> bytes:
+    def _read(self, within_s: float) -> bytes:
         """What the client has written, waiting so long for it."""
         if not self.plugged_in:
             self._stopped.wait(within_s)
@@ -186,7 +186,7 @@ class DynamixelEmulator:
         ready, _, _ = select.select([self._ours], [], [], within_s)
         if not ready and within_s > 0.0:
             self._forget_who_was_killed()
-        return os.read(self._ours, MOST_BYTES) if ready else b""
+        return os.read(self._ours, MAX_BYTES) if ready else b""
 
     def _forget_who_was_killed(self) -> None:
         """A program that was the only one at the line, and is no more, leaves it closed to others while it is open.

@@ -54,7 +54,7 @@ class Course:
     def toward(self, goal: float, fastest: float, acceleration: float) -> None:
         """One step on the way to the goal, not beyond it."""
         away = goal - self.position
-        # The greatest speed from which, after one more step with it, the servo can still brake in time.
+        # The largest speed from which, after one more step with it, the servo can still brake in time.
         stopping = acceleration * (math.sqrt(STEP_S**2 + 2.0 * abs(away) / acceleration) - STEP_S)
         self.reach(math.copysign(min(fastest, stopping), away), acceleration)
 
@@ -82,7 +82,7 @@ class Loops:
         self.course = Course()
         self.pwm = 0.0
         self._sum = 0.0
-        self._limits = (math.inf, AT_ONCE)  # greatest speed and acceleration of the course, pulses and s
+        self._limits = (math.inf, AT_ONCE)  # largest speed and acceleration of the course, pulses and s
         self._shape = 0
 
     def begin(self, position: float, velocity: float = 0.0) -> None:
@@ -147,22 +147,22 @@ class Loops:
     def effort(self, position: float, velocity: float, volts: float) -> Effort:
         """For one step, with torque on: what the loop of the operating mode asks of the motor."""
         memory, mode = self.memory, self.memory["Operating Mode"]
-        most = min(memory["PWM Limit"], abs(memory["Goal PWM"])) if mode != PWM_MODE else memory["PWM Limit"]
+        maximum = min(memory["PWM Limit"], abs(memory["Goal PWM"])) if mode != PWM_MODE else memory["PWM Limit"]
         tripped = memory["Bus Watchdog"] == TRIPPED
         if mode in (POSITION_MODE, *EXTENDED_MODES):
-            pwm, damping = self._position_loop(position, velocity, most)
+            pwm, damping = self._position_loop(position, velocity, maximum)
             if mode == CURRENT_BASED_POSITION_MODE:
-                return self._limited_by_current(pwm, damping, velocity, volts, most)
+                return self._limited_by_current(pwm, damping, velocity, volts, maximum)
         elif mode == VELOCITY_MODE:
-            pwm, damping = self._velocity_loop(velocity, most)
+            pwm, damping = self._velocity_loop(velocity, maximum)
         elif mode == CURRENT_MODE and not tripped:
             wanted = Effort(self._torque_of(memory["Goal Current"]))
-            effort = self.motor.by_torque(wanted, velocity * RAD_PER_PULSE, volts * most / FULL_PWM)
+            effort = self.motor.by_torque(wanted, velocity * RAD_PER_PULSE, volts * maximum / FULL_PWM)
             self._note(effort, velocity, volts)
             return effort
         else:
             pwm, damping = (0.0 if tripped else float(memory["Goal PWM"])), 0.0
-        self.pwm = max(-most, min(most, pwm))
+        self.pwm = max(-maximum, min(maximum, pwm))
         if self.pwm != pwm:
             return self.motor.by_voltage(volts * self.pwm / FULL_PWM)
         at_rest = self.motor.by_voltage(volts * (pwm + damping * velocity) / FULL_PWM)
@@ -171,7 +171,7 @@ class Loops:
     def _goal(self) -> float:
         return float(self.memory["Goal Position"] - self.memory.homing)
 
-    def _position_loop(self, position: float, velocity: float, most: float) -> tuple[float, float]:
+    def _position_loop(self, position: float, velocity: float, maximum: float) -> tuple[float, float]:
         """PWM, and how much of it each pulse per second takes away."""
         memory, course = self.memory, self.course
         fastest, acceleration = self._limits
@@ -181,31 +181,31 @@ class Loops:
             course.toward(self._goal(), fastest, acceleration)
         error = course.position - position
         integral = memory["Position I Gain"] * POSITION_I
-        self._sum_up(error, integral, most)
+        self._sum_up(error, integral, maximum)
         damping = memory["Position D Gain"] * POSITION_D * STEP_S
         ahead = memory["Position P Gain"] * POSITION_P * error + integral * self._sum
         return ahead + damping * (course.velocity - velocity), damping
 
-    def _velocity_loop(self, velocity: float, most: float) -> tuple[float, float]:
+    def _velocity_loop(self, velocity: float, maximum: float) -> tuple[float, float]:
         memory = self.memory
         acceleration = AT_ONCE if memory["Bus Watchdog"] == TRIPPED else self._limits[1]
         self.course.reach(memory["Goal Velocity"] * VELOCITY_UNIT, acceleration)
         error = (self.course.velocity - velocity) / VELOCITY_UNIT
         integral = memory["Velocity I Gain"] * VELOCITY_I
-        self._sum_up(error, integral, most)
+        self._sum_up(error, integral, maximum)
         proportional = memory["Velocity P Gain"] * VELOCITY_P
         return proportional * error + integral * self._sum, proportional / VELOCITY_UNIT
 
-    def _sum_up(self, error: float, gain: float, most: float) -> None:
+    def _sum_up(self, error: float, gain: float, maximum: float) -> None:
         """Of the errors, no further than the output can follow."""
-        far = most / gain if gain else 0.0
+        far = maximum / gain if gain else 0.0
         self._sum = max(-far, min(far, self._sum + error))
 
     def _limited_by_current(self, pwm: float, damping: float, velocity: float, volts: float, pwm_limit: int) -> Effort:
         """Current-based position: the loop asks for a current, which Goal Current limits."""
-        most = abs(self._torque_of(self.memory["Goal Current"]))
+        maximum = abs(self._torque_of(self.memory["Goal Current"]))
         asked = self.motor.model.stall_torque * pwm / FULL_PWM
-        torque = max(-most, min(most, asked))
+        torque = max(-maximum, min(maximum, asked))
         damped = self._stalled_by(damping, self.motor.model.voltage) if torque == asked else 0.0
         wanted = Effort(torque + damped * velocity * RAD_PER_PULSE, damped)
         effort = self.motor.by_torque(wanted, velocity * RAD_PER_PULSE, volts * pwm_limit / FULL_PWM)

@@ -65,12 +65,12 @@ class Motor:
 
     def by_torque(self, wanted: Effort, velocity: float, volts: float) -> Effort:
         """With a current for the wanted torque, as far as these volts, positive, drive it at this velocity, rad/s."""
-        most = self.by_voltage(volts)
-        least = Effort(-most.torque, most.damping)
+        maximum = self.by_voltage(volts)
+        minimum = Effort(-maximum.torque, maximum.damping)
         asked = wanted.at(velocity)
-        if asked > most.at(velocity):
-            return most
-        return least if asked < least.at(velocity) else wanted
+        if asked > maximum.at(velocity):
+            return maximum
+        return minimum if asked < minimum.at(velocity) else wanted
 
     def amperes(self, torque: float) -> float:
         """Current that makes this torque, N m."""

@@ -25,8 +25,8 @@ ROUNDING = 2.0
 """Pulses by which a step may exceed what the rate allows."""
 NEAR = 20.0
 """Pulses by which the goal may be away from the servo when torque comes on."""
-MOST_FINDINGS = 1000
-MOST_BYTES = 1024
+MAX_FINDINGS = 1000
+MAX_BYTES = 1024
 PULSES_PER_MINUTE_TO_SECOND = 4096 / 60
 LOCKED_BELOW = 64
 
@@ -123,9 +123,9 @@ class ProtocolChecker:
             if len(self._bytes) < 7:
                 return
             size = 7 + int.from_bytes(self._bytes[5:7], "little")
-            if size < 10 or size > 7 + MOST_BYTES or self._bytes[3] != 0:
+            if size < 10 or size > 7 + MAX_BYTES or self._bytes[3] != 0:
                 self._find(
-                    "length", f"{_hex(self._bytes[:7])} begins no packet: a length of 3 to {MOST_BYTES} after 00 ID"
+                    "length", f"{_hex(self._bytes[:7])} begins no packet: a length of 3 to {MAX_BYTES} after 00 ID"
                 )
                 yield self._drop(3)
                 continue
@@ -258,7 +258,7 @@ class ProtocolChecker:
 
     def _find(self, kind: str, sentence: str, number: int = -1) -> None:
         self.counts[kind] += 1
-        if len(self.findings) < MOST_FINDINGS:
+        if len(self.findings) < MAX_FINDINGS:
             self.findings.append(Finding(self._now_s, number, kind, sentence))
 
 

@@ -1,4 +1,4 @@
-"""How probable so strange a movement is: Student's t against its definition, and what it promises about new groups."""
+"""Predictive distribution of p-values: Student's t against its definition, and what it promises about new groups."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.special import log_ndtr, stdtr
 
-from paramove.phmm.typicality import PredictiveDistribution, log_upper_tail
+from paramove.phmm.predictive_distribution import PredictiveDistribution, log_upper_tail
 
 PROPERTY = settings(max_examples=60, deadline=None, derandomize=True)
 

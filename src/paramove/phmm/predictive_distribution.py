@@ -1,4 +1,4 @@
-"""How probable so strange a movement is, judged by few persons.
+"""Predictive distribution of a value of a new person's movement, learned from few persons: it gives p-values.
 
 Movements of one person are alike, so a hundred movements of nine persons say about a tenth person hardly more than nine
 numbers do. A value of a new person's movement has the variance between persons and that within them, and its mean is
@@ -15,7 +15,7 @@ from scipy.special import gammaln, stdtr  # scipy.stats would take half a second
 
 from paramove.documents import Floats, Ints
 
-LEAST_DEVIATION = 1e-3
+MIN_DEVIATION = 1e-3
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class PredictiveDistribution:
         between = float(means.var(ddof=1)) * (1.0 + 1.0 / count)
         free_within = max(1, len(values) - count)
         within = float(((values - means[numbers]) ** 2).sum()) / free_within * (1.0 - float((1.0 / sizes).mean()))
-        variance = max(between + within, LEAST_DEVIATION**2)
+        variance = max(between + within, MIN_DEVIATION**2)
         uncertainty = between**2 / (count - 1) + within**2 / free_within
         freedom = variance**2 / uncertainty if uncertainty > 0.0 else len(values) - 1.0
         return cls(float(means.mean()), float(np.sqrt(variance)), min(freedom, len(values) - 1.0))
