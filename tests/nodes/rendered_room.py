@@ -95,7 +95,7 @@ def second_person(film: list[list[Image]], empty: list[Image]) -> list[list[Imag
     return result
 
 
-def waving(rest: np.ndarray, seconds: float = 4.0) -> np.ndarray:
+def waving(rest: np.ndarray, seconds: float = 2.5) -> np.ndarray:
     """Poses (T, 9) at `RATE_HZ`: the arm goes up, the forearm swings, and it comes back."""
     shoulder, upper, lower = rest[:3], np.linalg.norm(rest[3:6] - rest[:3]), np.linalg.norm(rest[6:] - rest[3:6])
     elbow = shoulder + upper * _unit((0.35, -0.75, -0.4))
