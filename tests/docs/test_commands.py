@@ -98,6 +98,7 @@ def test_commands_look_at_a_running_demo():
 ON_THE_ARM = {block.path for block in BLOCKS if block.marker == "on an emulated arm"} - {CONNECT_YOUR_ARM}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in sorted(ON_THE_ARM)])
 def test_commands_work_on_an_emulated_arm(page, tmp_path):
     """One after the other, as a person follows the page."""

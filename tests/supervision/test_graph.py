@@ -1,5 +1,6 @@
 """The graph of a launch file: who is in it, and that text, Mermaid and SVG show all of it."""
 
+import functools
 import os
 import re
 import threading
@@ -21,14 +22,15 @@ from paramove.supervision.launch_file import load
 ROOT = Path(__file__).parents[2]
 
 
-def graph(overlay="sim"):
+@functools.cache
+def graph(overlay):
     launch = load(ROOT / "launch", "rule_learning", [overlay])
     return graph_of(launch, application.check(launch, ROOT))
 
 
 @pytest.fixture(scope="module")
 def sim():
-    return graph()
+    return graph("sim")
 
 
 def edge(found, topic):
