@@ -112,7 +112,7 @@ def test_while_the_robot_relocates_an_object(gap: int) -> None:
         assert {name for name, _ in _said_after(story)} == {"blue"}
 
 
-@pytest.mark.parametrize("brightness", [0.02, 0.25, 4.0])
+@pytest.mark.parametrize("brightness", [0.02, 0.1, 0.25, 4.0])
 def test_a_step_of_brightness_moves_nothing(brightness: float) -> None:
     """Frames that are too dark for colours do not pass the camera's checks; all others show what is there."""
     with Scene(Look(noise=6.0), 1) as before, Scene(Look(brightness=brightness, noise=6.0), 1) as during:
