@@ -1,9 +1,26 @@
-"""What tests of several packages use."""
+"""What tests of several packages use, and in which order they run."""
 
+import gc
 import subprocess
 import sys
 
 import pytest
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Thousands of modules and tests are made that stay: nobody need look through them for garbage again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def pytest_collection_modifyitems(items):
+    """The long ones come first, whole systems before all: at the end no processor waits for the last of them."""
+    items.sort(key=lambda item: (item.get_closest_marker("slow") is None, "system" not in item.path.parts))
 
 
 @pytest.fixture

@@ -54,8 +54,9 @@ def pair(context: Context, folder: Path, wait: Wait) -> Iterator[tuple[Publisher
     subscriber.close()
 
 
-@pytest.mark.parametrize("greeting", GREETINGS)
-@pytest.mark.parametrize("count", [1000, pytest.param(20_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("greeting", "count"), [*((one, 1000) for one in GREETINGS), ("garbage", 20_000), ("silence", 20_000)]
+)
 def test_a_good_peer_hears_every_message_and_one_line_tells_of_the_strangers(
     greeting: str,
     count: int,

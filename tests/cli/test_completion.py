@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from paramove.bus import topics
-from paramove.cli.main import COMMANDS, wanted_command
+from paramove.cli.main import COMMANDS, main, wanted_command
 
 ROOT = Path(__file__).parents[2]
 LAUNCHED = "import sys; from paramove.cli.main import main; sys.argv[0] = 'paramove'; main()"
@@ -27,13 +27,25 @@ def paramove(*arguments, cwd=ROOT, **variables):
     )
 
 
-def offered(line, cwd=ROOT, **variables):
-    """What bash is offered at the end of `line`."""
-    words = line.split(" ")
-    variables |= {"_PARAMOVE_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    answer = paramove(cwd=cwd, **variables)
-    assert answer.stderr == ""
-    return answer.stdout.split()
+@pytest.fixture
+def offered(monkeypatch, capsys):
+    """What bash is offered at the end of a line; answered in this process, and for a real bash in one of its own."""
+
+    def ask(line, cwd=ROOT, **variables):
+        words = line.split(" ")
+        variables |= {"_PARAMOVE_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+        with monkeypatch.context() as patch:
+            patch.chdir(cwd)
+            patch.setattr(sys, "argv", ["paramove"])
+            for name, value in variables.items():
+                patch.setenv(name, value)
+            with pytest.raises(SystemExit):
+                main()
+        answer = capsys.readouterr()
+        assert answer.err == ""
+        return answer.out.split()
+
+    return ask
 
 
 @pytest.mark.parametrize(
@@ -54,27 +66,27 @@ def offered(line, cwd=ROOT, **variables):
         ("paramove launch no_such --set x", set()),
     ],
 )
-def test_names_are_offered(line, expected):
+def test_names_are_offered(line, expected, offered):
     assert set(offered(line)) == expected
 
 
-def test_every_command_is_offered():
+def test_every_command_is_offered(offered):
     there = {name for name in offered("paramove ") if not name.startswith("-")}
     assert {"launch", "graph", "topic", "node", "evaluate", "warm", "doctor"} <= there <= set(COMMANDS)
 
 
-def test_options_of_the_typed_command_are_offered():
+def test_options_of_the_typed_command_are_offered(offered):
     assert {"--with", "--set", "--seed", "--check", "--headless", "--schema"} <= set(offered("paramove launch --"))
     assert {"--format", "--output", "--live"} <= set(offered("paramove graph --"))
 
 
-def test_topics_of_the_truth_are_not_offered():
+def test_topics_of_the_truth_are_not_offered(offered):
     found = offered("paramove topic echo ")
     assert set(found) >= {topic.name for topic in topics.TOPICS if not topic.truth}
     assert not [name for name in found if name.startswith("truth/")]
 
 
-def test_nodes_and_domains_on_the_bus_are_offered(tmp_path):
+def test_nodes_and_domains_on_the_bus_are_offered(tmp_path, offered):
     folder = tmp_path / "paramove" / "second"
     folder.mkdir(parents=True)
     (folder / "status.camera").touch()
@@ -87,20 +99,20 @@ def test_nodes_and_domains_on_the_bus_are_offered(tmp_path):
 @pytest.mark.parametrize(
     "text", ["nodes: [", "nodes: {a: 3}", "default_overlays: 3", "\x00", "nodes: {a: {module: ../x}}"]
 )
-def test_half_written_files_offer_nothing_and_say_nothing(tmp_path, text):
+def test_half_written_files_offer_nothing_and_say_nothing(tmp_path, text, offered):
     (tmp_path / "launch").mkdir()
     (tmp_path / "launch" / "half.yaml").write_text(text)
     assert offered("paramove launch half --set x", cwd=tmp_path) == []
     assert offered("paramove launch ha", cwd=tmp_path) == ["half"]
 
 
-def test_folders_of_runs_are_offered(tmp_path):
+def test_folders_of_runs_are_offered(tmp_path, offered):
     (tmp_path / "runs" / "2026-11-21_10-00-00").mkdir(parents=True)
     assert offered("paramove logs --run runs/", cwd=tmp_path) == ["runs/2026-11-21_10-00-00"]
     assert offered("paramove logs --run runs/", cwd=tmp_path / "runs") == []
 
 
-def test_in_an_empty_folder_what_is_installed_is_offered(tmp_path):
+def test_in_an_empty_folder_what_is_installed_is_offered(tmp_path, offered):
     assert "rule_learning" in offered("paramove launch ", cwd=tmp_path)
 
 

@@ -262,7 +262,7 @@ def test_a_browser_that_does_not_read_or_answer_costs_nothing(page: PageServer, 
     """Of 400 images of 1 MB it gets one; the others are shown the newest."""
     image = b"\xff\xd8" + bytes(MEGABYTE)
     page.show({"clock": 0.0}, image)
-    with visitor.socket(max_queue=1) as deaf, visitor.socket() as silent, visitor.socket() as quick:
+    with visitor.socket(max_queue=1, close_timeout=0.1) as deaf, visitor.socket() as silent, visitor.socket() as quick:
         assert silent.recv(WAIT_S) == image
         assert "clock" in json.loads(silent.recv(WAIT_S))
         before = psutil.Process().memory_info().rss

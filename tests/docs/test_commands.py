@@ -11,7 +11,6 @@ the line before the block, change that:
                                    the exit code that is expected, 0 if it is left out
 """
 
-import contextlib
 import functools
 import itertools
 import re
@@ -29,6 +28,7 @@ from typer.testing import CliRunner
 
 from paramove.cli.main import build
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
+from paramove.supervision import parameters
 from tests.docs.command_line import unknown, unknown_study
 from tests.docs.markdown import CONNECT_YOUR_ARM, MARKERS, PAGES, ROOT, Block, blocks
 from tests.docs.terminal import ENVIRONMENT, attended
@@ -62,14 +62,13 @@ def test_commands_run(block):
     run_block(block)
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory):
-    """A run of the demo, ended after the last test that looks at it."""
-    runs = tmp_path_factory.mktemp("runs")
-    log = runs / "log"
+@pytest.fixture
+def demo(tmp_path):
+    """A run of the demo. It takes all processors that it gets, so one test needs it, and ends it."""
+    log = tmp_path / "log"
     with log.open("w") as output:
         launch = subprocess.Popen(
-            ["paramove", "launch", "rule_learning", "--headless", "--runs", str(runs)],
+            ["paramove", "launch", "rule_learning", "--headless", "--runs", str(tmp_path)],
             cwd=ROOT,
             env=ENVIRONMENT,
             stdout=output,
@@ -88,14 +87,18 @@ def demo(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", marked("needs a running demo"))
-def test_commands_look_at_a_running_demo(block, demo):
-    run_block(block)
+@pytest.mark.usefixtures("demo")
+def test_commands_look_at_a_running_demo():
+    watching = [block for block in BLOCKS if block.marker == "needs a running demo"]
+    assert watching
+    for block in watching:
+        run_block(block)
 
 
 ON_THE_ARM = {block.path for block in BLOCKS if block.marker == "on an emulated arm"} - {CONNECT_YOUR_ARM}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [pytest.param(page, id=page.stem) for page in sorted(ON_THE_ARM)])
 def test_commands_work_on_an_emulated_arm(page, tmp_path):
     """One after the other, as a person follows the page."""
@@ -141,9 +144,16 @@ def check_paramove(words):
     wrong = unknown(words[1:])
     assert not wrong, f"{shlex.join(words)}: {wrong} is unknown"
     if words[1] == "launch":
-        with contextlib.chdir(ROOT):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(ROOT)
+            patch.setattr(parameters, "_ask", asked_here)
             answer = CliRunner().invoke(build("launch"), [*words[1:], "--check"])
         assert answer.exit_code == 0, answer.output
+
+
+def asked_here(asked, workspace):
+    """Findings of the nodes' own Config, asked here; `tests/system/test_launch_files.py` asks it in a process."""
+    return [parameters._answer(module, values) for module, values in asked], ""
 
 
 def check_python(words):
@@ -214,6 +224,7 @@ def test_a_wrong_command_is_found():
     for words in (
         "make no-such-target",
         "paramove launch no_such",
+        "paramove launch rule_learning --set camera.no_such=1",
         "paramove topic hz --no-such",
         "paramove nothing",
         "python -m studies nothing",

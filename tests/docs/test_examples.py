@@ -28,6 +28,7 @@ def example(request, tmp_path_factory):
     return request.param, root
 
 
+@pytest.mark.slow
 def test_commands_of_the_example_run(example):
     page, root = example
     marked = [block for block in blocks(page) if block.marker == MARKER]

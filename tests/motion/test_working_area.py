@@ -16,9 +16,9 @@ from sim.places import STRIP_X, STRIP_Y
 from tests.motion.reaching import CORNERS, GRASP_Z, HOAP3, JOINTS, OPENINGS, at, checker, planner
 
 NOTHING = np.empty((0, 2))
-STEP = 0.02
-X = np.arange(0.115, 0.216, STEP)
-Y = np.arange(-0.14, 0.121, STEP)
+STEP = 0.03
+X = np.arange(0.105, 0.226, STEP)
+Y = np.arange(-0.15, 0.121, STEP)
 STRIP = [(x, y) for x in STRIP_X for y in (STRIP_Y[0], -0.045, 0.01, STRIP_Y[1])]
 
 

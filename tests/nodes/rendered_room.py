@@ -24,7 +24,7 @@ class Room:
     def __init__(self, folder: Path, seed: int = 40) -> None:
         self._world = PointingWorld(seed, 1, VIEWS)
         self._world.write_measures(folder)
-        self._noise = np.random.default_rng(seed)
+        self._seed = seed
         self.studio = self._world._studio  # what is filmed is changed below
         self.times_s = np.arange(0.0, self._world.duration_s, 1.0 / RATE_HZ)
         self.rest = self.studio.at(0.0).pose
@@ -62,14 +62,15 @@ class Room:
         return film
 
     def noisy(self, film: list[list[Image]]) -> list[list[Image]]:
-        """With the noise of the sensor, which no two images share."""
-        return [[self._exposed(image) for image in view] for view in film]
+        """With the noise of the sensor, which no two images share; the same for a film whatever was asked before."""
+        draw = np.random.default_rng(self._seed)
+        return [[self._exposed(image, draw) for image in view] for view in film]
 
     def close(self) -> None:
         self._world.close()
 
-    def _exposed(self, image: Image) -> Image:
-        noise = self._noise.normal(0.0, self.studio.room.noise, image.shape).round().astype(np.int8)
+    def _exposed(self, image: Image, draw: np.random.Generator) -> Image:
+        noise = draw.normal(0.0, self.studio.room.noise, image.shape).round().astype(np.int8)
         return np.ascontiguousarray(cv2.add(np.ascontiguousarray(image), noise, dtype=cv2.CV_8U))
 
 

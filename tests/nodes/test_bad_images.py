@@ -38,7 +38,7 @@ def test_good_images_are_a_gesture_and_no_trouble(config, good, times):
 
 
 @pytest.mark.parametrize("kind", ["black", "frozen", "gone"])
-@pytest.mark.parametrize("frame", [16, 20, 23])
+@pytest.mark.parametrize("frame", [16, 23])
 def test_no_usable_images_from_one_moment_on(config, good, times, kind, frame):
     """The hand is on its way to the target; that of frame 23 has arrived, but was not seen to stay."""
     bad = {"black": lambda view: np.zeros_like(view[0]), "frozen": lambda view: view[frame], "gone": lambda view: None}
@@ -89,11 +89,11 @@ def unsure(outcome) -> bool:
 
 @pytest.mark.slow
 def test_a_room_without_a_person_points_at_nothing(room):
-    assert outcome_of(room, [[gone] * 60 for gone in room[3]]).gestures == []
+    assert outcome_of(room, [[gone] * 30 for gone in room[3]]).gestures == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("before_arrival", [12, 2, 0, -1])
+@pytest.mark.parametrize("before_arrival", [12, 0, -1])
 def test_a_person_who_leaves_is_lost_and_points_at_nothing(room, before_arrival):
     """Where a body hid the wall the picture changes, and hypotheses would gather there."""
     made, _, pointing, empty = room
@@ -128,7 +128,7 @@ def test_what_is_not_in_the_vocabulary_is_lost_until_the_arm_rests_again(room, m
 @pytest.mark.slow
 def test_a_second_person_who_waves_behind_changes_nothing(room):
     _, _, pointing, empty = room
-    assert outcome_of(room, second_person([[view[0]] * 60 for view in pointing], empty)).gestures == []
+    assert outcome_of(room, second_person([[view[0]] * 30 for view in pointing], empty)).gestures == []
     gestures = outcome_of(room, second_person(pointing, empty)).gestures
     assert len(gestures) == 1
     target = room[0].studio.performance.acts[0].targets[0]

@@ -12,7 +12,7 @@ from paramove.objects.colour_tracker import Colour, ColourTracker
 from paramove.objects.homography import PlaneHomography
 from tests.objects.scene import COLOURS, WORKING_AREA, Look, Scene
 
-LOOKS = 20
+LOOKS = 12
 
 
 def _by_name(tracked: TrackedObjects) -> dict[str, TrackedObject]:

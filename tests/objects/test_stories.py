@@ -59,10 +59,7 @@ def hoap3() -> RobotDescription:
     [
         (0, 35, 25, 2),
         (1, 35, 34, 8),
-        (2, 42, 28, 6),
         (3, 52, 28, 6),
-        (4, 52, 34, 2),
-        (5, 58, 25, 4),
         (6, 65, 25, 2),
         (7, 65, 34, 8),
     ],
@@ -70,7 +67,10 @@ def hoap3() -> RobotDescription:
 def test_rules_hold_whatever_camera_and_openings(
     seed: int, elevation_deg: float, diameter_mm: float, chamfer_mm: float, hoap3: RobotDescription
 ) -> None:
-    """Nobody tells the robot of either: it sees from where the camera looks, and where the rims are."""
+    """Nobody tells the robot of either: it sees from where the camera looks, and where the rims are.
+
+    The extremes and a middle; `python -m benchmarks.many_worlds --measures drawn` looks at a hundred others.
+    """
     measures = Measures(elevation_deg, diameter_mm / 2000, chamfer_mm / 1000)
     view = View(seed, hoap3, measures)
     try:

@@ -80,8 +80,8 @@ def dense_maximum(model: InterpolativePHMM, sequence: np.ndarray) -> float:
 @pytest.mark.parametrize("name", ["three", "two"])
 def test_the_maximum_over_the_table_is_that_of_a_dense_raster(name: str, request: pytest.FixtureRequest) -> None:
     model = request.getfixturevalue(name)
-    gaps = np.array([dense_maximum(model, one) - model.estimate(one).log_likelihood for one in UNSEEN])
-    assert np.mean(gaps <= 0.5) >= 0.97
+    gaps = np.array([dense_maximum(model, one) - model.estimate(one).log_likelihood for one in UNSEEN[::3]])
+    assert (gaps <= 0.5).all()
 
 
 @pytest.mark.parametrize(("dimension", "lines"), [(1, 4), (3, 2)])

@@ -1,5 +1,6 @@
 """The graph of a launch file: who is in it, and that text, Mermaid and SVG show all of it."""
 
+import functools
 import os
 import re
 import threading
@@ -22,14 +23,15 @@ from paramove.workspace import Workspace
 ROOT = Path(__file__).parents[2]
 
 
-def graph(overlay="sim"):
+@functools.cache
+def graph(overlay):
     launch = load(Workspace.at(ROOT), "rule_learning", [overlay])
     return graph_of(launch, application.check(launch, Workspace.at(ROOT)))
 
 
 @pytest.fixture(scope="module")
 def sim():
-    return graph()
+    return graph("sim")
 
 
 def edge(found, topic):

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 from paramove.supervision.launch_file import load
 from paramove.workspace import Workspace
@@ -18,6 +19,8 @@ from studies.faults.kill_run import KillResult, KillRun
 
 ROOT = Path(__file__).parents[2]
 FILE = load(Workspace.at(ROOT), "rule_learning", ["sim", "real_time"]).file
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -45,7 +48,11 @@ def test_arm_driver_killed_in_motion_comes_back_disarmed_and_the_run_ends_so(tmp
 
 @pytest.mark.usefixtures("runtime")
 def test_camera_killed_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
-    assert killed("camera", "rest", tmp_path).ready_s is not None
+    result = killed("camera", "rest", tmp_path)
+    assert result.ready_s is not None
+    assert "was killed (SIGKILL); restart 1 in " in (tmp_path / "output.log").read_text()
+    outcome = YAML(typ="safe").load((Path(result.run_folder) / "run.yaml").read_text())["outcome"]["nodes"]["camera"]
+    assert (outcome["state"], outcome["exit_code"], outcome["restarts"]) == ("stopped", 0, 1)
 
 
 @pytest.mark.usefixtures("runtime")

@@ -4,9 +4,11 @@ import json
 
 import pytest
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
-def test_targets_that_a_person_points_at_are_found(launcher):
+
+def test_targets_that_a_person_points_at_are_found_and_tracked_again_without_truth(launcher):
+    """Then with one of the two cameras, from the recording of the run, with the measures that lie beside it."""
     code, shown = launcher.run("pointing", "--seed", "3", "--set", "simulator.targets=2", timeout_s=400)
     assert code == 0, shown
     assert "SUCCESS: 2 of 2 pointings were answered" in shown
@@ -16,12 +18,6 @@ def test_targets_that_a_person_points_at_are_found(launcher):
     assert (launcher.latest / "pointing.mp4").stat().st_size > 10_000
     assert "<video" in (launcher.latest / "report.html").read_text()
 
-
-@pytest.mark.slow
-def test_a_recorded_run_is_tracked_again_without_truth(launcher):
-    """One of the two cameras, from the recording of a run, with the measures that lie beside it."""
-    code, shown = launcher.run("pointing", "--seed", "3", "--set", "simulator.targets=1", timeout_s=400)
-    assert code == 0, shown
     folder = launcher.latest.resolve()
     cameras = folder / "cameras.yaml"
     text = cameras.read_text()
@@ -38,7 +34,6 @@ def test_a_recorded_run_is_tracked_again_without_truth(launcher):
     assert (again / "recording.mcap").stat().st_size > 100_000
 
 
-@pytest.mark.slow
 def test_a_stereo_body_tracker_and_a_window_of_its_poses_find_the_target_too(launcher):
     """Paper 5.4: markers instead of silhouettes, the last part of pointing instead of a filter."""
     arguments = ("--with", "sim", "--with", "stereo", "--seed", "9", "--set", "simulator.targets=1")

@@ -45,8 +45,7 @@ def synthesize(
     """
     import numpy as np
 
-    from paramove.demonstrations import write_plot
-    from paramove.training import ENDINGS, Made, as_csv, plot_synthesis, write_movement
+    from paramove.training import ENDINGS, Made, as_csv, write_movement
 
     if out is not None and out.suffix not in ENDINGS:
         raise typer.BadParameter(f"files of movements end in {', '.join(ENDINGS)}", param_hint="--out")
@@ -63,6 +62,9 @@ def synthesize(
             write_movement(made, out)
             typer.echo(f"{out}: {count} frames, {seconds:.3g} s")
         if plot is not None:
+            from paramove.demonstrations import write_plot
+            from paramove.training import plot_synthesis
+
             write_plot(plot_synthesis(trained, values, made.time, made.frames), plot, f"{model.name}: theta {theta}")
             typer.echo(str(plot))
         if out is None and plot is None:

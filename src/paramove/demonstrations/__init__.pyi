@@ -28,13 +28,13 @@ from .labels import FILE_NAME as FILE_NAME
 from .labels import Segment as Segment
 from .labels import load_labels as load_labels
 from .movement import AXIS_ENDINGS as AXIS_ENDINGS
+from .movement import POINTS_FIRST as POINTS_FIRST
 from .movement import DemonstrationError as DemonstrationError
 from .movement import Movement as Movement
 from .movement import place_of_theta as place_of_theta
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import at_times as at_times
 from .movement_ends import last_parts as last_parts
-from .plots import POINTS_FIRST as POINTS_FIRST
 from .plots import plot_set as plot_set
 from .plots import write_plot as write_plot
 from .pose_recording import BILLION as BILLION

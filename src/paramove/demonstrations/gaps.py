@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from paramove.demonstrations.movement import runs
 from paramove.documents import Floats
@@ -74,5 +73,7 @@ def fill_gaps(
 def _between(time: Floats, path: Floats, around: NDArray[np.intp], wanted: Floats) -> Floats:
     if len(around) < 4:
         return np.stack([np.interp(wanted, time[around], path[around, axis]) for axis in range(3)], axis=-1)
+    from scipy.interpolate import CubicSpline  # a third of a second, which only a gap should cost
+
     result: Floats = CubicSpline(time[around], path[around])(wanted)
     return result

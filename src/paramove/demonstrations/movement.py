@@ -12,6 +12,8 @@ from paramove.documents import Floats, InputError
 
 Side = Literal["right", "left"]
 AXIS_ENDINGS = ("_x", "_y", "_z")
+POINTS_FIRST = ("index", "wrist", "hand")
+"""Which point is drawn if none is named: the first of these that there is, else the last point."""
 
 
 class DemonstrationError(InputError):

@@ -14,13 +14,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from paramove.demonstrations.demonstration_set import DemonstrationSet
-from paramove.demonstrations.movement import DemonstrationError
+from paramove.demonstrations.movement import POINTS_FIRST, DemonstrationError
 from paramove.documents import Floats, image, nearest, report_page
 
 DPI = 110
 FIGURE_IN = (13.0, 7.5)
-POINTS_FIRST = ("index", "wrist", "hand")
-"""Which point is drawn if none is named: the first of these that there is, else the last point."""
 COLOURS = "viridis"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from paramove.demonstrations.movement import DemonstrationError, Movement
 from paramove.documents import Floats
@@ -34,6 +33,8 @@ def resampled(movement: Movement, rate_hz: float) -> Movement:
     time: Floats = np.arange(count) / rate_hz
     if count == len(movement.time) and np.allclose(time, movement.time, rtol=0.0, atol=1e-8):
         return movement
+    from scipy.interpolate import make_interp_spline  # a third of a second, which only a new rate should cost
+
     inside = np.minimum(time, movement.time[-1])
     degree = min(3, len(movement.time) - 1)
     spline = make_interp_spline(movement.time, movement.positions, k=degree)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
-from scipy.stats import chi2
+from scipy.special import chdtri  # scipy.stats would take half a second to import
 
 from paramove.demonstrations import POINTS_FIRST
 from paramove.documents import Floats, InputError, nearest
 from paramove.phmm import ParametricHMM
 from paramove.training.examples import is_place
+
+if TYPE_CHECKING:  # matplotlib takes half a second, which only those who draw should wait
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = "viridis"
 INK, FAINT, WARN = "#1d2530", "#aab3bd", "#b3372b"
@@ -94,6 +94,9 @@ def raster(low_high: Floats) -> Floats:
 
 def new_figure(width_in: float, height_in: float) -> Figure:
     """An empty figure that needs no display."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -115,7 +118,9 @@ def space_axes(figure: Figure, place: Any, paths: Sequence[Floats], title: str) 
 
 def add_ellipse(axes: Axes, centre: Floats, covariance: Floats, colour: Any, share: float = 0.95, **look: Any) -> None:
     """The region of a normal distribution in the plane that holds a share of it."""
+    from matplotlib.patches import Ellipse
+
     values, vectors = np.linalg.eigh(covariance)
-    lengths = 2.0 * np.sqrt(np.maximum(values, 0.0) * chi2.ppf(share, 2))
+    lengths = 2.0 * np.sqrt(np.maximum(values, 0.0) * chdtri(2, 1.0 - share))
     angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
     axes.add_patch(Ellipse((centre[0], centre[1]), lengths[1], lengths[0], angle=angle, color=colour, **look))

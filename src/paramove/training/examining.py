@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri  # scipy.stats would take half a second to import
 
 from paramove.demonstrations import BODY, DemonstrationError, Movement, in_body_frame, mirrored, resampled
 from paramove.documents import Floats, InputError, renamed_attribute
@@ -53,7 +53,7 @@ class Recognition:
     @property
     def half_widths(self) -> Floats:
         """From theta to the edges of the box around the region that holds it in 95 % of the cases. Shape (P,)."""
-        size = float(np.sqrt(chi2.ppf(REGION, len(self.estimate.theta))))
+        size = float(np.sqrt(chdtri(len(self.estimate.theta), 1.0 - REGION)))
         result: Floats = size * np.sqrt(np.diagonal(self.estimate.covariance))
         return result
 

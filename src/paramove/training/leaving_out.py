@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
-from scipy.stats import chi2
+from scipy.special import chdtri  # scipy.stats would take half a second to import
 
 from paramove.alignment import movement_distance
 from paramove.documents import Floats
@@ -122,7 +122,7 @@ def covers(estimated: Floats, covariance: Floats, theta: Floats) -> bool:
     """Whether the 95 % region of an estimate holds theta."""
     difference = theta - estimated
     squared = float(difference @ np.linalg.solve(covariance, difference))
-    return 0.0 <= squared <= float(chi2.ppf(REGION, len(theta)))
+    return 0.0 <= squared <= float(chdtri(len(theta), 1.0 - REGION))
 
 
 def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
