@@ -25,12 +25,7 @@ PUBLISHES = (topics.GESTURES, topics.GESTURES_SCENE)
 
 
 class Config(NodeConfig, PointingSetup):
-    old_names = (
-        ("motion.patience_s", "motion.timeout_s"),
-        ("pointing_actions.least_certainty", "pointing_actions.min_certainty"),
-        ("pointing_window.least_lead", "pointing_window.min_lead"),
-        ("pointing_window.most_gap_s", "pointing_window.max_gap_s"),
-    )
+    old_names = (("motion.patience_s", "motion.timeout_s"), *PointingSetup.old_names)
 
     motion: MotionThresholds = MotionThresholds()
     pointing: PointingThresholds = PointingThresholds()

@@ -27,7 +27,7 @@ BLUE, RED, BLACK, MAGENTA, GREEN = "#2f6fc4", "#c8372d", "#1d2530", "#b0309a", "
 ELBOW_LINES = (
     ("elbow", BLUE, "interpolation ‖q − q̂‖"),
     ("effective", RED, "effective ‖q′ − q̂′‖"),
-    ("least_imitation", BLACK, "imitation, reference ‖q̂′ − q̂‖"),
+    ("min_imitation", BLACK, "imitation, reference ‖q̂′ − q̂‖"),
     ("imitation", MAGENTA, "imitation ‖q′ − q̂‖"),
 )
 

@@ -60,7 +60,7 @@ def offered(monkeypatch, capsys):
         ("paramove launch rule_learning --with real --set simulator.", set()),
         ("paramove launch --schema ", {"launch", "overlay"}),
         ("paramove topic ec", {"echo"}),
-        ("paramove topic echo camera/im", {"camera/image"}),
+        ("paramove topic echo camera/im", {"camera/image", "camera/image_raw"}),
         ("paramove graph --format ", {"text", "mermaid", "svg"}),
         ("paramove doctor --only c", {"cameras"}),
         ("paramove launch no_such --set x", set()),

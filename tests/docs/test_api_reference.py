@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import importlib.util
 import inspect
+import re
 import subprocess
 import sys
 
@@ -64,25 +65,40 @@ def test_page_is_that_of_the_code():
     assert (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8") == page
 
 
-def test_pages_can_be_built(tmp_path):
-    count = BUILD.build(tmp_path / "html", pages_only=True)
-    assert count == len(list((tmp_path / "html").rglob("*.html"))) - 1 - len(folders(tmp_path / "html"))
-    index = (tmp_path / "html" / "docs" / "index.html").read_text()
-    assert 'href="reference/api.html"' in index
-    api = (tmp_path / "html" / "docs" / "reference" / "api.html").read_text()
-    assert 'href="../../api/paramove/hmm.html#LeftRightHMM"' in api
-    assert "<table>" in api
+@pytest.fixture(scope="module")
+def html(tmp_path_factory):
+    out = tmp_path_factory.mktemp("docs") / "html"
+    subprocess.run([sys.executable, "docs/build.py", "--pages-only", "--out", str(out)], cwd=ROOT, check=True)
+    return out
 
 
-def folders(out):
-    """Pages that list a folder of the repository which is linked to."""
-    return [page for page in out.rglob("index.html") if page.parent not in (out, out / "docs")]
+def test_pages_have_a_sidebar_a_search_and_links_to_the_api(html):
+    index = (html / "docs" / "index.html").read_text()
+    linked = set(re.findall(r'class="reference internal" href="([^"#]+)"', index))
+    written = {page.relative_to(html / "docs").as_posix() for page in (html / "docs").rglob("*.html")}
+    assert written - {"index.html"} <= linked
+    assert (html / "searchindex.js").is_file()
+    assert 'href="../../api/paramove/hmm.html#LeftRightHMM"' in (html / "docs" / "reference" / "api.html").read_text()
 
 
-def test_a_dead_link_is_found(tmp_path):
-    (tmp_path / "a.html").write_text("<a href='b.html#there'>1</a><a href='b.html#not'>2</a><a href='c.html'>3</a>")
-    (tmp_path / "b.html").write_text("<h1 id='there'>b</h1>")
-    assert BUILD.dead_links(tmp_path) == ["a.html: b.html#not", "a.html: c.html"]
+def test_formulas_are_drawn_without_a_network(html):
+    page = (html / "docs" / "explanation" / "models.html").read_text()
+    assert page.count("<math ") > 5
+    assert not re.search(r'(src|href)="https?://[^"]*(mathjax|katex|cdn)', page)
+
+
+@pytest.mark.parametrize("link", ["models.md#no-such-heading", "no_such_page.md"])
+def test_a_dead_link_is_found(tmp_path, link):
+    for name in ("docs", "docs/explanation"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "docs" / "index.md").write_text(
+        f"# Index\n\n**A**\n\n- [a](explanation/models.md)\n\n[b](explanation/{link})\n"
+    )
+    (tmp_path / "docs" / "explanation" / "models.md").write_text("# Models\n")
+    sphinx = ["-m", "sphinx", "-q", "-W", "-b", "html", "-c", str(ROOT / "docs"), str(tmp_path), str(tmp_path / "out")]
+    answer = subprocess.run([sys.executable, *sphinx], capture_output=True, text=True, check=False)
+    assert answer.returncode != 0
+    assert link.partition("#")[2] in answer.stderr
 
 
 def test_nobody_elses_folder_is_made_anew(tmp_path):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import ConfigDict
 
 from paramove.bus import Topic, topics
+from paramove.documents import OldNames
 from paramove.pointing.events import PointingEventOptions, PointingEvents
 from paramove.pointing.window import PointingWindowOptions
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from paramove.pointing.window import PointingWindow
 
 
-class PointingSetup(BaseModel):
+class PointingSetup(OldNames):
     """Parameters of what says where a person points.
 
     Attributes:
@@ -28,6 +29,11 @@ class PointingSetup(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    old_names: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("pointing_actions.least_certainty", "pointing_actions.min_certainty"),
+        ("pointing_window.least_lead", "pointing_window.min_lead"),
+        ("pointing_window.most_gap_s", "pointing_window.max_gap_s"),
+    )
 
     pointing_from: Literal["estimates", "poses"] = "estimates"
     person: Path | None = None

@@ -151,7 +151,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(chain, emulator
 
 
 @pytest.mark.parametrize(
-    ("faults", "rounds", "least"),
+    ("faults", "rounds", "minimum"),
     [(WireFaults(late=0.03, late_s=0.06, seed=9), 40, 100), (WireFaults(late=0.2, late_s=0.04, seed=3), 15, 0)],
     ids=["now and then", "most of them"],
 )
