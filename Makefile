@@ -10,7 +10,7 @@ SEEDS ?= 0-9
 # Of linear algebra in each process: with small matrices threads mostly wait for each other, and keep processors busy with it.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-hardware check docs results ci format setup messages lock benchmark-seeds coverage mutation bare clean
+.PHONY: help wheel demo test test-hardware check docs results ci format setup messages lock benchmark-seeds coverage mutation bare clean
 
 help: ## this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -33,6 +33,11 @@ check: setup ## formatting, lint, types, generated messages
 
 docs: setup ## the documentation as HTML in build/docs: all pages, and the API from docstrings
 	@$(BIN)/python docs/build.py $(ARGS)
+
+wheel: setup ## the package as one file in build/dist, to be installed anywhere by pip
+	@rm -rf build/dist
+	@$(BIN)/python -m pip wheel . --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir build/dist
+	@ls build/dist/*.whl
 
 results: setup ## measures again what the pages print (hours), or some of it: make results ARGS="imitation pointing"
 	@$(BIN)/python docs/results.py --run $(or $(ARGS),all)
