@@ -1,5 +1,11 @@
 """paramove: parametric human movements, learned from few demonstrations."""
 
-import importlib.metadata
+__version__: str
 
-__version__ = importlib.metadata.version("paramove")
+
+def __getattr__(name: str) -> str:
+    if name != "__version__":
+        raise AttributeError(f"module 'paramove' has no attribute {name!r}")
+    from importlib.metadata import version  # takes longer than all that a help page needs
+
+    return version("paramove")

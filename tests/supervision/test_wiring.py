@@ -6,6 +6,7 @@ import pytest
 
 from paramove.bus import topics
 from paramove.documents.positions import DocumentError
+from paramove.supervision import launch_file, parameters
 from paramove.supervision.interfaces import InterfaceError, read_interface
 from paramove.supervision.wiring import check_wiring, clock_publisher, read_interfaces
 from paramove.workspace import Workspace
@@ -135,3 +136,25 @@ def test_no_node_has_to_be_imported_to_be_known(module, monkeypatch):
     monkeypatch.setattr("paramove.supervision.interfaces._imported", lambda *ask: asked.append(ask) or ((), ()))
     read_interface(module, Workspace.at(ROOT))
     assert asked == []
+
+
+def test_parameters_that_were_right_are_not_checked_again_until_the_code_changes(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    installed = Workspace.at(ROOT)
+    launch = launch_file.load(installed, "pointing")
+    interfaces = read_interfaces(launch, installed)
+    asked = []
+    ask = parameters._ask
+    monkeypatch.setattr(parameters, "_ask", lambda *arguments: asked.append(arguments) or ask(*arguments))
+    for _ in range(2):
+        check_wiring(launch, interfaces, installed)
+    assert len(asked) == 1
+    wrong = launch_file.load(installed, "pointing", None, ["action_tracker.particles=0"])
+    with pytest.raises(DocumentError, match="particles"):
+        check_wiring(wrong, interfaces, installed)
+    library = tmp_path / "library"
+    library.mkdir()
+    (library / "other.py").touch()
+    monkeypatch.setattr(parameters, "LIBRARY", library)
+    check_wiring(launch, interfaces, installed)
+    assert len(asked) == 3

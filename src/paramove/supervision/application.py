@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from paramove import __version__
+import paramove
 from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
@@ -97,7 +97,7 @@ def _facts(launch: Launch, workspace: Workspace, domain: str, begun: datetime.da
         "seed": launch.seed,
         "domain": domain,
         "begun": begun.isoformat(timespec="seconds"),
-        "version": __version__,
+        "version": paramove.__version__,
         "commit": _commit(workspace.clone),
         "workspace": {"folders": [str(folder) for folder in workspace.folders], "sha256": workspace.digest},
     }

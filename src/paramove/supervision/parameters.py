@@ -1,19 +1,25 @@
 """Parameters of nodes, checked by the nodes' own Config before anything starts.
 
 The modules are imported in one process of its own, because they import heavy libraries. Only nodes are asked that are
-given parameters or need some, for this is most of what a launch waits for before it starts.
+given parameters or need some, for this is most of what a launch waits for before it starts. That nothing is wrong is
+stored, so that nobody waits for it again as long as no code, library or parameter has changed.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import importlib
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, get_args
 
+from platformdirs import user_cache_path
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
@@ -23,6 +29,7 @@ from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.workspace import Workspace
 
+LIBRARY = Path(__file__).parents[1]
 TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
 
@@ -38,6 +45,9 @@ def wrong_parameters(
     }
     if not asked:
         return
+    passed = _passed_before(asked, interfaces, workspace)
+    if passed is not None and passed.is_file():
+        return
     answers, ending = _ask(list(asked.values()), workspace)
     for (name, (module, _)), answer in zip(asked.items(), answers, strict=False):
         if isinstance(answer, str):
@@ -49,6 +59,22 @@ def wrong_parameters(
     if len(answers) < len(asked):
         name, (module, _) = list(asked.items())[len(answers)]
         yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {ending}")
+    if passed is not None and answers == [[]] * len(asked):
+        with contextlib.suppress(OSError):  # where nothing can be stored, it is checked again
+            passed.parent.mkdir(parents=True, exist_ok=True)
+            passed.touch()
+
+
+def _passed_before(
+    asked: Mapping[str, tuple[str, dict[str, Any]]], interfaces: Mapping[str, Interface], workspace: Workspace
+) -> Path | None:
+    """A file that exists once these parameters were right for this code; None for nodes whose code may lie anywhere."""
+    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name in asked):
+        return None
+    digest = hashlib.sha256(json.dumps([asked, workspace.digest, sys.version, version("pydantic")]).encode())
+    for file in sorted(LIBRARY.rglob("*.py")):
+        digest.update(b"%s\0%s" % (os.fsencode(file), file.read_bytes()))
+    return user_cache_path("paramove") / "checked" / digest.hexdigest()
 
 
 def _sentence(node: str, parameter: str, finding: dict[str, Any]) -> str:
