@@ -168,6 +168,10 @@ def check_python(words):
     check_options((sys.executable, *program), words[1 + len(program) :])
 
 
+def check_pip(words):
+    check_options((sys.executable, "-m", "pip", words[1]), words[2:])
+
+
 def check_options(command, words):
     known = set(re.findall(r"(?<![\w-])--?[a-z][\w-]*", help_of(command)))
     assert {word.partition("=")[0] for word in words if word.startswith("-")} <= known
@@ -207,9 +211,12 @@ CHECKS = {
     "make": check_make,
     "paramove": check_paramove,
     "python": check_python,
+    "python3": check_python,
+    "pip": check_pip,
     "git": check_git,
     "docker": check_docker,
     "cp": check_program,
+    "mkdir": check_program,
     "ls": check_program,
     "sudo": check_nothing,
     "cd": check_nothing,
