@@ -12,7 +12,9 @@ project = "paramove"
 author = "the paramove authors"
 extensions = ["myst_parser"]
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/**.md", "msgs/README.md", "robot_description/*/README.md"]
+MORE = ["README", "CHANGELOG", "CONTRIBUTING", "msgs/README", "robot_description/*/README"]
+"""Pages outside of docs/."""
+include_patterns = ["docs/**.md", *(f"{page}.md" for page in MORE)]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 html_theme = "furo"
@@ -21,9 +23,6 @@ html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_copy_source = False
 suppress_warnings = ["misc.highlighting_failure"]  # output of programs in code blocks
-
-MORE = ["README", "CHANGELOG", "CONTRIBUTING", "msgs/README", "robot_description/*/README"]
-"""Pages outside of docs/."""
 
 
 def _sidebar(text: str) -> str:

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 _FOLDER = Path(__file__).resolve().parents[1]
+_WITH_WORKSPACE = (_FOLDER.parent, _FOLDER / "paramove" / "workspace")  # of a clone, of a wheel
 _IMPORTED_NS = time.clock_gettime_ns(time.CLOCK_REALTIME)
 _IMPORT = re.compile(
     rb"^[ \t]*(?:from[ \t]+((?:paramove|sim|studies)\b[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.*)|"
@@ -86,7 +87,7 @@ def _file(module: str) -> Path | None:
     if loaded := getattr(sys.modules.get(module), "__file__", None):
         return Path(loaded)
     package, *_ = parts = module.split(".")
-    for folder in [_FOLDER] if package == "paramove" else [*map(Path, sys.path), _FOLDER.parent]:
+    for folder in [_FOLDER] if package == "paramove" else [*map(Path, sys.path), *_WITH_WORKSPACE]:
         path = folder.joinpath(*parts)
         for file in (path / "__init__.py", path.with_suffix(".py")):
             if file.is_file():

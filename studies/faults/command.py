@@ -50,13 +50,13 @@ def kills(
     from studies.faults.live_run import APPLICATION
 
     console = Console(highlight=False, emoji=False)
-    workspace = Workspace.here().root
-    file = load(Workspace.here(), APPLICATION, ["sim", "real_time"]).file
+    workspace = Workspace.here()
+    file = load(workspace, APPLICATION, ["sim", "real_time"]).file
     try:
         cases = cases_of(file, _names(nodes), _names(signals), _names(moments))
     except CaseError as error:
         raise typer.BadParameter(str(error)) from error
-    options = KillOptions(workspace, (runs or workspace / RUNS).resolve(), jobs, seed, pace)
+    options = KillOptions(workspace.root, (runs or workspace.root / RUNS).resolve(), jobs, seed, pace)
     results = {} if again else finished(options.folder, cases)
     if results:
         console.print(f"results of {len(results)} cases are taken from {options.folder} (--again makes them anew)")

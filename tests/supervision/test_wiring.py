@@ -152,9 +152,6 @@ def test_parameters_that_were_right_are_not_checked_again_until_the_code_changes
     wrong = launch_file.load(installed, "pointing", None, ["action_tracker.particles=0"])
     with pytest.raises(DocumentError, match="particles"):
         check_wiring(wrong, interfaces, installed)
-    library = tmp_path / "library"
-    library.mkdir()
-    (library / "other.py").touch()
-    monkeypatch.setattr(parameters, "LIBRARY", library)
+    monkeypatch.setattr(parameters, "code_digest", lambda *modules: "of changed code")
     check_wiring(launch, interfaces, installed)
     assert len(asked) == 3

@@ -15,7 +15,6 @@ from typing import Annotated
 
 import typer
 
-import paramove
 from paramove.cli.completions import typed_words
 from paramove.documents import UNAVAILABLE, InputError
 from paramove.linear_algebra_threads import use_one_thread
@@ -46,7 +45,9 @@ EXTRAS = dict.fromkeys(("av", "cv2", "dynamixel_sdk", "mujoco", "serial", "webso
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"paramove {paramove.__version__}")
+        from paramove import __version__
+
+        typer.echo(f"paramove {__version__}")
         raise typer.Exit
 
 

@@ -154,7 +154,8 @@ class RobotFile(_Part):
 def read_robot_file(path: Path) -> RobotFile:
     """Read and check a `robot.yaml`. Raises DescriptionError with every wrong key, what was found and expected."""
     try:
-        remedy = f"name the folder that holds robot.yaml, or one of {', '.join(Workspace.here().robots())}"
+        known = "" if path.exists() else f", or one of {', '.join(Workspace.here().robots())}"
+        remedy = f"name the folder that holds robot.yaml{known}"
         file = RobotFile.model_validate(read_document(path, "robot description", DescriptionError, remedy).data)
     except ValidationError as error:
         raise DescriptionError(f"{path}: {findings(error)}") from error

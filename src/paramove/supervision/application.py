@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import paramove
 from paramove.supervision.domain import held_domain
 from paramove.supervision.environment import DEFAULT_DOMAIN, allow_open_files
 from paramove.supervision.interfaces import Interface
@@ -91,13 +90,15 @@ def _private_files() -> Iterator[None]:
 
 
 def _facts(launch: Launch, workspace: Workspace, domain: str, begun: datetime.datetime) -> dict[str, Any]:
+    from paramove import __version__  # looked up in the installed package
+
     return {
         "launch": launch.name,
         "overlays": list(launch.overlays),
         "seed": launch.seed,
         "domain": domain,
         "begun": begun.isoformat(timespec="seconds"),
-        "version": paramove.__version__,
+        "version": __version__,
         "commit": _commit(workspace.clone),
         "workspace": {"folders": [str(folder) for folder in workspace.folders], "sha256": workspace.digest},
     }

@@ -24,12 +24,12 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from paramove.documents import DocumentError, nearest
+from paramove.source_code import code_digest
 from paramove.supervision.environment import node_environment
 from paramove.supervision.interfaces import Interface
 from paramove.supervision.launch_file import Launch
 from paramove.workspace import Workspace
 
-LIBRARY = Path(__file__).parents[1]
 TIMEOUT_S = 120.0
 """For importing the modules, on a busy machine with cold caches."""
 
@@ -71,10 +71,9 @@ def _passed_before(
     """A file that exists once these parameters were right for this code; None for nodes whose code may lie anywhere."""
     if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name in asked):
         return None
-    digest = hashlib.sha256(json.dumps([asked, workspace.digest, sys.version, version("pydantic")]).encode())
-    for file in sorted(LIBRARY.rglob("*.py")):
-        digest.update(b"%s\0%s" % (os.fsencode(file), file.read_bytes()))
-    return user_cache_path("paramove") / "checked" / digest.hexdigest()
+    code = code_digest(*(module for module, _ in asked.values()))
+    key = json.dumps([asked, code, workspace.digest, sys.version, version("pydantic")])
+    return user_cache_path("paramove") / "checked" / hashlib.sha256(key.encode()).hexdigest()
 
 
 def _sentence(node: str, parameter: str, finding: dict[str, Any]) -> str:
