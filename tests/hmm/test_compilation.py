@@ -54,6 +54,12 @@ def test_processes_that_compile_at_once_lose_nothing(folder):
     assert ended(started(folder, "3", "3.5")) == (["30", "35.0"], 0)
 
 
+def test_numba_is_imported_when_the_first_kernel_is_called(folder):
+    imported = "print('numba' in sys.modules, end=' ')\n"
+    program = PROGRAM.replace("kernel\n", f"kernel\n{imported}", 1) + imported
+    assert ended(started(folder, "1", program=program))[0] == ["False", "10", "True"]
+
+
 def test_old_machine_code_is_not_used_and_not_stored_for_ever(folder):
     assert ended(started(folder, "1")) == (["10"], 1)
     (old,) = folder.rglob("*.nbc")

@@ -1,28 +1,13 @@
-"""The one way in which numerical kernels are compiled.
+"""The one way in which numerical kernels are compiled: with numba, which is imported when the first of them is called.
 
-Machine code is stored beside the source, or in the user's cache folder where that cannot be written. numba looks only
-at the file of a kernel to see whether its machine code is stale, not at kernels of others that were compiled into it,
-and its index loses entries when several processes write it. So each file here is named by all that it is made from.
+A process that has kernels but calls none, such as one that only synthesises, does without a second of imports.
 """
 
-import hashlib
-import logging
 from collections.abc import Callable
-from functools import cache
-from multiprocessing import parent_process
-from pathlib import Path
+from functools import cached_property, update_wrapper
 from typing import Any, TypeVar, cast
 
-import llvmlite
-import numba
-import numpy as np
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-
-from paramove.source_code import code_digest
-
 Function = TypeVar("Function", bound=Callable[..., Any])
-LIBRARIES = f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
-logger = logging.getLogger(__name__)
 
 
 def compiled(function: Function) -> Function:
@@ -49,44 +34,26 @@ def compiled_arithmetic(function: Function) -> Function:
     return _compiled(function, error_model="numpy", fastmath={"contract"})
 
 
-class KernelFiles(IndexDataCacheFile):
-    """One file of machine code per signature and processor; its name has the digest of the code, which is the stamp."""
+class Kernel:
+    """A compiled function; numba makes its `dispatcher` when it is first called, or a kernel that calls it."""
 
-    def load(self, key: object) -> Any:
-        """The machine code for a key of signature, processor and bytecode; None if there is none."""
-        try:
-            return self._load_data(self._file_for(key))
-        except Exception:  # there is none, or it is damaged: those bytes can raise anything
-            _announce()
-            return None
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self._options = options
 
-    def save(self, key: object, data: Any) -> None:
-        """Writes machine code; removes what is there of the same module from other code."""
-        module = self._data_name_pattern.partition(".")[0]
-        try:
-            self._save_data(self._file_for(key), data)
-            for file in Path(self._cache_path).glob(f"{module}.*.nb[ci]*"):
-                if f".{self._source_stamp}." not in file.name:
-                    file.unlink(missing_ok=True)
-        except OSError as error:
-            logger.warning("the compiled kernel is not stored: %s", error)
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
 
-    def _file_for(self, key: object) -> str:
-        made_for = hashlib.sha256(f"{key}, {LIBRARIES}".encode()).hexdigest()[:16]
-        return str(self._data_name_pattern.format(number=0)).replace(".0.nbc", f".{self._source_stamp}.{made_for}.nbc")
+    @cached_property
+    def dispatcher(self) -> Any:
+        from paramove.hmm.machine_code import dispatcher
 
+        return dispatcher(self.__wrapped__, self._options)
 
-@cache
-def _announce() -> None:
-    """Once, and not in every process of a pool; without other settings of logging it goes to the terminal."""
-    if parent_process() is None:
-        logger.warning("compiling numerical kernels: seconds to two minutes, once ('paramove warm' does it ahead)")
+    @property
+    def _numba_type_(self) -> Any:  # numba asks for it where another kernel calls this one
+        return self.dispatcher._numba_type_
 
 
 def _compiled(function: Function, **options: Any) -> Function:
-    dispatcher = numba.njit(nogil=True, **options)(function)
-    stored = FunctionCache(function)
-    stamp = code_digest(function.__module__)
-    stored._cache_file = KernelFiles(stored.cache_path, stored._impl.filename_base, stamp)
-    dispatcher._cache = stored
-    return cast(Function, dispatcher)
+    return cast(Function, Kernel(function, options))

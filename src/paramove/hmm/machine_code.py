@@ -1,0 +1,67 @@
+"""Machine code of the kernels on disk.
+
+It is stored beside the source, or in the user's cache folder where that cannot be written. numba looks only
+at the file of a kernel to see whether its machine code is stale, not at kernels of others that were compiled into it,
+and its index loses entries when several processes write it. So each file here is named by all that it is made from.
+"""
+
+import hashlib
+import logging
+from collections.abc import Callable
+from functools import cache
+from multiprocessing import parent_process
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from paramove.source_code import code_digest
+
+LIBRARIES = f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
+logger = logging.getLogger(__name__)
+
+
+def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """What numba makes of a function: it chooses among its machine code by the types of arguments."""
+    compiled = numba.njit(nogil=True, **options)(function)
+    stored = FunctionCache(function)
+    stored._cache_file = KernelFiles(stored.cache_path, stored._impl.filename_base, code_digest(function.__module__))
+    compiled._cache = stored
+    return compiled
+
+
+class KernelFiles(IndexDataCacheFile):
+    """One file of machine code per signature and processor; its name has the digest of the code, which is the stamp."""
+
+    def load(self, key: object) -> Any:
+        """The machine code for a key of signature, processor and bytecode; None if there is none."""
+        try:
+            return self._load_data(self._file_for(key))
+        except Exception:  # there is none, or it is damaged: those bytes can raise anything
+            _announce()
+            return None
+
+    def save(self, key: object, data: Any) -> None:
+        """Writes machine code; removes what is there of the same module from other code."""
+        module = self._data_name_pattern.partition(".")[0]
+        try:
+            self._save_data(self._file_for(key), data)
+            for file in Path(self._cache_path).glob(f"{module}.*.nb[ci]*"):
+                if f".{self._source_stamp}." not in file.name:
+                    file.unlink(missing_ok=True)
+        except OSError as error:
+            logger.warning("the compiled kernel is not stored: %s", error)
+
+    def _file_for(self, key: object) -> str:
+        made_for = hashlib.sha256(f"{key}, {LIBRARIES}".encode()).hexdigest()[:16]
+        return str(self._data_name_pattern.format(number=0)).replace(".0.nbc", f".{self._source_stamp}.{made_for}.nbc")
+
+
+@cache
+def _announce() -> None:
+    """Once, and not in every process of a pool; without other settings of logging it goes to the terminal."""
+    if parent_process() is None:
+        logger.warning("compiling numerical kernels: seconds to two minutes, once ('paramove warm' does it ahead)")
