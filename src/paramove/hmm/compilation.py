@@ -39,6 +39,7 @@ class Kernel:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
+        self._function = function
         self._options = options
 
     def __call__(self, *arguments: Any) -> Any:
@@ -48,7 +49,7 @@ class Kernel:
     def dispatcher(self) -> Any:
         from paramove.hmm.machine_code import dispatcher
 
-        return dispatcher(self.__wrapped__, self._options)
+        return dispatcher(self._function, self._options)
 
     @property
     def _numba_type_(self) -> Any:  # numba asks for it where another kernel calls this one
