@@ -412,7 +412,7 @@ def stops(person):
         (
             {"joint4": float(np.deg2rad(113.0))},
             lambda person: None,
-            r"trajectory refused \(joint_limit\) at point 1, joint joint4: asked 113 deg, allowed -96.4 to 111.8 deg",
+            r"trajectory rejected \(joint_limit\) at point 1, joint joint4: requested 113 deg, allowed -96.4 to 111.8 deg",
         ),
     ],
     ids=["stopped", "moving", "far away", "impossible"],
