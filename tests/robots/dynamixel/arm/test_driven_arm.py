@@ -310,7 +310,7 @@ def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
     person.waits_for("HOLD")
     (fault,) = person.safety.faults
     assert (fault.code, fault.joint) == ("following", "joint1")
-    told = r"joint joint1 is [0-9.]+ deg from where it is commanded for 100 ms, allowed 10\.00 deg; see what holds it"
+    told = r"joint joint1 has been [0-9.]+ deg from its commanded position for 100 ms, allowed 10\.00 deg"
     assert re.match(told, fault.sentence)
     person.hears_until(lambda: np.ptp(person.angles[-10:], axis=0).max() < 1e-3)
     held = person.memory("Present Position")

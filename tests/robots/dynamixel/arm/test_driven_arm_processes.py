@@ -156,7 +156,7 @@ def test_logic_that_hangs_while_the_loop_lives_ends_in_the_stop_ramp(emulator):
         person.waits_for("HOLD")
         (fault,) = person.safety.faults
         assert fault.code in ("driver_stalled", "stream_under_run")
-        assert "stood still for" in fault.sentence or "ran out of rows" in fault.sentence
+        assert "stalled for" in fault.sentence or "ran out of rows" in fault.sentence
         assert fault.sentence.endswith("arm again")
         assert person.is_told("STOPPED").reason == fault.sentence
 
