@@ -268,7 +268,7 @@ def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_some
     person.waits_for("HOLD")
     assert person.codes()[0] in (("torque_lost", "joint2"), ("joint_silent", "joint2"))
     told = person.safety.faults[0].sentence
-    assert TORQUE_LOST in told or told.startswith("servo 12 (joint2) was last heard")
+    assert TORQUE_LOST in told or told.startswith("no data from servo 12 (joint2)")
     assert person.memory("Torque Enable") == [1, 0, 1, 1, 1]
     person.hears_until(lambda: person.emulator.bus.servos[1].listens)
     person.arms()  # one word is enough
@@ -299,7 +299,7 @@ def test_a_second_servo_of_one_id_stops_the_arm(person):
     person.waits_for("HOLD")
     assert person.codes()[0] in (("joint_silent", "joint2"), ("bus_noise", ""))
     told = person.safety.faults[0].sentence
-    assert told.startswith("servo 12 (joint2) was last heard") or "two servos may have one ID" in told
+    assert told.startswith("no data from servo 12 (joint2)") or "two servos may have one ID" in told
 
 
 def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
@@ -412,7 +412,7 @@ def stops(person):
         (
             {"joint4": float(np.deg2rad(113.0))},
             lambda person: None,
-            r"trajectory rejected \(joint_limit\) at point 1, joint joint4: requested 113 deg, allowed -96.4 to 111.8 deg",
+            r".*\(joint_limit\) at point 1, joint joint4: requested 113 deg, allowed -96.4 to 111.8 deg",
         ),
     ],
     ids=["stopped", "moving", "far away", "impossible"],
