@@ -424,7 +424,7 @@ def test_where_anything_is_wrong_it_does_not_go_to_rest_but_holds(emulator, capl
         before_the_end(person)
     assert person.memory("Torque Enable") == [1] * 5
     assert person.memory("Bus Watchdog") == [0] * 5
-    assert re.search(f"the arm holds where it is and does not go to rest: {why}", caplog.text)
+    assert re.search(f"does not go to rest: {why}", caplog.text)
 
 
 def test_the_emergency_stop_wins_over_the_way_to_rest(emulator, tmp_path, caplog):
@@ -465,8 +465,8 @@ def test_a_servo_in_trouble_at_the_end_keeps_nothing_from_the_others(emulator, c
             goes_wrong(emulator.bus.servos[0])
     assert person.memory("Torque Enable") == torque
     assert person.memory("Bus Watchdog")[1:] == [0] * 4
-    told = [record.message for record in caplog.records if "did not hear the last word" in record.message]
-    begin = "a servo did not hear the last word: joint1: servo 11 did not answer"
+    told = [record.message for record in caplog.records if "did not take its final settings" in record.message]
+    begin = "a servo did not take its final settings: joint1: servo 11 did not answer"
     assert [one.partition(" (write ")[::2][0] for one in told] == [begin] * len(not_heard)
     assert [name for name, one in zip(not_heard, told, strict=True) if name in one] == not_heard
     with ServoPort(emulator.port):  # free for others

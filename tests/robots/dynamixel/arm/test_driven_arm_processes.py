@@ -118,10 +118,8 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
         driver.send_signal(signal.SIGCONT)
         ((code, sentence),) = json.loads(driver.stdout.readline())
         assert code == "watchdog_tripped"
-        assert sentence == (
-            "servo 11 (joint1) has stopped by itself, for it heard nothing for 1000 ms: this computer was too busy, or "
-            "a cable was loose; arm again, which clears its watchdog"
-        )
+        assert "servo 11 (joint1) has stopped by itself" in sentence
+        assert "1000 ms" in sentence
         assert memory(emulator, "Present Position") == rested
         assert driver.stdout.readline() == "moves\n"  # once it was armed again
         driver.kill()

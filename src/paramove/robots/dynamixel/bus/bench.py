@@ -85,7 +85,7 @@ def slow_timer(device: str, timer_ms: int) -> str:
         return ""
     file = USB_SERIAL / Path(device).name / "latency_timer"
     return (
-        f"the adapter's latency timer is {timer_ms} ms, so each reply waits for it: echo 1 | sudo tee {file}; for "
+        f"the adapter's latency timer is {timer_ms} ms, so each answer waits for it: echo 1 | sudo tee {file}; for "
         'good: ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1" in '
         "/etc/udev/rules.d/99-latency.rules"
     )

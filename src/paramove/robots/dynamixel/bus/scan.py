@@ -141,7 +141,7 @@ class BusScan:
             messages.append(f"answers at {rates} bit/s are damaged: several servos have the same ID, or a bad cable")
         if self.foreign:
             rates = listed(self.foreign)
-            messages.append(f"bytes at {rates} bit/s are no reply of a servo: another device, or a bad cable")
+            messages.append(f"bytes at {rates} bit/s are no answer of a servo: another device, or a bad cable")
         return messages
 
     def findings(self, baud_rate: int = 0) -> list[str]:

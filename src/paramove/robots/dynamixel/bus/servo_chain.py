@@ -329,7 +329,7 @@ def _fits(packet: Packet, sizes: set[int]) -> bool:
 def _check(number: int, packet: Packet, what: str) -> None:
     error = packet.parameters[0] & ~ALERT
     if error:
-        why = REJECTIONS.get(Status(error), "rejected") if error in set(Status) else f"replied with error {error}"
+        why = REJECTIONS.get(Status(error), "rejected") if error in set(Status) else f"answered error {error}"
         raise ServoRejectedError(number, f"servo {number} {why}: {what}")
 
 
