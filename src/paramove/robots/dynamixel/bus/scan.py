@@ -235,7 +235,7 @@ def _quick_ping(chain: ServoChain, number: int) -> PingedServo | None:
     """With short timeouts: most likely no servo has this ID."""
     latency_s, chain.port.latency_s = chain.port.latency_s, min(chain.port.latency_s, SHORT_LATENCY_S)
     try:
-        return chain.ping(number, patient=False)
+        return chain.ping(number, retry=False)
     finally:
         chain.port.latency_s = latency_s
 

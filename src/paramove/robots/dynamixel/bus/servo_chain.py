@@ -141,10 +141,10 @@ class ServoChain:
             self._read_delayed_replies(0.0)
         return not self._delayed.rest_s
 
-    def ping(self, number: int, patient: bool = True) -> PingedServo | None:
-        """Ask one servo whether it is there; `patient`: with the attempts of a read, else once."""
+    def ping(self, number: int, retry: bool = True) -> PingedServo | None:
+        """Ask one servo whether it is there; `retry`: with the attempts of a read, else once."""
         packet = [0, 0, 0, 0, number, 3, 0, Instruction.PING, 0, 0]
-        answer = self._insist(packet, number, PING_DATA, ATTEMPTS_S if patient else ATTEMPTS_S[:1])
+        answer = self._insist(packet, number, PING_DATA, ATTEMPTS_S if retry else ATTEMPTS_S[:1])
         return None if answer is None else _pinged(answer)
 
     def ping_all(self) -> list[PingedServo]:

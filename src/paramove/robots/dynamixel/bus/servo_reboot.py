@@ -61,7 +61,7 @@ def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -
     chain.reboot(number)
     end_s = time.monotonic() + timeout_s
     while time.monotonic() < end_s:
-        pinged = chain.ping(number, patient=False)
+        pinged = chain.ping(number, retry=False)
         if pinged is not None:
             return looked_at(chain, pinged)
     raise ServoSilentError(number, f"servo {number} does not answer {timeout_s:g} s after its reboot: check its power")
