@@ -54,7 +54,7 @@ def test_another_platform_is_told():
 
 def test_packages_in_their_ranges_are_well(installed):
     finding = packages_finding(REQUIRED, installed(numba="0.68.1", opencv_contrib_python_headless="4.14.0.94"))
-    assert (finding.level, finding.sentence) == (Level.OK, "all 2 packages are as paramove needs them")
+    assert (finding.level, finding.sentence) == (Level.OK, "all 2 required packages are installed")
 
 
 def test_packages_outside_of_their_ranges_and_missing_ones_are_named_with_the_command(installed):

@@ -62,7 +62,7 @@ def test_a_driver_without_low_latency_is_told_to_who_may_not_write_its_file(mach
     code = LOOK.replace("Path(sys.argv[1]), dev", "Path(sys.argv[1]), sysfs=Path(sys.argv[2]), dev")
     code = code.partition("print")[0] + "fix = list(serial_findings(machine))[1].fix\n"
     code += "try:\n    fix.do()\nexcept OSError as error:\n    print(json.dumps(str(error)))"
-    assert "no mode of low latency" in as_nobody(serial_findings, code, machine.by_id, machine.sysfs)
+    assert "no low latency mode" in as_nobody(serial_findings, code, machine.by_id, machine.sysfs)
 
 
 def test_a_port_that_another_program_has_open_is_not_asked(machine, port, started):
@@ -72,7 +72,7 @@ def test_a_port_that_another_program_has_open_is_not_asked(machine, port, starte
     assert f"{port} is in use by pid {program.pid} (python" in held.sentence
     assert usable_ports(machine) == []
     (finding,) = servos_findings(machine)
-    assert (finding.level, "none were asked" in finding.sentence) == (Level.WARNING, True)
+    assert (finding.level, "no serial port is free" in finding.sentence) == (Level.WARNING, True)
 
 
 def test_ports_without_such_a_name_are_listed_unless_a_folder_is_given(machine, port):
@@ -87,7 +87,7 @@ def test_ports_without_such_a_name_are_listed_unless_a_folder_is_given(machine, 
 
 def test_a_link_that_leads_nowhere_is_told(machine):
     (machine.by_id / "usb-gone").symlink_to("/dev/pts/no_such")
-    assert "which is not there" in list(serial_findings(machine))[-1].sentence
+    assert "does not exist" in list(serial_findings(machine))[-1].sentence
 
 
 def test_no_port_is_a_warning(tmp_path):

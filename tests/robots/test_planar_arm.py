@@ -91,7 +91,7 @@ def test_without_a_posture_the_arm_faces_the_position_with_the_elbow_above() -> 
 def test_a_point_too_far_away_is_refused_with_a_reachable_one(robot: RobotDescription) -> None:
     arm = arm_of(robot)
     with pytest.raises(
-        OutOfReachError, match=r"wrist .* found links for 0\.\d+ to .*first reachable point is \(0\."
+        OutOfReachError, match=r"wrist .* its links reach 0\.\d+ to .*first reachable point is \(0\."
     ) as refusal:
         arm.joint_angles((0.60, 0.0, 0.20), 0.0)
     nearer = refusal.value.position

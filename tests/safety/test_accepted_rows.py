@@ -96,7 +96,7 @@ def test_giving_way_ends_at_the_measured_pose_after_the_ramp() -> None:
     ramp = rows.early_ramp(10, at(8))
     assert ramp is not None
     there = np.array([0.3, 0.1, -0.2])
-    targets = rows.give_way(ramp, at(8, there))
+    targets = rows.move_to_measured(ramp, at(8, there))
     assert targets is not None
     assert (targets.first_index, targets.ramp_rows) == (10, len(targets.rows))
     np.testing.assert_array_equal(targets.rows[: len(ramp.rows)], ramp.rows)
@@ -108,11 +108,11 @@ def test_giving_way_ends_at_the_measured_pose_after_the_ramp() -> None:
 def test_without_a_ramp_it_begins_where_the_last_row_ends_or_the_robot_is() -> None:
     rows = filled()
     end = rows.end_index
-    targets = rows.give_way(None, at(end, np.full(3, 0.1)))
+    targets = rows.move_to_measured(None, at(end, np.full(3, 0.1)))
     assert targets is not None
     assert (targets.first_index, targets.ramp_rows) == (end, len(targets.rows))
     rows = AcceptedRows(LIMITS)
-    targets = rows.give_way(None, at(4, np.full(3, 0.1)))
+    targets = rows.move_to_measured(None, at(4, np.full(3, 0.1)))
     assert targets is not None
     assert targets.first_index == 4
     np.testing.assert_allclose(targets.rows[-1], 0.1, rtol=0, atol=1e-12)
@@ -121,17 +121,17 @@ def test_without_a_ramp_it_begins_where_the_last_row_ends_or_the_robot_is() -> N
 def test_it_begins_at_the_last_row_itself() -> None:
     rows = AcceptedRows(LIMITS)
     rows.accept(0, np.array([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]]), NOTHING, at(0))
-    targets = rows.give_way(None, at(2, np.array([0.02, 0.0, 0.0])))
+    targets = rows.move_to_measured(None, at(2, np.array([0.02, 0.0, 0.0])))
     assert targets is not None
     np.testing.assert_array_equal(targets.rows, [[0.02, 0.0, 0.0]])
 
 
 def test_a_pose_outside_the_range_is_given_way_to_as_far_as_allowed_and_an_unknown_one_not() -> None:
     rows = AcceptedRows(LIMITS)
-    targets = rows.give_way(None, at(0, np.array([1.9, -1.9, 0.0])))
+    targets = rows.move_to_measured(None, at(0, np.array([1.9, -1.9, 0.0])))
     assert targets is not None
     np.testing.assert_allclose(targets.rows[-1], [1.5, -1.5, 0.0], rtol=0, atol=1e-12)
-    assert AcceptedRows(LIMITS).give_way(None, at(0, np.array([np.nan, 0.0, 0.0]))) is None
+    assert AcceptedRows(LIMITS).move_to_measured(None, at(0, np.array([np.nan, 0.0, 0.0]))) is None
     rows = filled()
     ramp = rows.early_ramp(10, at(8))
-    assert rows.give_way(ramp, at(8, np.array([0.0, np.nan, 0.0]))) is ramp
+    assert rows.move_to_measured(ramp, at(8, np.array([0.0, np.nan, 0.0]))) is ramp

@@ -49,7 +49,7 @@ def test_what_is_not_finite_is_told_first_and_where(value: float) -> None:
     assert found is not None
     assert (found.code, found.row, found.joint, found.allowed) == ("not_finite", 2, "shoulder", "a finite number")
     allowed = "deg, allowed a finite number"
-    assert found.sentence == f"joint shoulder is not a finite number at row 2: asked {value} {allowed}"
+    assert found.message == f"joint shoulder is not a finite number at row 2: requested {value} {allowed}"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -66,7 +66,7 @@ def test_the_position_range_is_judged_exactly(side: int) -> None:
     assert found is not None
     assert (found.code, found.row, found.joint, found.unit) == ("joint_limit", 0, "shoulder", "deg")
     assert found.allowed == "-85.94 to 85.94 deg"
-    np.testing.assert_allclose(found.asked, side * 85.94375, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(found.requested, side * 85.94375, rtol=0, atol=1e-4)
 
 
 def test_outside_its_range_a_joint_may_stay_or_come_back_slowly_but_not_go_on() -> None:
@@ -104,7 +104,7 @@ def test_each_limit_passes_what_is_at_it_and_refuses_a_thousandth_more(kind: str
         assert found is not None
         assert (found.code, found.joint, found.unit) == (kind, "shoulder", unit)
         assert found.allowed.endswith(unit)
-        assert found.asked > np.rad2deg(2.0)
+        assert found.requested > np.rad2deg(2.0)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_what_was_found_and_the_limit_with_its_slack_are_told(kind: str, order: 
     assert (found.code, found.allowed) == (kind, allowed)
     first = np.concatenate([rows[found.row :: -1, 0], np.zeros(3)])[:4]  # the rows before are zero
     value = [first @ [1, -1, 0, 0], first @ [1, -2, 1, 0], first @ [1, -3, 3, -1]][order - 1] / 0.01**order
-    np.testing.assert_allclose(found.asked, np.rad2deg(value), rtol=1e-9)
+    np.testing.assert_allclose(found.requested, np.rad2deg(value), rtol=1e-9)
 
 
 def test_a_jerk_at_its_limit_passes_where_rounding_is_nothing_beside_it() -> None:
@@ -142,8 +142,8 @@ def test_a_jump_is_more_than_one_and_a_half_times_what_motors_can() -> None:
     found = limits.first_violation(rows_of([0.0, 0.751]), REST)
     assert found is not None
     assert (found.code, found.row, found.allowed, found.unit) == ("jump", 1, "343.8 deg/s", "deg/s")
-    said = "joint shoulder jumps from 0 to 43.03 deg at row 1: asked 344.2 deg/s, allowed 343.8 deg/s"
-    assert found.sentence == said
+    facts = "from 0 to 43.03 deg at row 1: requested 344.2 deg/s, allowed 343.8 deg/s"
+    assert facts in found.message
 
 
 def test_what_lies_before_a_short_history_is_rest() -> None:

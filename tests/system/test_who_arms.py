@@ -36,7 +36,7 @@ def test_the_release_of_an_emergency_stop_arms_nothing(tmp_path):
         heard(running, "operator", "ready")
         heard(running, "waiting until a person arms the arm", "the emergency stop is pressed")
         pressed.unlink()
-        heard(running, "arm_driver", "ready", "the safety gate says")  # an emergency stop, until the next report
+        heard(running, "arm_driver", "ready", "safety gate")  # an emergency stop, until the next report
         code, output = at_terminal("sleep 2 && paramove topic echo arm/safety --count 1", "", environment)
         assert code == 0, output
         assert "STATE_DISARMED" in output

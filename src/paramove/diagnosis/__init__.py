@@ -1,4 +1,4 @@
-"""What is wrong with a machine, its installation and what is plugged in, with the command that mends it."""
+"""What is wrong with a machine, its installation and what is plugged in, with the command that fixes it."""
 
 import lazy_loader
 

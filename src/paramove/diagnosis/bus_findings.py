@@ -27,16 +27,16 @@ from paramove.robots.dynamixel import (
 )
 
 NEAR_LIMIT_C = 10
-"""A servo so near its temperature limit is told of; chosen."""
-NOBODY = (
+"""A servo so near its temperature limit is reported; chosen."""
+NO_SERVO = (
     "check, the likeliest first: the motor supply is on; the cable to the first servo is plugged in",
     "the adapter is one for Dynamixel (half duplex, TTL or RS-485 as the servos are)",
-    "the servos speak Protocol 2.0 at one of these rates (--baud names another)",
+    "the servos use Protocol 2.0 at one of these rates (--baud names another)",
 )
-CLEAN = ("unplug the last servo of the chain and look again, until the answers are clean",)
+CLEAN = ("unplug the last servo of the chain and check again, until the answers are clean",)
 
 Wrong = tuple[Level, str, tuple[str, ...]]
-"""How bad, what, and what mends it."""
+"""Severity, message and remedy."""
 
 
 def servos_findings(machine: Machine) -> Iterator[Finding]:
@@ -45,7 +45,7 @@ def servos_findings(machine: Machine) -> Iterator[Finding]:
     for port in ports:
         yield from bus_findings(port, machine.baud_rates or USUAL_BAUD_RATES)
     if not ports:
-        yield Finding("servos", Level.WARNING, "none were asked: there is no serial port that is free")
+        yield Finding("servos", Level.WARNING, "not checked: no serial port is free")
 
 
 def bus_findings(
@@ -54,13 +54,13 @@ def bus_findings(
     timeout_s: float = 0.1,
     ids: Sequence[int] = ALL_IDS,
 ) -> list[Finding]:
-    """Asks the servos on a port, and judges what they tell.
+    """Reads the servos on a port, and checks what they report.
 
     Args:
         port: For example a link in /dev/serial/by-id.
-        baud_rates: At which is asked, bit/s.
-        timeout_s: For the beginning of an answer, beyond the time of its bytes.
-        ids: That are asked one by one where servos answer and something disturbs them.
+        baud_rates: Of the scan, bit/s.
+        timeout_s: For the beginning of a reply, beyond the time of its bytes.
+        ids: That are asked one by one where replies are disturbed.
     """
     try:
         with ServoPort(str(port), baud_rates[0], timeout_s) as opened:
@@ -74,31 +74,31 @@ def bus_findings(
 
 
 def servo_findings(port: Path, servo: FoundServo) -> list[Finding]:
-    """Of one servo: first what it tells, then what is wrong with it."""
+    """Of one servo: first its state, then its faults."""
     about = f"servo {servo.number}"
-    told = [servo.name, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
+    details = [servo.name, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
     facts: dict[str, object] = {"port": str(port), "id": servo.number, "model": servo.name}
     facts |= {"firmware": servo.firmware, "baud_rate": servo.baud_rate}
     if servo.voltage is not None:
         facts["voltage"] = servo.voltage
-        told.append(f"{servo.voltage:.1f} V")
+        details.append(f"{servo.voltage:.1f} V")
     if servo.temperature is not None:
         facts["temperature_c"] = servo.temperature
-        told.append(f"{servo.temperature} °C")
+        details.append(f"{servo.temperature} °C")
     if servo.hardware_error is not None:
         facts["hardware_error"] = servo.hardware_error
     wrong = [*_identity(port, servo), *_voltage(servo), *_temperature(servo), *_hardware_errors(port, servo)]
-    return [Finding(about, Level.OK, ", ".join(told), facts=facts), *(Finding(about, *one) for one in wrong)]
+    return [Finding(about, Level.OK, ", ".join(details), facts=facts), *(Finding(about, *one) for one in wrong)]
 
 
 def _overview(port: Path, scan: BusScan) -> Finding:
     facts = {"port": str(port), "servos": len(scan.servos)}
     if scan.faults and (scan.damaged or not scan.servos):
-        level, remedy = (Level.PROBLEM, CLEAN) if scan.damaged else (Level.WARNING, NOBODY)
+        level, remedy = (Level.PROBLEM, CLEAN) if scan.damaged else (Level.WARNING, NO_SERVO)
         return Finding("bus", level, f"{port.name}: {'; '.join(scan.faults)}", remedy, facts=facts)
     if not scan.servos:
-        sentence = f"{port.name}: no servo answers at {listed(scan.asked)} bit/s"
-        return Finding("bus", Level.WARNING, sentence, NOBODY, facts=facts)
+        message = f"{port.name}: no servo answers at {listed(scan.asked)} bit/s"
+        return Finding("bus", Level.WARNING, message, NO_SERVO, facts=facts)
     plural = "s" * (len(scan.servos) > 1)
     rates = " and ".join(map(str, sorted({servo.baud_rate for servo in scan.servos})))
     return Finding(
@@ -107,19 +107,19 @@ def _overview(port: Path, scan: BusScan) -> Finding:
 
 
 def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
-    """A program talks at one rate; the others are brought to that of most, of two equal ones the faster."""
+    """A program uses one rate: the others get the rate of most servos, of two equal ones the faster."""
     by_rate: dict[int, list[int]] = {}
     for servo in servos:
         by_rate.setdefault(servo.baud_rate, []).append(servo.number)
     if len(by_rate) < 2:
         return
-    kept = max(by_rate, key=lambda rate: (len(by_rate[rate]), rate))
+    target = max(by_rate, key=lambda rate: (len(by_rate[rate]), rate))
     parts = (f"{', '.join(map(str, numbers))} at {rate} bit/s" for rate, numbers in sorted(by_rate.items()))
-    sentence = f"{port.name}: servos at different rates ({'; '.join(parts)}): no program reaches all of them"
-    others = [servo for servo in servos if servo.baud_rate != kept]
-    code = BAUD_RATES.index(kept)
-    remedy = tuple(line for one in others for line in _setting(port, one, "Baud Rate", str(code), f"{kept} bit/s"))
-    yield Finding("bus", Level.PROBLEM, sentence, remedy)
+    message = f"{port.name}: servos at different rates ({'; '.join(parts)}): no program reaches all of them"
+    others = [servo for servo in servos if servo.baud_rate != target]
+    code = BAUD_RATES.index(target)
+    remedy = tuple(line for one in others for line in _setting(port, one, "Baud Rate", str(code), f"{target} bit/s"))
+    yield Finding("bus", Level.PROBLEM, message, remedy)
 
 
 def _identity(port: Path, servo: FoundServo) -> Iterator[Wrong]:
@@ -137,9 +137,9 @@ def _voltage(servo: FoundServo) -> Iterator[Wrong]:
     present, minimum, maximum = (servo.values.get(name) for name in names)
     if present is None or minimum is None or maximum is None or minimum <= present <= maximum:
         return
-    sentence = f"measures {present / 10:.1f} V, its limits are {minimum / 10:.1f} to {maximum / 10:.1f} V"
-    wanted = f"{servo.table.voltage:g} V" if servo.table is not None else "what its manual recommends"
-    yield Level.PROBLEM, sentence, (f"switch off, and give it a supply of {wanted}",)
+    message = f"measures {present / 10:.1f} V, its limits are {minimum / 10:.1f} to {maximum / 10:.1f} V"
+    recommended = f"{servo.table.voltage:g} V" if servo.table is not None else "what its manual recommends"
+    yield Level.PROBLEM, message, (f"switch off, and give it a supply of {recommended}",)
 
 
 def _temperature(servo: FoundServo) -> Iterator[Wrong]:
@@ -147,22 +147,22 @@ def _temperature(servo: FoundServo) -> Iterator[Wrong]:
     if present is None or limit is None or present < limit - NEAR_LIMIT_C:
         return
     level = Level.PROBLEM if present >= limit else Level.WARNING
-    yield level, f"is {present} °C hot, its limit is {limit} °C", ("let it cool with torque off, and lessen its load",)
+    yield level, f"is {present} °C hot, its limit is {limit} °C", ("let it cool with torque off, and reduce its load",)
 
 
 def _hardware_errors(port: Path, servo: FoundServo) -> Iterator[Wrong]:
     status = servo.hardware_error
     if not status:
         return
-    sentence = f"has stopped: {in_words(status)} (Hardware Error Status {status:#04x})"
+    message = f"has stopped: {in_words(status)} (Hardware Error Status {status:#04x})"
     restart = "then hold the arm, as its torque goes off, and restart the servo:"
     command = _command(port, servo, f"reboot(p, {servo.number})")
-    yield Level.PROBLEM, sentence, (*(one.remedy for one in hardware_errors(status)), restart, command)
+    yield Level.PROBLEM, message, (*(one.remedy for one in hardware_errors(status)), restart, command)
 
 
-def _setting(port: Path, servo: FoundServo, register: str, value: str, words: str) -> tuple[str, ...]:
+def _setting(port: Path, servo: FoundServo, register: str, value: str, meaning: str) -> tuple[str, ...]:
     """How a register is set; by a command only where its address is known for certain."""
-    aim = f"set {register} of servo {servo.number} to {words}, with its torque off"
+    aim = f"set {register} of servo {servo.number} to {meaning}, with its torque off"
     if servo.table is None:
         return (f"{aim}, with Dynamixel Wizard 2",)
     address = servo.table.registers[register].address

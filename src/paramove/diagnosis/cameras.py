@@ -11,21 +11,21 @@ from paramove.diagnosis.finding import Finding, Level, Machine
 
 def camera_findings(machine: Machine) -> Iterator[Finding]:
     """One for each device that gives images."""
-    found = sorted(machine.devices.glob("video[0-9]*"), key=lambda path: (len(path.name), path.name))
-    cameras = [path for path in found if _about(machine.sysfs, path, "index") in ("", "0")]
+    devices = sorted(machine.devices.glob("video[0-9]*"), key=lambda path: (len(path.name), path.name))
+    cameras = [path for path in devices if _about(machine.sysfs, path, "index") in ("", "0")]
     for path in cameras:
         yield camera_finding(path, _about(machine.sysfs, path, "name") or "unnamed")
     if not cameras:
-        sentence = f"none found ({machine.devices}/video*): plug one in; the simulation needs none"
-        yield Finding("cameras", Level.WARNING, sentence)
+        message = f"none found ({machine.devices}/video*): plug one in; the simulation needs none"
+        yield Finding("cameras", Level.WARNING, message)
 
 
 def camera_finding(device: Path, name: str) -> Finding:
     """Whether it may be used, and is not used by another program."""
     facts = {"device": str(device), "name": name}
     if not may_use(device):
-        sentence = f"{name}: this user may not read {device}"
-        return Finding("camera", Level.PROBLEM, sentence, access_remedy(device, "video", "video*"), facts=facts)
+        message = f"{name}: this user may not read {device}"
+        return Finding("camera", Level.PROBLEM, message, access_remedy(device, "video", "video*"), facts=facts)
     if held := holders(device):
         who = ", ".join(map(str, held))
         remedy = (f"end it in its terminal, or: kill {held[0].pid}",)
@@ -34,7 +34,7 @@ def camera_finding(device: Path, name: str) -> Finding:
 
 
 def _about(sysfs: Path, device: Path, attribute: str) -> str:
-    """A second device of a camera, with index 1, gives data about the images; "" where nothing is said."""
+    """A second device of a camera, with index 1, gives data about the images; "" without the attribute."""
     path = sysfs / "class" / "video4linux" / device.name / attribute
     try:
         return path.read_text(encoding="utf-8", errors="replace").strip()

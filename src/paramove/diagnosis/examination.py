@@ -1,4 +1,4 @@
-"""All parts of a machine looked at, one after the other."""
+"""Checks of all parts of a machine, one after the other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paramove.diagnosis.installation import installation_findings
 from paramove.diagnosis.resources import resources_findings
 from paramove.diagnosis.serial_ports import serial_findings
 
-LOOKS: dict[Part, Callable[[Machine], Iterable[Finding]]] = {
+CHECKS: dict[Part, Callable[[Machine], Iterable[Finding]]] = {
     Part.INSTALLATION: installation_findings,
     Part.GRAPHICS: graphics_findings,
     Part.RESOURCES: resources_findings,
@@ -23,11 +23,11 @@ LOOKS: dict[Part, Callable[[Machine], Iterable[Finding]]] = {
 
 
 def examined(part: Part, machine: Machine) -> Sequence[Finding]:
-    """What is found of a part; that it could not be looked at is a finding too."""
+    """The findings of a part; a check that fails itself is a finding too."""
     try:
-        return list(LOOKS[part](machine))
+        return list(CHECKS[part](machine))
     except OSError as error:
-        return [Finding(part.value, Level.PROBLEM, f"cannot be looked at: {error}")]
+        return [Finding(part.value, Level.PROBLEM, f"cannot be checked: {error}")]
 
 
 def is_sound(findings: Iterable[Finding]) -> bool:

@@ -1,4 +1,4 @@
-"""One thing that was looked at: whether it is well, what was found, and what mends it."""
+"""The result of one check of a machine, with its cause and remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 class Level(StrEnum):
-    """How a thing is. Only with a problem something cannot work."""
+    """Severity. Only with a problem something cannot work."""
 
     OK = "ok"
     WARNING = "warning"
@@ -18,7 +18,7 @@ class Level(StrEnum):
 
 
 class Part(StrEnum):
-    """Of a machine, in the order in which they are looked at."""
+    """Of a machine, in the order of the checks."""
 
     INSTALLATION = "installation"
     GRAPHICS = "graphics"
@@ -30,10 +30,10 @@ class Part(StrEnum):
 
 @dataclass(frozen=True)
 class Fix:
-    """What mends a thing without being root.
+    """A remedy that needs no root.
 
     Attributes:
-        words: What would be done, for a person who is asked whether it shall be.
+        words: What would be done, for a person who has to confirm it.
         do: Does it; raises OSError or subprocess.CalledProcessError if it cannot be done.
     """
 
@@ -43,14 +43,14 @@ class Fix:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of one thing.
+    """The result of checking one thing.
 
     Attributes:
         subject: The thing, in a word or two.
-        sentence: What was found, with its cause.
-        remedy: Lines that mend it: commands for a shell, or what a person has to do.
+        sentence: The result, with its cause.
+        remedy: Lines that fix it: commands for a shell, or what a person has to do.
         fix: The same by a call, where the user may do it.
-        facts: Numbers and names of the sentence, for programs; unit in the name.
+        facts: Numbers and names of the message, for programs; unit in the name.
     """
 
     subject: str
@@ -63,14 +63,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class Machine:
-    """Where is looked; the defaults are this machine.
+    """What is checked; the defaults are this machine.
 
     Attributes:
         folder: The clone, or any folder in one.
         devices, sysfs: Of the system.
-        by_id: Links to the serial ports that are looked at. None: those that the system makes, by the names of
+        by_id: Links to the serial ports that are checked. None: those that the system makes, by the names of
             adapters, and ports of USB that have no such link.
-        baud_rates: At which servos are asked, bit/s; empty: the usual ones.
+        baud_rates: At which a scan looks for servos, bit/s; empty: the usual ones.
     """
 
     folder: Path = field(default_factory=Path.cwd)

@@ -40,10 +40,10 @@ sys.exit(0 if picture[24, 32, 0] > 0 else "the picture is black")
 
 
 def graphics_backend() -> str:
-    """`egl` or `osmesa`: what MUJOCO_GL says, else EGL where its library is, else software."""
-    asked = os.environ.get("MUJOCO_GL", "").lower()
-    if asked in PACKAGES:
-        return asked
+    """`egl` or `osmesa`: that of MUJOCO_GL, else EGL where its library is, else software."""
+    requested = os.environ.get("MUJOCO_GL", "").lower()
+    if requested in PACKAGES:
+        return requested
     return "egl" if find_library("EGL") or not find_library("OSMesa") else "osmesa"
 
 
@@ -62,14 +62,14 @@ def failure_to_draw(backend: str, script: str = DRAW) -> str:
         return f"nothing was drawn within {TIMEOUT_S:g} s"
     if done.returncode < 0:
         return f"its libraries crash ({signal.Signals(-done.returncode).name})"
-    said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-    return said[0] if done.returncode != 0 else ""
+    error = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+    return error[0] if done.returncode != 0 else ""
 
 
 def graphics_findings(
     _: Machine, failure: Callable[[str], str] = failure_to_draw, backend: str | None = None
 ) -> Iterator[Finding]:
-    """What the simulation would draw with, and if that fails, what else would do.
+    """The library with which the simulation would draw, and if that fails, whether the other one works.
 
     Args:
         failure: Why a library does not draw, "" if it does.
@@ -82,9 +82,9 @@ def graphics_findings(
         yield Finding("graphics", Level.OK, f"MuJoCo draws without a display ({chosen})", facts=facts)
         return
     other = next(name for name in PACKAGES if name != chosen)
-    sentence = f"MuJoCo does not draw with {chosen}: {reason}"
+    message = f"MuJoCo does not draw with {chosen}: {reason}"
     if failure(other):
         remedy = (f"{as_root('apt-get update')} && {as_root(INSTALL)} {PACKAGES['osmesa']}", "export MUJOCO_GL=osmesa")
-        yield Finding("graphics", Level.PROBLEM, sentence, remedy)
+        yield Finding("graphics", Level.PROBLEM, message, remedy)
     else:
-        yield Finding("graphics", Level.PROBLEM, f"{sentence}; with {other} it does", (f"export MUJOCO_GL={other}",))
+        yield Finding("graphics", Level.PROBLEM, f"{message}; with {other} it does", (f"export MUJOCO_GL={other}",))

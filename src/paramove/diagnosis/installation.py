@@ -1,4 +1,4 @@
-"""Whether Python, the packages and OpenCV are such as this version of paramove needs."""
+"""Whether Python, the packages and OpenCV meet the requirements of this version of paramove."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def packages_finding(required: Iterable[str], installed: Iterable[Distribution])
     """Whether every package that is needed is there, in a version that is allowed.
 
     Args:
-        required: As in a package's metadata; those of extras are passed over.
+        required: As in a package's metadata; those of extras are ignored.
         installed: What Python finds, the first of a name first.
     """
     versions: dict[str, str] = {}
@@ -72,12 +72,12 @@ def packages_finding(required: Iterable[str], installed: Iterable[Distribution])
         needed += 1
         version = versions.get(canonicalize_name(requirement.name))
         if version is None or not requirement.specifier.contains(version, prereleases=True):
-            found = "is missing" if version is None else f"is {version}"
-            wrong[f"{requirement.name}{requirement.specifier}"] = f"{requirement.name} {found}"
+            state = "is missing" if version is None else f"is {version}"
+            wrong[f"{requirement.name}{requirement.specifier}"] = f"{requirement.name} {state}"
     if not wrong:
-        return Finding("packages", Level.OK, f"all {needed} packages are as paramove needs them")
-    sentence = "; ".join(f"{found}, {wanted} is needed" for wanted, found in wrong.items())
-    return _mended_by_pip("packages", sentence, [("install", *wrong)])
+        return Finding("packages", Level.OK, f"all {needed} required packages are installed")
+    message = "; ".join(f"{state}, {required_version} is needed" for required_version, state in wrong.items())
+    return _fixed_by_pip("packages", message, [("install", *wrong)])
 
 
 def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) -> Finding:
@@ -89,19 +89,19 @@ def opencv_finding(installed: Iterable[Distribution], script: str = IMPORT_CV2) 
     """
     packages = list(installed)
     owners = sorted({one.name for one in packages if _owns_cv2(one)})
-    again = ("install", "--force-reinstall", "--no-deps", _wanted_opencv(packages))
+    again = ("install", "--force-reinstall", "--no-deps", _required_opencv(packages))
     if len(owners) > 1:
-        sentence = f"{' and '.join(owners)} both hold cv2: what was installed last has overwritten the other"
-        return _mended_by_pip("opencv", sentence, [("uninstall", "-y", *owners), again])
+        message = f"{' and '.join(owners)} both install cv2: the later one has overwritten the other"
+        return _fixed_by_pip("opencv", message, [("uninstall", "-y", *owners), again])
     try:
         done = subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired:
-        return _mended_by_pip("opencv", f"cv2 is not imported within {TIMEOUT_S:g} s", [again])
+        return _fixed_by_pip("opencv", f"cv2 is not imported within {TIMEOUT_S:g} s", [again])
     if done.returncode != 0:
-        said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        return _mended_by_pip("opencv", f"cv2 of {' '.join(owners) or 'no package'} is broken: {said[0]}", [again])
+        error = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+        return _fixed_by_pip("opencv", f"cv2 of {' '.join(owners) or 'no package'} is broken: {error[0]}", [again])
     return Finding("opencv", Level.OK, f"cv2 {done.stdout.strip()} of {' '.join(owners)}")
 
 
@@ -110,19 +110,19 @@ def _owns_cv2(package: Distribution) -> bool:
     return record.startswith("cv2/") or "\ncv2/" in record
 
 
-def _wanted_opencv(installed: Iterable[Distribution]) -> str:
-    """As paramove's metadata say."""
+def _required_opencv(installed: Iterable[Distribution]) -> str:
+    """By paramove's metadata."""
     ours = next((one for one in installed if one.name == OURS), None)
     texts = (ours.requires or ()) if ours is not None else ()
-    found = (one for one in map(Requirement, texts) if one.name == OPENCV)
-    return next((f"{one.name}{one.specifier}" for one in found), OPENCV)
+    matches = (one for one in map(Requirement, texts) if one.name == OPENCV)
+    return next((f"{one.name}{one.specifier}" for one in matches), OPENCV)
 
 
-def _mended_by_pip(subject: str, sentence: str, calls: Sequence[Sequence[str]]) -> Finding:
+def _fixed_by_pip(subject: str, message: str, calls: Sequence[Sequence[str]]) -> Finding:
     commands = [(sys.executable, "-m", "pip", *call) for call in calls]
     remedy = tuple(map(shlex.join, commands))
     fix = Fix(f"run {' && '.join(remedy)}", functools.partial(_run_all, commands))
-    return Finding(subject, Level.PROBLEM, sentence, remedy, fix)
+    return Finding(subject, Level.PROBLEM, message, remedy, fix)
 
 
 def _run_all(commands: Iterable[Sequence[str]]) -> None:

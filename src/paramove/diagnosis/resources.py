@@ -28,7 +28,7 @@ from paramove.workspace import Workspace
 
 LITTLE_BYTES, FEW_BYTES = 1_000_000_000, 5_000_000_000
 """Free on a disk: less than the first is a problem, as a run of the demo records 0.5 GB and more; less than the second
-is told."""
+is a warning."""
 
 
 def resources_findings(machine: Machine) -> Iterator[Finding]:
@@ -58,20 +58,20 @@ def folder_finding(name: str, folder: Path) -> Finding:
             (shlex.join(["mv", str(there), f"{there}.old"]),),
             facts=facts,
         )
-    sentence = f"{there} cannot be written by this user"
-    found = there.stat()
-    if found.st_uid == os.geteuid():
-        mode = stat.S_IMODE(found.st_mode) | stat.S_IRWXU
+    message = f"{there} cannot be written by this user"
+    status = there.stat()
+    if status.st_uid == os.geteuid():
+        mode = stat.S_IMODE(status.st_mode) | stat.S_IRWXU
         command = shlex.join(["chmod", "u+rwx", str(there)])
         fix = Fix(f"run {command}", partial(there.chmod, mode))
-        return Finding(subject, Level.PROBLEM, sentence, (command,), fix, facts)
+        return Finding(subject, Level.PROBLEM, message, (command,), fix, facts)
     return Finding(
-        subject, Level.PROBLEM, sentence, (as_root(f"chown -R $USER {shlex.quote(str(there))}"),), facts=facts
+        subject, Level.PROBLEM, message, (as_root(f"chown -R $USER {shlex.quote(str(there))}"),), facts=facts
     )
 
 
 def sockets_finding() -> Finding:
-    """Whether the sockets of a run can lie where the environment says."""
+    """Whether the sockets of a run can be in the folder that the environment names."""
     subject, name = "sockets folder", os.environ.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     own = ("mkdir -p -m 700 /tmp/r-$USER && export XDG_RUNTIME_DIR=/tmp/r-$USER",)
     try:
@@ -82,61 +82,61 @@ def sockets_finding() -> Finding:
     facts = {"folder": str(folder)}
     size = len(os.fsencode(folder))
     if size > LONGEST_FOLDER:
-        sentence = f"{folder} is too long for sockets: {size} bytes found, {LONGEST_FOLDER} allowed"
-        return Finding(subject, Level.PROBLEM, sentence, own, facts=facts)
+        message = f"{folder} is too long for sockets: {size} bytes, allowed {LONGEST_FOLDER}"
+        return Finding(subject, Level.PROBLEM, message, own, facts=facts)
     above = folder.parent
     if above.is_symlink() or (above.exists() and above.stat().st_uid != os.geteuid()):
         return Finding(subject, Level.PROBLEM, f"{above} is no folder of this user", own, facts=facts)
-    found = folder_finding("sockets", folder)
-    if found.level is Level.OK:
+    finding = folder_finding("sockets", folder)
+    if finding.level is Level.OK:
         return Finding(subject, Level.OK, f"{folder} can be written, and is short enough", facts=facts)
-    return Finding(subject, found.level, found.sentence, (*found.remedy, *own), found.fix, facts)
+    return Finding(subject, finding.level, finding.sentence, (*finding.remedy, *own), finding.fix, facts)
 
 
 def disk_findings(folders: Mapping[str, Path]) -> Iterator[Finding]:
     """Free bytes of each disk on which one of the folders lies."""
-    seen = set[int]()
+    checked = set[int]()
     for name, folder in folders.items():
         there = _nearest(folder)
-        if (number := there.stat().st_dev) not in seen:
-            seen.add(number)
+        if (number := there.stat().st_dev) not in checked:
+            checked.add(number)
             yield disk_finding(name, there, shutil.disk_usage(there).free)
 
 
 def disk_finding(name: str, folder: Path, free_bytes: int) -> Finding:
     """Whether a run has room on the disk of a folder."""
-    sentence = f"{free_bytes / 1e9:.1f} GB free on the disk of {folder} ({name})"
+    message = f"{free_bytes / 1e9:.1f} GB free on the disk of {folder} ({name})"
     facts = {"folder": str(folder), "free_bytes": free_bytes}
     if free_bytes >= FEW_BYTES:
-        return Finding("disk", Level.OK, sentence, facts=facts)
+        return Finding("disk", Level.OK, message, facts=facts)
     remedy = (
         f"du -xh --max-depth=2 {folder} | sort -h | tail",
         "remove what is not needed, such as old folders in runs/",
     )
     level = Level.PROBLEM if free_bytes < LITTLE_BYTES else Level.WARNING
-    return Finding("disk", level, f"only {sentence}", remedy, facts=facts)
+    return Finding("disk", level, f"only {message}", remedy, facts=facts)
 
 
 def open_files_finding(hard_limit: int) -> Finding:
     """Whether a run may have enough files open; below the hard limit `paramove launch` raises its own."""
     if hard_limit == resource.RLIM_INFINITY or hard_limit >= OPEN_FILES:
-        shown = "any number" if hard_limit == resource.RLIM_INFINITY else str(hard_limit)
-        return Finding("open files", Level.OK, f"a process may have {shown} open", facts={"hard_limit": hard_limit})
-    sentence = f"a process may have {hard_limit} files open, a run needs {OPEN_FILES}"
+        allowed = "any number" if hard_limit == resource.RLIM_INFINITY else str(hard_limit)
+        return Finding("open files", Level.OK, f"a process may have {allowed} open", facts={"hard_limit": hard_limit})
+    message = f"a process may have {hard_limit} files open, a run needs {OPEN_FILES}"
     line = f"echo '*  -  nofile  {4 * OPEN_FILES}' | {as_root('tee')} /etc/security/limits.d/paramove.conf"
-    return Finding("open files", Level.PROBLEM, sentence, (line, "log out and in again"))
+    return Finding("open files", Level.PROBLEM, message, (line, "log out and in again"))
 
 
 def environment_findings(workspace: Path) -> Iterator[Finding]:
-    """What of the environment is ignored or in the way of a run in this workspace."""
+    """Variables of the environment that a run in this workspace ignores or that disturb it."""
     try:
         notes = examined(os.environ, workspace).notes
-    except DomainError:  # told with the sockets
+    except DomainError:  # reported with the sockets
         return
     for note in notes:
         yield Finding("environment", Level.WARNING, note)
     if not notes:
-        yield Finding("environment", Level.OK, "no variable is in the way")
+        yield Finding("environment", Level.OK, "no variable disturbs a run")
 
 
 def _nearest(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Which serial ports there are, whether they can be used, and how soon their adapters hand over what came in."""
+"""Which serial ports there are, whether they can be used, and the latency of their adapters."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from paramove.devices import holders, may_use, serial_remedy
 from paramove.diagnosis.finding import Finding, Fix, Level, Machine, as_root
 from paramove.robots.dynamixel import ServoPort, adapter_links
 
-SOON_MS = 1
+LATENCY_MS = 1
 RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 
 
 def port_links(machine: Machine) -> list[Path]:
-    """By the name of their adapter, those that have no such name by their own."""
+    """By the name of their adapter, or by their own name without one."""
     folder = _folder(machine)
     links = adapter_links(folder)
     if machine.by_id is not None:
@@ -40,8 +40,8 @@ def serial_findings(machine: Machine) -> Iterator[Finding]:
     """One or two for each port."""
     links = port_links(machine)
     if not links:
-        sentence = f"none found in {_folder(machine)}: plug in the adapter of the arm; the simulation needs none"
-        yield Finding("serial ports", Level.WARNING, sentence)
+        message = f"none found in {_folder(machine)}: plug in the adapter of the arm; the simulation needs none"
+        yield Finding("serial ports", Level.WARNING, message)
     for link in links:
         yield port_finding(link)
         timer = machine.sysfs / "bus" / "usb-serial" / "devices" / link.resolve().name / "latency_timer"
@@ -54,50 +54,52 @@ def port_finding(link: Path) -> Finding:
     device = link.resolve()
     facts: dict[str, object] = {"port": str(link), "device": str(device)}
     if not device.exists():
-        sentence = f"{link.name} leads to {device}, which is not there"
-        return Finding(
-            "serial port", Level.PROBLEM, sentence, ("unplug the adapter and plug it in again",), None, facts
-        )
+        message = f"{link.name} leads to {device}, which does not exist"
+        return Finding("serial port", Level.PROBLEM, message, ("unplug the adapter and plug it in again",), None, facts)
     if not may_use(link):
-        sentence = f"{link.name}: this user may not use {device}"
-        return Finding("serial port", Level.PROBLEM, sentence, serial_remedy(device), None, facts)
+        message = f"{link.name}: this user may not use {device}"
+        return Finding("serial port", Level.PROBLEM, message, serial_remedy(device), None, facts)
     if held := holders(link):
         facts["pid"] = held[0].pid
-        sentence = f"{link.name}: {device} is in use by {', '.join(map(str, held))}"
+        message = f"{link.name}: {device} is in use by {', '.join(map(str, held))}"
         return Finding(
-            "serial port", Level.PROBLEM, sentence, (f"end it in its terminal, or: kill {held[0].pid}",), None, facts
+            "serial port", Level.PROBLEM, message, (f"end it in its terminal, or: kill {held[0].pid}",), None, facts
         )
     return Finding("serial port", Level.OK, f"{link.name}: {device} is free", facts=facts)
 
 
 def latency_finding(link: Path, timer: Path) -> Finding:
-    """Whether the adapter hands over what came in within 1 ms; by default one of FTDI takes 16 ms.
+    """Whether the adapter hands over received bytes within 1 ms; by default one of FTDI takes 16 ms.
 
     Args:
         link: The port.
-        timer: File in which the driver tells the time, ms, and is told another.
+        timer: File from which the time is read, ms, and to which another is written.
     """
     latency_ms = int(timer.read_text(encoding="utf-8"))
     facts = {"port": str(link), "latency_ms": latency_ms}
-    if latency_ms <= SOON_MS:
+    if latency_ms <= LATENCY_MS:
         return Finding("usb latency", Level.OK, f"{link.name} hands over within {latency_ms} ms", facts=facts)
-    sentence = (
-        f"{link.name} keeps what came in for up to {latency_ms} ms, so that each question to a servo takes as long"
+    message = (
+        f"{link.name} hands over received bytes after up to {latency_ms} ms: each request to a servo takes as long"
     )
     remedy = (
-        f"echo {SOON_MS} | {as_root('tee')} {timer}",
+        f"echo {LATENCY_MS} | {as_root('tee')} {timer}",
         f"for good: echo '{RULE}' | {as_root('tee')} /etc/udev/rules.d/99-paramove-latency.rules && "
         f"{as_root('udevadm control --reload-rules')} && {as_root('udevadm trigger --action=add')}",
     )
-    fix = Fix(f"set it to {SOON_MS} ms until it is unplugged", partial(_hasten, link, timer)) if may_use(link) else None
-    return Finding("usb latency", Level.WARNING, sentence, remedy, fix, facts)
+    fix = (
+        Fix(f"set it to {LATENCY_MS} ms until it is unplugged", partial(_hasten, link, timer))
+        if may_use(link)
+        else None
+    )
+    return Finding("usb latency", Level.WARNING, message, remedy, fix, facts)
 
 
 def _hasten(link: Path, timer: Path) -> None:
     """By the driver's file, which usually only root may write; else by a flag of the port, which its user may set."""
     if os.access(timer, os.W_OK):
-        timer.write_text(f"{SOON_MS}\n", encoding="utf-8")
+        timer.write_text(f"{LATENCY_MS}\n", encoding="utf-8")
         return
     with ServoPort(str(link)) as port:
         if not port.low_latency:
-            raise OSError(f"the driver of {link.name} has no mode of low latency")
+            raise OSError(f"the driver of {link.name} has no low latency mode")

@@ -41,8 +41,8 @@ class Arm:
 
     Attributes:
         joints: Shoulder pitch, roll, torsion, elbow, wrist.
-        indices: Their places in the robot's joint vector.
-        fingers: Name of the joint that closes the hand; `fingers_index` its place.
+        indices: Their indices in the robot's joint vector.
+        fingers: Name of the joint that closes the hand; `fingers_index` its index.
         fingers_open, fingers_closed: Angles of the open (xi = 1) and the closed hand (xi = 0), rad.
         kinematics: Forward kinematics in the frame of the shoulder site.
     """
@@ -69,11 +69,11 @@ class Chain:
 
     Attributes:
         joints: From the base on, without the gripper.
-        indices: Their places in the robot's joint vector.
-        gripper: Name of the joint that closes the gripper; `gripper_index` its place.
+        indices: Their indices in the robot's joint vector.
+        gripper: Name of the joint that closes the gripper; `gripper_index` its index.
         gripper_open, gripper_closed: Its angles, rad.
-        grip_current_ma: With which it holds whatever is between its fingers; None: its servo knows positions only.
-        kinematics: Keeps to the robot's soft limits; in the frame of the base site.
+        grip_current_ma: With which it holds an object; None: its servo has no such mode.
+        kinematics: Within the robot's soft limits; in the frame of the base site.
     """
 
     joints: tuple[str, ...]
@@ -91,8 +91,8 @@ class Chain:
 class RobotDescription:
     """A robot's joints, limits, units and arms. Joint vectors are in the order of `joint_names`.
 
-    All arrays have shape [J]; angles in rad. `lower`, `upper` are the mechanical range, `soft_lower`, `soft_upper` what
-    commands keep to. `velocity` is the motor's limit; `operating_*` are our limits for planned movement. A robot like
+    All arrays have shape [J]; angles in rad. `lower`, `upper` are the mechanical range, `soft_lower`, `soft_upper` the
+    range of commands. `velocity` is the motor's limit; `operating_*` are our limits for planned movement. A robot like
     HOAP-3 has `firmware` and `arms`; one of servos on a bus has `bus`, `servo_ids` and `position_gains` (P, I, D of the
     servo's own loop, in its units) in the order of the joints, and a `chain`. What a robot has not is None or empty.
     """
@@ -144,27 +144,27 @@ class RobotDescription:
         )
 
     @cached_property
-    def _places(self) -> dict[str, int]:
-        return {name: place for place, name in enumerate(self.joint_names)}
+    def _index_of(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.joint_names)}
 
     def index(self, joint: str) -> int:
-        """Place of a joint in the joint vector.
+        """Index of a joint in the joint vector.
 
         Raises:
             DescriptionError: No such joint; names the nearest one.
         """
-        place = self._places.get(joint)
-        if place is None:
+        index = self._index_of.get(joint)
+        if index is None:
             raise DescriptionError(f"{self.name} has no joint {joint!r}; {nearest(joint, self.joint_names)}")
-        return place
+        return index
 
     def indices(self, joints: Iterable[str]) -> NDArray[np.intp]:
-        """Places of several joints, ready to index a joint vector."""
+        """Indices of several joints, ready to index a joint vector."""
         return np.array([self.index(joint) for joint in joints], dtype=np.intp)
 
     @property
     def gripper_indices(self) -> tuple[int, ...]:
-        """Places of the joints that close hands; what they hold keeps them from where they are commanded."""
+        """Indices of the joints that close hands; an object in them keeps them from their commanded position."""
         fingers = tuple(arm.fingers_index for arm in self.arms.values())
         return fingers if self.chain is None else (*fingers, self.chain.gripper_index)
 
@@ -175,8 +175,8 @@ class RobotDescription:
             DescriptionError: No such arm; names those that there are.
         """
         if side not in self.arms:
-            there = f"the arms {', '.join(self.arms)}" if self.arms else "no arm of five joints like HOAP-3's"
-            raise DescriptionError(f"{self.model_path.parent} describes {there}, found side {side!r}")
+            arms = f"the arms {', '.join(self.arms)}" if self.arms else "no arm of five joints like HOAP-3's"
+            raise DescriptionError(f"{self.model_path.parent} describes {arms}, found side {side!r}")
         return self.arms[side]
 
     @classmethod

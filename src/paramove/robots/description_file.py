@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from paramove.documents import InputError, findings, read_document
 from paramove.workspace import Workspace
 
-POSITION_MODE_MOST = 4095
+POSITION_MODE_MAXIMUM = 4095
 
 
 class DescriptionError(InputError):
@@ -35,7 +35,7 @@ class JointPart(_Part):
 
 
 class MotorPart(_Part):
-    """What a kind of motor can do and may do. `position_gains`: P, I and D of a servo's own loop, in its units."""
+    """Abilities and limits of a kind of motor. `position_gains`: P, I and D of a servo's own loop, in its units."""
 
     loop: Literal["velocity", "servo"]
     torque_average: float = Field(gt=0)
@@ -79,7 +79,7 @@ class FingersPart(_Part):
 
 
 class GripperPart(FingersPart):
-    """`grip_current_ma`: with which it holds whatever is between its fingers; none for a servo without such a mode."""
+    """`grip_current_ma`: with which it holds an object; None for a servo without such a mode."""
 
     grip_current_ma: float | None = Field(default=None, gt=0)
 
@@ -222,9 +222,9 @@ def _check_servos(path: Path, file: RobotFile) -> None:
         raise DescriptionError(f"{path}: servo_id given twice: {', '.join(map(str, twice))}")
     for joint in file.joints:
         ends = sorted(joint.zero_counts + joint.counts_per_deg * end for end in (joint.lower_deg, joint.upper_deg))
-        if joint.servo_id is not None and not (ends[0] >= 0 and ends[1] <= POSITION_MODE_MOST):
+        if joint.servo_id is not None and not (ends[0] >= 0 and ends[1] <= POSITION_MODE_MAXIMUM):
             raise DescriptionError(
-                f"{path}: joint {joint.name}: expected a range within 0 to {POSITION_MODE_MOST} counts, what a "
+                f"{path}: joint {joint.name}: expected a range within 0 to {POSITION_MODE_MAXIMUM} counts, what a "
                 f"servo's position mode takes, found {ends[0]:.0f} to {ends[1]:.0f}"
             )
 

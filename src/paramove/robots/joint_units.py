@@ -37,7 +37,7 @@ class JointUnits:
     upper: Floats
 
     def counts_range(self) -> tuple[Floats, Floats]:
-        """Smallest and largest counts that keep each joint inside its mechanical range, each [J]."""
+        """Minimum and maximum counts that keep each joint inside its mechanical range, each [J]."""
         ends = np.stack([self.zero_counts + self.counts_per_rad * end for end in (self.lower, self.upper)])
         # The manual's ends are whole counts; rounding must not shut them out.
         return np.ceil(ends.min(axis=0) - 1e-6), np.floor(ends.max(axis=0) + 1e-6)
@@ -60,7 +60,7 @@ class JointUnits:
         counts = np.rint(self.zero_counts + self.counts_per_rad * values)
         low, high = self.counts_range()
         slack = np.abs(self.counts_per_rad) * beyond
-        self._refuse_first(values, (counts < low - slack) | (counts > high + slack))
+        self._reject_first(values, (counts < low - slack) | (counts > high + slack))
         return counts.astype(np.int16)
 
     def to_radians(self, counts: ArrayLike) -> Floats:
@@ -78,9 +78,9 @@ class JointUnits:
         values = self._checked(counts, "counts")
         bad = (values != np.rint(values)) | (values < INT16_RANGE[0]) | (values > INT16_RANGE[1])
         if bad.any():
-            place = tuple(int(i) for i in np.argwhere(bad)[0])
+            index = tuple(int(i) for i in np.argwhere(bad)[0])
             raise JointRangeError(
-                f"joint {self.names[place[-1]]}: {values[place]!r} is not an integer unit of 16 bits "
+                f"joint {self.names[index[-1]]}: {values[index]!r} is not an integer unit of 16 bits "
                 f"({INT16_RANGE[0]} to {INT16_RANGE[1]})"
             )
         return np.asarray((values - self.zero_counts) / self.counts_per_rad, dtype=np.float64)
@@ -90,16 +90,16 @@ class JointUnits:
         if array.ndim == 0 or array.shape[-1] != len(self.names):
             raise JointRangeError(f"{what} have shape {array.shape}; the last axis must hold {len(self.names)} joints")
         if not np.isfinite(array).all():
-            place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-            raise JointRangeError(f"joint {self.names[place[-1]]}: {array[place]} is not a finite number")
+            index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+            raise JointRangeError(f"joint {self.names[index[-1]]}: {array[index]} is not a finite number")
         return array
 
-    def _refuse_first(self, angles: Floats, bad: NDArray[np.bool_]) -> None:
+    def _reject_first(self, angles: Floats, bad: NDArray[np.bool_]) -> None:
         if not bad.any():
             return
-        place = tuple(int(i) for i in np.argwhere(bad)[0])
-        joint = place[-1]
+        index = tuple(int(i) for i in np.argwhere(bad)[0])
+        joint = index[-1]
         raise JointRangeError(
-            f"joint {self.names[joint]}: {np.rad2deg(angles[place]):.3f} deg is outside its range "
+            f"joint {self.names[joint]}: {np.rad2deg(angles[index]):.3f} deg is outside its range "
             f"{np.rad2deg(self.lower[joint]):.3f} to {np.rad2deg(self.upper[joint]):.3f} deg"
         )

@@ -1,4 +1,4 @@
-"""What an arm cannot reach, and why, in words."""
+"""What an arm cannot reach, and why."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ class OutOfReachError(ValueError):
         position: If not, a reachable point [3] nearer to the shoulder, frame of the base, m, if there is one.
     """
 
-    def __init__(self, sentence: str, pitch: float | None = None, position: Floats | None = None) -> None:
-        super().__init__(sentence)
+    def __init__(self, message: str, pitch: float | None = None, position: Floats | None = None) -> None:
+        super().__init__(message)
         self.pitch = pitch
         self.position = position
 
 
 def describe_miss(names: tuple[str, ...], lower: Floats, upper: Floats, solutions: Floats) -> str:
-    """Why none of the solutions [S, J], some of them nan, is within the limits: the joint that breaks one by least."""
-    long_enough = solutions[np.isfinite(solutions).all(axis=-1)]
-    beyond = np.maximum(lower - long_enough, long_enough - upper)
+    """Why none of the solutions [S, J], some of them nan, is within the limits: the joint of the smallest excess."""
+    finite = solutions[np.isfinite(solutions).all(axis=-1)]
+    beyond = np.maximum(lower - finite, finite - upper)
     best = beyond.max(axis=-1).argmin()
     joint = int(beyond[best].argmax())
-    angle, minimum, maximum = np.rad2deg([long_enough[best, joint], lower[joint], upper[joint]])
+    angle, minimum, maximum = np.rad2deg([finite[best, joint], lower[joint], upper[joint]])
     return f"{names[joint]} would have to turn to {angle:.1f} deg, its range is {minimum:.1f} to {maximum:.1f} deg"

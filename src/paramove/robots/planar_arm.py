@@ -17,12 +17,12 @@ from paramove.robots.out_of_reach import OutOfReachError, describe_miss
 Numbers = Floats | np.float64
 
 PITCHES = np.linspace(-np.pi, np.pi, 720, endpoint=False)
-"""Where a search for a reachable pitch looks, rad."""
+"""Searched for a reachable pitch, rad."""
 PITCH_TOLERANCE = 1e-6
 POINTS_TO_SHOULDER = 60
-"""Between a point out of reach and the shoulder, looked at for the nearest that is not."""
+"""Between a point out of reach and the shoulder, searched for the nearest that is reachable."""
 ROUNDING = 1e-9
-"""By so much, rad or relative, rounding may carry an angle over its limit or a point over the end of the reach."""
+"""Tolerance, rad or relative: rounding may carry an angle beyond its limit or a point beyond the reach."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PlanarArm:
 
     Attributes:
         names: Of the joints.
-        lower, upper: What solutions keep to, rad, shape [4] or [5].
+        lower, upper: Limits of solutions, rad, shape [4] or [5].
         yaw_axis: Where it stands in the frame of the base, x and y, m.
         shoulder: First pitch axis from the yaw axis in the zero pose: forward, left, and up from the base, m. The whole
             plane of the arm, with the roll axis, lies so far to the left.
@@ -104,14 +104,14 @@ class PlanarArm:
             Shape [J], rad.
 
         Raises:
-            OutOfReachError: No solution within the limits; says what is in the way, and the nearest that is reachable.
+            OutOfReachError: No solution within the limits; names the cause, and the nearest pose that is reachable.
             ValueError: Not finite, or of another shape.
         """
         goal = self._goal(position, pitch, roll)
-        found = self._solutions(goal, np.float64(pitch), roll, near)
-        good = found[self._within(found)]
+        solutions = self._solutions(goal, np.float64(pitch), roll, near)
+        good = solutions[self._within(solutions)]
         if len(good) == 0:
-            raise self._out_of_reach(goal, pitch, roll, found)
+            raise self._out_of_reach(goal, pitch, roll, solutions)
         if near is None:
             return np.asarray(good[0])
         return np.asarray(good[np.abs(good - np.asarray(near)).max(axis=-1).argmin()])
@@ -126,11 +126,11 @@ class PlanarArm:
         Returns:
             Shape [..., 4, J], rad: facing the position or with the back to it, the elbow above or below.
         """
-        found = self._solutions(np.asarray(positions, dtype=np.float64), np.asarray(pitches), 0.0, None)
-        return np.where(self._within(found)[..., None], found, np.nan)
+        solutions = self._solutions(np.asarray(positions, dtype=np.float64), np.asarray(pitches), 0.0, None)
+        return np.where(self._within(solutions)[..., None], solutions, np.nan)
 
     def nearest_pitch(self, position: ArrayLike, pitch: float, roll: float = 0.0) -> float:
-        """The reachable pitch nearest to the wanted one, to a millionth of a radian, from a search in half degrees.
+        """The reachable pitch nearest to the requested one, to a millionth of a radian, from a search in half degrees.
 
         Raises:
             OutOfReachError: The position is reachable with no pitch.
@@ -139,10 +139,10 @@ class PlanarArm:
         goal = self._goal(position, pitch, roll)
         if self._reachable(goal, np.float64(pitch), roll):
             return float(pitch)
-        found = self._nearest_pitch(goal, pitch, roll)
-        if found is None:
+        nearest = self._nearest_pitch(goal, pitch, roll)
+        if nearest is None:
             raise self._out_of_reach(goal, pitch, roll, self._solutions(goal, np.float64(pitch), roll, None))
-        return found
+        return nearest
 
     def _nearest_pitch(self, goal: Floats, pitch: float, roll: float) -> float | None:
         offsets = PITCHES[self._reachable(goal[None], pitch + PITCHES, roll)]
@@ -169,7 +169,7 @@ class PlanarArm:
         return goal
 
     def _rolled(self, roll: Numbers) -> tuple[Numbers, Numbers]:
-        """The end effector beside the roll axis, left and up in the frame before the roll."""
+        """The end effector relative to the roll axis, left and up in the frame before the roll."""
         cosine, sine = np.cos(roll), np.sin(roll)
         return self.hand[1] * cosine - self.hand[2] * sine, self.hand[1] * sine + self.hand[2] * cosine
 
@@ -213,10 +213,10 @@ class PlanarArm:
     def _whole_turns(self, angles: Floats, near: ArrayLike | None) -> Floats:
         """The same angles with the whole turns that bring them between the limits, and then nearest to `near`."""
         middle = 0.5 * (self.lower + self.upper)
-        wanted = middle if near is None else np.asarray(near, dtype=np.float64)
-        if wanted.shape != middle.shape:
-            raise ValueError(f"a posture has shape {middle.shape}, found {wanted.shape}")
-        nearest = wanted + np.remainder(angles - wanted + np.pi, 2 * np.pi) - np.pi
+        target = middle if near is None else np.asarray(near, dtype=np.float64)
+        if target.shape != middle.shape:
+            raise ValueError(f"a posture has shape {middle.shape}, found {target.shape}")
+        nearest = target + np.remainder(angles - target + np.pi, 2 * np.pi) - np.pi
         central = middle + np.remainder(angles - middle + np.pi, 2 * np.pi) - np.pi
         return np.where(self._inside(nearest), nearest, central)
 
@@ -229,19 +229,19 @@ class PlanarArm:
     def _reachable(self, goal: Floats, pitch: Numbers, roll: float) -> NDArray[np.bool_]:
         return np.asarray(self._within(self._solutions(goal, pitch, roll, None)).any(axis=-1))
 
-    def _cause(self, goal: Floats, pitch: float, roll: float, found: Floats) -> str:
-        if np.isfinite(found).all(axis=-1).any():
-            return describe_miss(self.names, self.lower, self.upper, found)
+    def _cause(self, goal: Floats, pitch: float, roll: float, solutions: Floats) -> str:
+        if np.isfinite(solutions).all(axis=-1).any():
+            return describe_miss(self.names, self.lower, self.upper, solutions)
         with np.errstate(invalid="ignore"):
             away = np.linalg.norm(self._wrist(goal, np.float64(pitch), roll, 1.0)[1])
         if np.isnan(away):
             return "it is nearer to the yaw axis than the plane of the arm"
         upper, fore = self._lengths
         reach = f"{abs(upper - fore):.3f} to {upper + fore:.3f} m"
-        return f"the wrist would have to be {away:.3f} m from the shoulder, found links for {reach}"
+        return f"the wrist would have to be {away:.3f} m from the shoulder, its links reach {reach}"
 
-    def _out_of_reach(self, goal: Floats, pitch: float, roll: float, found: Floats) -> OutOfReachError:
-        cause = self._cause(goal, pitch, roll, found)
+    def _out_of_reach(self, goal: Floats, pitch: float, roll: float, solutions: Floats) -> OutOfReachError:
+        cause = self._cause(goal, pitch, roll, solutions)
         where = f"{_metres(goal)} with pitch {np.rad2deg(pitch):.1f} deg"
         other = self._nearest_pitch(goal, pitch, roll)
         if other is not None:

@@ -50,8 +50,8 @@ def arm_points(chain: Chain, angles: ArrayLike, gripper: ArrayLike) -> Floats:
     approach = along(end.pitch, 1.0, 0.0)
     roll = end.roll[..., None]
     across = np.cos(roll) * left + np.sin(roll) * along(end.pitch, 0.0, 1.0)
-    share = (np.asarray(gripper) - chain.gripper_closed) / (chain.gripper_open - chain.gripper_closed)
-    half = 0.5 * (CLOSED_M + np.clip(share, 0.0, 1.0) * (OPEN_M - CLOSED_M))[..., None]
+    opening = (np.asarray(gripper) - chain.gripper_closed) / (chain.gripper_open - chain.gripper_closed)
+    half = 0.5 * (CLOSED_M + np.clip(opening, 0.0, 1.0) * (OPEN_M - CLOSED_M))[..., None]
     tips = end.position + FINGER_M * approach
     knuckle = end.position - 2.0 * FINGER_M * approach
     points = [shoulder, elbow, wrist, knuckle, tips - half * across, tips + half * across]

@@ -1,7 +1,7 @@
 """Whether a robot is emulated by the very launch that its driver belongs to: only then a program may arm it.
 
-What the system itself knows is the evidence, never a parameter: who has started this process, who holds the other end
-of a pseudo-terminal, who owns a topic.
+The evidence comes from the system, never from a parameter: who has started this process, who holds the other end of a
+pseudo-terminal, who owns a topic.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class ThisLaunch:
             return f"{device} is no pseudo-terminal"
         servers = serving(device)
         if not servers:
-            return f"nobody is seen at the other end of {device}"
+            return f"no process holds the other end of {device}"
         for server in servers:
             if not self._has_started(server.pid):
                 return f"{server} at the other end of {device} does not belong to this launch"

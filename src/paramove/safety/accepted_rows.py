@@ -11,7 +11,7 @@ from paramove.safety.stopping import stop_ramp, straight_move
 
 
 class AcceptedRows:
-    """They end at rest, always. Nothing is kept at first and after `clear`: then the robot holds its commanded pose.
+    """They end at rest, always. There are none at first and after `clear`: then the robot holds its commanded pose.
 
     Attributes:
         end_index: After the last row ever given; the robot cannot have played more.
@@ -48,13 +48,13 @@ class AcceptedRows:
         return self._sent.rows[max(0, upto - self._limits.history) : upto]
 
     def accept(self, first_index: int, rows: Floats, ramp: Floats, measured: Measured) -> Targets:
-        """Take `rows` and the `ramp` after them in place of all from `first_index` on."""
+        """Replace all rows from `first_index` on by `rows` and the `ramp` after them."""
         targets = Targets(first_index, np.concatenate([rows, ramp]), len(ramp))
-        kept_index, kept = first_index - 1, measured.commanded[None]
+        history_index, history = first_index - 1, measured.commanded[None]
         if self._sent is not None:
-            kept_index = max(self._sent.first_index, measured.next_index - self._limits.history)
-            kept = self._sent.rows[kept_index - self._sent.first_index : first_index - self._sent.first_index]
-        self._sent = Targets(kept_index, np.concatenate([kept, targets.rows]), targets.ramp_rows)
+            history_index = max(self._sent.first_index, measured.next_index - self._limits.history)
+            history = self._sent.rows[history_index - self._sent.first_index : first_index - self._sent.first_index]
+        self._sent = Targets(history_index, np.concatenate([history, targets.rows]), targets.ramp_rows)
         self.end_index = max(self.end_index, targets.end_index)
         return targets
 
@@ -70,8 +70,8 @@ class AcceptedRows:
             return None
         return self.accept(first_index, ramp[:0], ramp, measured)
 
-    def give_way(self, ramp: Targets | None, measured: Measured) -> Targets | None:
-        """On to the measured pose, after `ramp`: motors do not push on against what holds a joint."""
+    def move_to_measured(self, ramp: Targets | None, measured: Measured) -> Targets | None:
+        """After `ramp`, a movement to the measured pose: motors do not push against what blocks a joint."""
         index = self.allowed_from(measured)[1]
         start = self._sent.rows[-1] if self._sent else measured.commanded
         goal = np.clip(measured.positions, self._limits.lower, self._limits.upper)

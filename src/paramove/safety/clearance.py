@@ -1,7 +1,7 @@
 """Rows that bring parts of the robot too close to each other or to what stands around it.
 
 Below 20 mm parts may approach only so fast that 0.2 s would be left until 5 mm; below 5 mm only apart, and slowly. What
-is faster is refused, not slowed down: that is the planner's business. Rows are looked at every 20 ms and at the end.
+is faster is rejected, not slowed down: that is the planner's business. Every 20 ms and at the end a row is checked.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import numpy as np
 
 from paramove.documents import Floats
 from paramove.safety.gate_io import Clearance, Fault
-from paramove.safety.limits import INWARD_SHARE, MotionLimits
+from paramove.safety.limits import INWARD_FRACTION, MotionLimits
 
 CHECK_EVERY_S = 0.02
 STOP_M = 0.005
 SLOW_M = 0.020
 TIME_LEFT_S = 0.2
-# Distances between meshes are found by iteration: an approach of 0.1 mm/s may be none.
+# Distances between meshes are computed by iteration: an approach of 0.1 mm/s may be none.
 STILL_M_S = 1e-4
 
 
@@ -32,13 +32,13 @@ def clearance_fault(
         gap_s = (row - row_before) * limits.dt_s
         approach = (distance_before - distance) / gap_s
         allowed = STILL_M_S + max(distance - STOP_M, 0.0) / TIME_LEFT_S
-        slow = bool((np.abs(rows[row] - before) <= INWARD_SHARE * limits.velocity * gap_s).all())
+        slow = bool((np.abs(rows[row] - before) <= INWARD_FRACTION * limits.velocity * gap_s).all())
         if not (distance >= SLOW_M or (approach <= allowed and (slow or distance >= STOP_M))):
             where = "in the stop after these rows" if row >= n_proposed else f"at row {row}"
-            sentence = (
+            message = (
                 f"{one} and {other} come within {1e3 * distance:.1f} mm {where}, at {1e3 * approach:.0f} mm/s, allowed "
                 f"{1e3 * allowed:.0f} mm/s there, and below {1e3 * STOP_M:.0f} mm only slowly apart"
             )
-            return Fault("clearance", "", sentence)
+            return Fault("clearance", "", message)
         before, row_before, distance_before = rows[row], row, distance
     return None

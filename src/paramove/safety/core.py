@@ -1,9 +1,9 @@
 """The one gate between a commanded movement and a motor: a pure function of time and inputs.
 
-No clock, no input or output, no threads. Not armed by default, and it never arms itself: only an arm word that a person
-said after this gate began, and after its last fault, arms it. A program's word does so only for a robot that the driver
-has verified to be emulated by its own launch, and only until this gate was armed, stopped or at fault for the first
-time.
+No clock, no input or output, no threads. Not armed by default, and it never arms itself: only a person's arming request
+from after the start of this gate, and after its last fault, arms it. A program's request does so only for a robot that
+the driver has verified to be emulated by its own launch, and only until this gate was armed, stopped or at fault for
+the first time.
 
 Each step takes the rows proposed for the stream and gives the rows that may be sent. Whatever it gives ends at rest:
 the rows are followed by their own stop ramp, so a sender that dies leaves a robot that stops by itself.
@@ -48,8 +48,8 @@ class SafetyCore:
         limits: Of all joints of the robot.
         mechanical: Lower and upper mechanical limits, each [J], rad, for the check of the pose at arming.
         epoch: Of the stream that this gate serves.
-        start_ns: Arm words captured at or before this time are another life's and are not heard.
-        clearance: Measures how near parts of the robot come to each other; None: that is not looked at.
+        start_ns: Arming requests captured at or before this time are ignored: they were for an earlier gate.
+        clearance: Measures how near parts of the robot come to each other; None: not checked.
 
     Attributes:
         untouched: Whether this gate was never armed, stopped or at fault.
@@ -71,7 +71,7 @@ class SafetyCore:
         self.untouched = True
         self._mechanical = mechanical
         self._now_ns = start_ns
-        self._heard_ns = start_ns  # only later arm words count
+        self._requests_after_ns = start_ns  # only later arming requests count
         self._measured_ns = start_ns
         self._stopping_since_ns = start_ns
         self._disarm_after_stop = False
@@ -80,7 +80,7 @@ class SafetyCore:
         self._gate = ProposalGate(limits, self.settings, epoch, clearance)
         self._emergency = EmergencyWatch(self.settings.emergency_timeout_ms, start_ns)
         self._following = FollowingWatch(limits.names, self.settings.following, self.settings.following_ms)
-        self._words = RateWatch(self.settings.words_per_s)
+        self._requests = RateWatch(self.settings.words_per_s)
 
     def step(self, now_ns: int, inputs: Inputs) -> tuple[Targets | None, State, tuple[Fault, ...]]:
         """Advance to `now_ns`; returns the rows that may be sent (None: send nothing), the state and the faults."""
@@ -129,7 +129,7 @@ class SafetyCore:
         self._add(pressed)
         if inputs.stop is not None:
             self._add(inputs.stop)
-        self._heard_ns = max(self._heard_ns, now_ns)  # an arm word must be said after the release
+        self._requests_after_ns = max(self._requests_after_ns, now_ns)  # arming needs a request from after the release
         self._stopping_since_ns = now_ns
         self._disarm_after_stop = True
         return targets
@@ -147,26 +147,28 @@ class SafetyCore:
         return True
 
     def _disconnect(self, age_ms: float) -> None:
-        """What was latched stays: a fault that was found first, such as a lost port, is why the robot is silent."""
+        """Latched faults stay: one that came first, such as a lost port, is why the robot sends no data."""
         if self.state is State.DISARMED:
             self.faults = ()
-        sentence = (
-            f"the robot was last heard {age_ms:.0f} ms ago, allowed {self.settings.measured_timeout_ms:.0f} ms; it "
-            "comes to rest by itself; arm again once it is back"
+        message = (
+            f"no data from the robot for {age_ms:.0f} ms, allowed {self.settings.measured_timeout_ms:.0f} ms; it comes "
+            "to rest by itself; arm again once it is back"
         )
-        self._add(Fault("robot_silent", "", sentence))
+        self._add(Fault("robot_silent", "", message))
         self.untouched = False
         self.state = State.DISCONNECTED
         self._disarm_after_stop = False
         self._accepted.clear()
 
-    def _handle_request(self, now_ns: int, word: ArmingRequest, measured: Measured, inputs: Inputs) -> Targets | None:
-        if word.captured_ns <= self._heard_ns:
+    def _handle_request(
+        self, now_ns: int, request: ArmingRequest, measured: Measured, inputs: Inputs
+    ) -> Targets | None:
+        if request.captured_ns <= self._requests_after_ns:
             return None
-        # One from the future must not silence those to come.
-        self._heard_ns = max(self._heard_ns, min(word.captured_ns, now_ns))
-        too_often = self._words.exceeded(now_ns)
-        if not word.armed:
+        # One from the future must not shut out later ones.
+        self._requests_after_ns = max(self._requests_after_ns, min(request.captured_ns, now_ns))
+        too_often = self._requests.exceeded(now_ns)
+        if not request.armed:
             if self.state is State.STOPPING:
                 self._disarm_after_stop = True
             elif self.state is State.ARMED and self._moving(measured):
@@ -174,58 +176,61 @@ class SafetyCore:
             else:
                 self.state = State.DISARMED
         elif self.state in (State.DISARMED, State.HOLD):
-            self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, inputs, word, measured))
+            self.faults = (*inputs.arming_faults, *self._arming_faults(now_ns, inputs, request, measured))
             if too_often:
-                sentence = f"more arm words than allowed: {self._words.allowed} within 250 ms; wait"
-                self._add(Fault("arming_rate", "", sentence))
+                message = f"more arming requests than allowed: {self._requests.allowed} within 250 ms; wait"
+                self._add(Fault("arming_rate", "", message))
             if not self.faults:
                 self.state = State.ARMED
                 self._accepted.clear()
                 self._played = max(0, measured.next_index)
         return None
 
-    def _arming_faults(self, now_ns: int, inputs: Inputs, word: ArmingRequest, measured: Measured) -> list[Fault]:
+    def _arming_faults(self, now_ns: int, inputs: Inputs, request: ArmingRequest, measured: Measured) -> list[Fault]:
         """Every check that fails; none means that the gate may be armed."""
         faults = []
-        # A word to arm counts only while the person who said it still looks; one to disarm always counts.
+        # A request to arm counts only while the person who sent it still looks; one to disarm always counts.
         began_ns = now_ns if inputs.checks_began_ns is None else inputs.checks_began_ns
-        heard_ns = min(max(began_ns, word.captured_ns), now_ns)  # one said during the checks was heard at once
-        age_ms, allowed_ms = (heard_ns - word.captured_ns) * 1e-6, self.settings.word_age_ms
+        received_ns = min(max(began_ns, request.captured_ns), now_ns)  # at once, if sent during the checks
+        age_ms, allowed_ms = (received_ns - request.captured_ns) * 1e-6, self.settings.word_age_ms
         if abs(age_ms) > allowed_ms:
-            sentence = f"the arm word was said {age_ms:.0f} ms ago, allowed {allowed_ms:.0f} ms; say it again"
-            faults.append(Fault("arming_stale", "", sentence))
-        checks_ms, allowed_ms = (now_ns - heard_ns) * 1e-6, self.settings.checks_ms
+            message = f"the arming request is {age_ms:.0f} ms old, allowed {allowed_ms:.0f} ms; arm again"
+            faults.append(Fault("arming_stale", "", message))
+        checks_ms, allowed_ms = (now_ns - received_ns) * 1e-6, self.settings.checks_ms
         if checks_ms > allowed_ms:
-            sentence = (
+            message = (
                 f"the checks before arming took {checks_ms:.0f} ms, allowed {allowed_ms:.0f} ms; see what keeps the "
-                "bus or this computer busy, and say the word again"
+                "bus or this computer busy, then arm again"
             )
-            faults.append(Fault("arming_slow", "", sentence))
+            faults.append(Fault("arming_slow", "", message))
         no_program = inputs.no_program or ("" if self.untouched else TOUCHED)
-        if no_program and not word.by_person:
-            sentence = f"{word.source} is a program and may not arm: {no_program}; a person may: paramove arm enable"
-            faults.append(Fault("arming_program", "", sentence))
-        if not word.source:
-            faults.append(Fault("arming_source", "", "the arm word names no source; say who arms"))
+        if no_program and not request.by_person:
+            message = f"{request.source} is a program and may not arm: {no_program}; a person may: paramove arm enable"
+            faults.append(Fault("arming_program", "", message))
+        if not request.source:
+            faults.append(Fault("arming_source", "", "the arming request has no source; name who arms"))
         if not measured.at_rest:
             faults.append(Fault("arming_moving", "", "the robot is moving; arm it at rest"))
         lower, upper = self._mechanical
         tolerance = self.settings.pose_tolerance
         for what, pose in (("measured", measured.positions), ("commanded", measured.commanded)):
             if pose.shape != lower.shape or not np.isfinite(pose).all():
-                faults.append(Fault("arming_pose_unknown", "", f"the {what} pose is not known: {pose}"))
+                faults.append(Fault("arming_pose_unknown", "", f"the {what} pose is unknown: {pose}"))
                 continue
             for joint in np.flatnonzero((pose < lower - tolerance) | (pose > upper + tolerance)):
-                sentence = (
+                message = (
                     f"joint {self.limits.names[joint]} is {what} at {np.rad2deg(pose[joint]):.2f} deg, allowed "
                     f"{np.rad2deg(lower[joint]):.2f} to {np.rad2deg(upper[joint]):.2f} deg; move it inside by hand"
                 )
-                faults.append(Fault("arming_pose_outside", self.limits.names[joint], sentence))
+                faults.append(Fault("arming_pose_outside", self.limits.names[joint], message))
         if not faults:
             away = [self.limits.names[joint] for joint in np.flatnonzero(self._following.away(measured))]
             if away:
-                sentence = f"{', '.join(away)} not where commanded; see what holds them or command where they are"
-                faults.append(Fault("arming_following", away[0], sentence))
+                message = (
+                    f"not at their commanded position: {', '.join(away)}; see what blocks them, or command their "
+                    "present position"
+                )
+                faults.append(Fault("arming_following", away[0], message))
         return faults
 
     def _armed(self, now_ns: int, measured: Measured, inputs: Inputs) -> Targets | None:
@@ -244,11 +249,11 @@ class SafetyCore:
         """A report that cannot be true."""
         shape, end = (len(self.limits.names),), self._accepted.end_index
         if measured.positions.shape != shape or measured.commanded.shape != shape:
-            found = f"{measured.positions.shape} and {measured.commanded.shape}"
-            return Fault("report", "", f"the robot says poses of shape {found}, allowed {shape}")
+            shapes = f"{measured.positions.shape} and {measured.commanded.shape}"
+            return Fault("report", "", f"the robot reports poses of shape {shapes}, allowed {shape}")
         if not self._played <= measured.next_index <= end:
-            sentence = f"the robot is at row {measured.next_index}, allowed {self._played} to {end}; was it restarted?"
-            return Fault("report", "", sentence)
+            message = f"the robot is at row {measured.next_index}, allowed {self._played} to {end}; was it restarted?"
+            return Fault("report", "", message)
         self._played = measured.next_index
         return None
 
@@ -260,7 +265,7 @@ class SafetyCore:
         self._stopping_since_ns = now_ns
         targets = self._early_ramp(proposal, measured)
         if fault is not None and fault.code == "following":
-            return self._accepted.give_way(targets, measured)
+            return self._accepted.move_to_measured(targets, measured)
         return targets
 
     def _early_ramp(self, proposal: Proposal | None, measured: Measured | None) -> Targets | None:
@@ -277,25 +282,25 @@ class SafetyCore:
             self.faults = (*self.faults, fault)
 
     def _latch(self, now_ns: int, fault: Fault) -> None:
-        """A fault while nothing is let through: it stays until a new arm word, and so nobody arms by an older one."""
+        """A fault while nothing is let through: it stays until an arming request from after it."""
         self._disarm_after_stop = False
-        if self.state is State.DISARMED:  # what kept somebody from arming before is no more of interest
+        if self.state is State.DISARMED:  # faults of an earlier arming are of no more interest
             self.state, self.faults = State.HOLD, ()
         self._add(fault)
-        self._heard_ns = max(self._heard_ns, now_ns)
+        self._requests_after_ns = max(self._requests_after_ns, now_ns)
 
     def _moving(self, measured: Measured) -> bool:
         """Whether rows are played or still to be played: a report of rest can be older than the rows just sent."""
         return not measured.at_rest or self._accepted.unplayed(measured.next_index)
 
     def _rest(self, now_ns: int, measured: Measured) -> None:
-        """Leave STOPPING once the robot says that it rests."""
+        """Leave STOPPING once the robot reports that it rests."""
         # Rows that were sent and lost will never be played; they are waited for no longer than this.
         lost = now_ns - self._stopping_since_ns >= self.settings.lost_rows_ms * 1e6
         if self._moving(measured) and not (lost and measured.at_rest):
             return
         self._accepted.clear()
-        self._heard_ns = max(self._heard_ns, now_ns)  # a new arm word must be said after the stop
+        self._requests_after_ns = max(self._requests_after_ns, now_ns)  # arming needs a request from after the stop
         self.state = State.HOLD if self.faults else State.DISARMED
         if self._disarm_after_stop:
             self.state = State.DISARMED

@@ -1,4 +1,4 @@
-"""What the safety gate is told at each step and what it answers."""
+"""Inputs and outputs of a step of the safety gate."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ PERSON_STOP = "person_stop"
 class State(enum.Enum):
     """What the gate lets pass: rows only in ARMED, a stop ramp in STOPPING."""
 
-    DISCONNECTED = "disconnected"  # the robot is not heard
+    DISCONNECTED = "disconnected"  # the robot sends no data
     DISARMED = "disarmed"
     ARMED = "armed"
     STOPPING = "stopping"
-    HOLD = "hold"  # at rest after a fault, which stays until a new arm word
-    ESTOP = "emergency stop"  # pressed or not heard; wins in every state and is left, disarmed, by its release alone
+    HOLD = "hold"  # at rest after a fault, which stays until a new arming request
+    ESTOP = "emergency stop"  # pressed or without data; wins in every state and is left, disarmed, by its release alone
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Fault:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What the robot said of itself. Arrays [J], rad; `next_index` counts the stream's rows."""
+    """What the robot reports. Arrays [J], rad; `next_index` counts the stream's rows."""
 
     captured_ns: int
     positions: Floats
@@ -47,7 +47,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class ArmingRequest:
-    """A word from outside to arm or disarm; not `by_person`: from a program."""
+    """A request to arm or disarm; not `by_person`: from a program."""
 
     captured_ns: int
     source: str
@@ -71,10 +71,10 @@ class Proposal:
 class Inputs:
     """All that a step may know.
 
-    `stop` is a fault that the driver has found, `arming_faults` are those that only forbid arming (ids, models,
-    voltage, …), of checks that began at `checks_began_ns` (None: now). `emergency` says whether the emergency stop is
-    pressed; None: its source said nothing since the last step. `no_program` says why no program may arm this robot; ""
-    only where the driver has verified that its own launch emulates the robot.
+    `stop` is a fault that the driver has detected, `arming_faults` are those that only forbid arming (ids, models,
+    voltage, …), of checks that began at `checks_began_ns` (None: now). `emergency`: whether the emergency stop is
+    pressed; None: its source sent nothing since the last step. `no_program`: why no program may arm this robot; "" only
+    where the driver has verified that its own launch emulates the robot.
     """
 
     measured: Measured | None = None
@@ -105,7 +105,7 @@ class Clearance(Protocol):
     """How near the robot's parts come to each other and to what is fixed around it."""
 
     def distances(self, q: Floats) -> tuple[float, str, str]:
-        """The smallest distance in the pose `q` [J], rad: metres (negative: penetration) and the names of the two."""
+        """The minimum distance in the pose `q` [J], rad: metres (negative: penetration) and the names of the two."""
         ...
 
 
@@ -114,10 +114,10 @@ class SafetySettings:
     """Ages in ms, angles in rad, rates per second.
 
     Attributes:
-        word_age_ms: Of a word to arm, when it was heard: when the checks began, which may take `checks_ms`.
-        following: How far each joint may be from where it is commanded, [J], for up to `following_ms`; inf for a joint
-            that may be held off for good, such as fingers by what they hold; None: for no joint.
-        emergency_timeout_ms: An emergency stop not heard for so long counts as pressed; None if the robot has none.
+        word_age_ms: Of a request to arm, when it was received: when the checks began, which may take `checks_ms`.
+        following: How far each joint may be from its commanded position, [J], for up to `following_ms`; inf for a joint
+            that may stay away, such as fingers that hold something; None: not checked.
+        emergency_timeout_ms: An emergency stop without data for so long counts as pressed; None if the robot has none.
         proposals_per_s, words_per_s: Nominal rates; 1.2 times as many within 250 ms pass. None: not counted.
     """
 

@@ -1,4 +1,4 @@
-"""What commanded movement must keep to, and the first place where it does not.
+"""The limits of commanded movement, and the first row that breaks one.
 
 Rows of joint angles [N, J] in rad, one every `dt_s`, are judged as a whole: all joints or none. The period is the
 nominal one, never a measured one: a loop that stalled must not be allowed a larger step.
@@ -26,15 +26,15 @@ ROUNDING = 8 * 0.5e-6
 SLACK = 1.001
 # A step of more than this many times the motors' fastest is a jump: a wrong number, not a fast movement.
 JUMP_FACTOR = 1.5
-# Joints outside their soft range may only come back, at this share of the operating velocity.
-INWARD_SHARE = 0.2
+# Joints outside their soft range may only come back, at this fraction of the operating velocity.
+INWARD_FRACTION = 0.2
 # A controlled stop has the path's own jerk and as much again for the slowing down.
 STOP_JERK_FACTOR = 2.0
 
 
 @dataclass(frozen=True)
 class Violation:
-    """One value that breaks a rule. `asked` and `allowed` are in `unit`; `allowed` is the text of a limit or range.
+    """One value that breaks a rule. `requested` and `allowed` are in `unit`; `allowed` is the text of a limit or range.
 
     `step` is where a jump begins and ends, deg; None for other rules.
     """
@@ -42,14 +42,14 @@ class Violation:
     code: str
     row: int
     joint: str
-    asked: float
+    requested: float
     allowed: str
     unit: str
     step: tuple[float, float] | None = None
 
     @property
-    def sentence(self) -> str:
-        """Cause, what was found and what is allowed."""
+    def message(self) -> str:
+        """Cause, the requested value and what is allowed."""
         what = {
             "not_finite": "is not a finite number",
             "joint_limit": "leaves its range",
@@ -58,9 +58,9 @@ class Violation:
             "acceleration": "accelerates too hard",
             "jerk": "changes its acceleration too fast",
         }[self.code]
-        way = "" if self.step is None else f" from {self.step[0]:.4g} to {self.step[1]:.4g} deg"
-        where = f"joint {self.joint} {what}{way} at row {self.row}"
-        return f"{where}: asked {self.asked:.4g} {self.unit}, allowed {self.allowed}"
+        step = "" if self.step is None else f" from {self.step[0]:.4g} to {self.step[1]:.4g} deg"
+        where = f"joint {self.joint} {what}{step} at row {self.row}"
+        return f"{where}: requested {self.requested:.4g} {self.unit}, allowed {self.allowed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +104,9 @@ class MotionLimits:
             stopping: Judge by what a controlled stop may use, with rest at the end.
         """
         for known in (before, rows):
-            found = self._first("not_finite", ~np.isfinite(known), known)
-            if found is not None:
-                return found
+            violation = self._first("not_finite", ~np.isfinite(known), known)
+            if violation is not None:
+                return violation
         history = self.history
         parts = [np.repeat(before[:1], max(0, history - len(before)), axis=0), before[-history:], rows]
         if rest_at_end or stopping:
@@ -114,11 +114,11 @@ class MotionLimits:
         whole = np.concatenate(parts)
         excess = np.maximum(np.maximum(self.lower - whole, whole - self.upper), 0.0)[history - 1 :]
         outward = (excess[1:] > 1e-9) & ~(excess[1:] <= excess[:-1])
-        found = self._first("joint_limit", outward, whole[history:])
-        return found or self._first_too_fast(whole, excess[:-1] > 1e-9, stopping)
+        violation = self._first("joint_limit", outward, whole[history:])
+        return violation or self._first_too_fast(whole, excess[:-1] > 1e-9, stopping)
 
     def _first_too_fast(self, whole: Floats, outside: NDArray[np.bool_], stopping: bool) -> Violation | None:
-        """`whole` begins with the history; `outside` says where the row before lies outside the soft range."""
+        """`whole` begins with the history; `outside` is true where the row before lies outside the soft range."""
         h, end = self.history, len(whole)
         span_s, jerk_span_s = self.span * self.dt_s, self.jerk_span * self.dt_s
 
@@ -131,15 +131,15 @@ class MotionLimits:
         jerks = (earlier(0) - 3.0 * (earlier(m) - earlier(2 * m)) - earlier(3 * m)) / jerk_span_s**3
         acceleration = self.stop_acceleration if stopping else self.acceleration
         jerk = (STOP_JERK_FACTOR if stopping else 1.0) * SLACK * self.jerk + ROUNDING / jerk_span_s**3
-        slow = np.where(outside, INWARD_SHARE, 1.0)
-        for code, found, limit, unit in (
+        slow = np.where(outside, INWARD_FRACTION, 1.0)
+        for code, values, limit, unit in (
             ("jump", steps, JUMP_FACTOR * self.motor_velocity, "deg/s"),
             ("velocity", steps, slow * SLACK * self.velocity, "deg/s"),
             ("acceleration", bends, SLACK * acceleration, "deg/s²"),
             ("jerk", jerks, jerk, "deg/s³"),
         ):
             # Written so that a NaN would be a violation too.
-            violation = self._first(code, ~(np.abs(found) <= limit), np.abs(found), unit, limit)
+            violation = self._first(code, ~(np.abs(values) <= limit), np.abs(values), unit, limit)
             if violation is not None and code == "jump":
                 step = whole[h + violation.row - 1 : h + violation.row + 1, self.names.index(violation.joint)]
                 return replace(violation, step=(float(np.rad2deg(step[0])), float(np.rad2deg(step[1]))))
@@ -159,6 +159,6 @@ class MotionLimits:
             return None
         row, joint = (int(i) for i in np.argwhere(bad)[0])
         maximum = np.broadcast_to(limit, bad.shape)[row, joint]
-        low, high, maximum, asked = np.rad2deg([self.lower[joint], self.upper[joint], maximum, values[row, joint]])
+        low, high, maximum, value = np.rad2deg([self.lower[joint], self.upper[joint], maximum, values[row, joint]])
         texts = {"not_finite": "a finite number", "joint_limit": f"{low:.4g} to {high:.4g} deg"}
-        return Violation(code, row, self.names[joint], float(asked), texts.get(code, f"{maximum:.4g} {unit}"), unit)
+        return Violation(code, row, self.names[joint], float(value), texts.get(code, f"{maximum:.4g} {unit}"), unit)

@@ -1,4 +1,4 @@
-"""What a proposal must keep to before its rows are let pass; the order is that of `ProposalGate.judged`."""
+"""The checks of a proposal before its rows pass, in the order of `ProposalGate.judged`."""
 
 from __future__ import annotations
 
@@ -27,51 +27,53 @@ class ProposalGate:
         self._counted_ns: int | None = None
 
     def judged(self, now_ns: int, proposal: Proposal, measured: Measured, accepted: AcceptedRows) -> Fault | Floats:
-        """The first gate that refuses: form, age, rate, place, movement, the stop after it, clearance.
+        """The first check that fails: form, age, rate, index, movement, the stop after it, clearance.
 
         Returns:
-            Without a refusal, the stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest.
+            If all pass, the stop that follows the proposal's rows, [M, J]; M = 0 where these end at rest.
         """
         fault = self._form(proposal) or self._time(now_ns, proposal)
-        fault = fault or self._place(proposal, accepted.allowed_from(measured))
+        fault = fault or self._index(proposal, accepted.allowed_from(measured))
         return fault or self._movement(proposal, accepted.before(proposal.first_index, measured))
 
     def _form(self, proposal: Proposal) -> Fault | None:
         names, n_joints = self._limits.names, len(self._limits.names)
         if proposal.joint_names != names:
-            sentence = f"rows are for {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
-            return Fault("names", "", sentence)
+            message = f"the rows are of {len(proposal.joint_names)} other joints, allowed: {', '.join(names)}"
+            return Fault("names", "", message)
         for rows in (proposal.rows, proposal.ahead):
             if rows.ndim != 2 or rows.shape[1] != n_joints or len(rows) > MAX_ROWS:
                 return Fault("length", "", f"rows have shape {rows.shape}, allowed [up to {MAX_ROWS}, {n_joints}]")
         if not len(proposal.rows):
             return Fault("length", "", "the proposal is empty, at least one row is needed")
         if proposal.epoch != self._epoch:
-            return Fault("epoch", "", f"rows of epoch {proposal.epoch}, allowed {self._epoch}: of an earlier life")
+            return Fault("epoch", "", f"rows of epoch {proposal.epoch}, allowed {self._epoch}: from before a restart")
         return None
 
     def _time(self, now_ns: int, proposal: Proposal) -> Fault | None:
         age_ms = (now_ns - proposal.captured_ns) * 1e-6
         if not 0.0 <= age_ms <= self._settings.proposal_age_ms:
             allowed = f"0 to {self._settings.proposal_age_ms:.0f} ms"
-            return Fault("stale", "", f"rows were made {age_ms:.0f} ms ago, allowed {allowed}")
+            return Fault("stale", "", f"the rows are {age_ms:.0f} ms old, allowed {allowed}")
         known, self._counted_ns = proposal.captured_ns == self._counted_ns, proposal.captured_ns
         if not known and self._rate.exceeded(now_ns):
             return Fault("rate", "", f"more proposals than allowed: {self._rate.allowed} within 250 ms")
         return None
 
-    def _place(self, proposal: Proposal, allowed: tuple[int, int]) -> Fault | None:
+    def _index(self, proposal: Proposal, allowed: tuple[int, int]) -> Fault | None:
         index, (first, last) = proposal.first_index, allowed
         if index < first:
-            return Fault("played", "", f"rows from index {index}, allowed from {first}: earlier ones are played")
-        return Fault("gap", "", f"rows from index {index}, allowed up to {last}: no gap") if index > last else None
+            return Fault(
+                "played", "", f"rows from index {index}, allowed from {first}: the robot has played those before"
+            )
+        return Fault("gap", "", f"rows from index {index}, allowed up to {last}: a gap") if index > last else None
 
     def _movement(self, proposal: Proposal, before: Floats) -> Fault | Floats:
         # The rows ahead are judged too: the stop ramp will run over them.
         rows = np.concatenate([proposal.rows, proposal.ahead])
         violation = self._limits.first_violation(rows, before, rest_at_end=not len(proposal.ahead))
         if violation is not None:
-            return Fault(violation.code, violation.joint, violation.sentence)
+            return Fault(violation.code, violation.joint, violation.message)
         ramp = proposal.ahead
         if len(ramp):
             ramp = stop_ramp(proposal.rows[-1], ramp, self._limits)
@@ -79,8 +81,8 @@ class ProposalGate:
             until = np.concatenate([before, proposal.rows])
             violation = self._limits.first_violation(ramp, until, stopping=True)
             if violation is not None:
-                return Fault(violation.code, violation.joint, f"in the stop after these rows: {violation.sentence}")
+                return Fault(violation.code, violation.joint, f"in the stop after these rows: {violation.message}")
         if self._clearance is None:
             return ramp
-        given = np.concatenate([proposal.rows, ramp])
-        return clearance_fault(self._clearance, before[-1], given, self._limits, len(proposal.rows)) or ramp
+        sent = np.concatenate([proposal.rows, ramp])
+        return clearance_fault(self._clearance, before[-1], sent, self._limits, len(proposal.rows)) or ramp

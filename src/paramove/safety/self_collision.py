@@ -47,22 +47,22 @@ class SelfCollision:
     ) -> None:
         self._model = model
         self._data = mujoco.MjData(model)
-        self._places = np.array([_place(model, joint) for joint in joints], dtype=np.intp)
+        self._qpos = np.array([_qpos_index(model, joint) for joint in joints], dtype=np.intp)
         self.pairs = _movable_pairs(model)
         self._free_of(free_pose, lower, upper, n_samples, seed)
 
     def distances(self, q: Floats) -> tuple[float, str, str]:
-        """The smallest distance in the pose `q` [J], rad: metres, negative for penetration, and the two bodies.
+        """The minimum distance in the pose `q` [J], rad: metres, negative for penetration, and the two bodies.
 
-        Nothing nearer than 50 mm is told as 50 mm between two empty names.
+        Without anything nearer than 50 mm: 50 mm and two empty names.
         """
         self._pose(q)
         near = self._near()
-        found = [self._measure(one, other) for one, other in self.pairs[near]]
-        if not found or min(found) >= FAR_M:
+        distances = [self._measure(one, other) for one, other in self.pairs[near]]
+        if not distances or min(distances) >= FAR_M:
             return FAR_M, "", ""
-        one, other = self.pairs[near][int(np.argmin(found))]
-        return min(found), self._body(one), self._body(other)
+        one, other = self.pairs[near][int(np.argmin(distances))]
+        return min(distances), self._body(one), self._body(other)
 
     def _free_of(self, free_pose: Floats, lower: Floats, upper: Floats, n_samples: int, seed: int) -> None:
         """Leave out the pairs that touch by design."""
@@ -80,7 +80,7 @@ class SelfCollision:
         return touching
 
     def _pose(self, q: Floats) -> None:
-        self._data.qpos[self._places] = q
+        self._data.qpos[self._qpos] = q
         mujoco.mj_kinematics(self._model, self._data)
 
     def _near(self) -> NDArray[np.intp]:
@@ -98,7 +98,7 @@ class SelfCollision:
         return str(self._model.body(self._model.geom_bodyid[geom]).name)
 
 
-def _place(model: mujoco.MjModel, joint: str) -> int:
+def _qpos_index(model: mujoco.MjModel, joint: str) -> int:
     number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
     if number < 0:
         names = ", ".join(model.joint(i).name for i in range(model.njnt))

@@ -55,10 +55,14 @@ def _durations(speed: Floats, limits: MotionLimits) -> Floats:
 
 def straight_move(start: Floats, goal: Floats, limits: MotionLimits) -> Floats:
     """Rows [N, J] from rest after `start` to rest at `goal`, each [J], rad: minimum jerk, as fast as allowed."""
-    way = np.abs(goal - start)
+    distance = np.abs(goal - start)
     # Peaks of the profile: velocity 15/8 d/T, acceleration 10/√3 d/T², jerk 60 d/T³.
     slowest = np.max(
-        [1.875 * way / limits.velocity, np.sqrt(5.774 * way / limits.acceleration), np.cbrt(60.0 * way / limits.jerk)]
+        [
+            1.875 * distance / limits.velocity,
+            np.sqrt(5.774 * distance / limits.acceleration),
+            np.cbrt(60.0 * distance / limits.jerk),
+        ]
     )
     n_rows = max(1, int(np.ceil(slowest / limits.dt_s)))
     u = (np.arange(1, n_rows + 1) / n_rows)[:, None]

@@ -25,17 +25,17 @@ class TrajectoryRefusedError(ValueError):
             or "jerk".
         index: Point of the trajectory, from 0; -1 where no single point is at fault.
         joint: Name of the joint; "" where no single joint is at fault.
-        asked, allowed: What was found and what would have passed.
+        requested, allowed: The value in the trajectory, and what would have passed.
     """
 
-    def __init__(self, code: str, index: int, joint: str, asked: str, allowed: str) -> None:
+    def __init__(self, code: str, index: int, joint: str, requested: str, allowed: str) -> None:
         where = f" at point {index}" if index >= 0 else ""
         who = f", joint {joint}" if joint else ""
-        super().__init__(f"trajectory refused ({code}){where}{who}: asked {asked}, allowed {allowed}")
+        super().__init__(f"trajectory rejected ({code}){where}{who}: requested {requested}, allowed {allowed}")
         self.code = code
         self.index = index
         self.joint = joint
-        self.asked = asked
+        self.requested = requested
         self.allowed = allowed
 
 
@@ -72,26 +72,26 @@ def check_trajectory(
             faded out.
 
     Raises:
-        TrajectoryRefusedError: With the point, the joint, what was asked and what is allowed.
+        TrajectoryRefusedError: With the point, the joint, the requested value and what is allowed.
     """
-    places = _places(joints, limits)
+    indices = _indices(joints, limits)
     points = _points(joints, positions)
     times = _times(times_s, len(points))
-    tolerance = np.broadcast_to(np.asarray(start_tolerance, dtype=np.float64), commanded.shape)[places]
-    _check_points(joints, points, places, commanded, limits, tolerance)
+    tolerance = np.broadcast_to(np.asarray(start_tolerance, dtype=np.float64), commanded.shape)[indices]
+    _check_points(joints, points, indices, commanded, limits, tolerance)
     segment, column, detour = largest_detour(times, points)
     if detour > MAX_DETOUR:
         allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
         raise TrajectoryRefusedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
     moving = sample_path(times, points, limits.dt_s)
-    moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[places] - points[0])
+    moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[indices] - points[0])
     rows = np.repeat(commanded[None], len(moving), axis=0)
-    rows[:, places] = moving
+    rows[:, indices] = moving
     _check_rows(rows, times, commanded, limits)
     return CheckedPath(rows, limits.dt_s)
 
 
-def _places(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
+def _indices(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
     if not joints:
         raise TrajectoryRefusedError("joints", -1, "", "no joints", "at least one")
     for joint in joints:
@@ -128,8 +128,8 @@ def _times(times_s: ArrayLike, n_points: int) -> Floats:
     steps = np.diff(times)
     if (steps <= 0).any():
         index = int(np.argmax(steps <= 0)) + 1
-        asked = f"{times[index]:.6g} s after {times[index - 1]:.6g} s"
-        raise TrajectoryRefusedError("times", index, "", asked, "times that increase strictly")
+        requested = f"{times[index]:.6g} s after {times[index - 1]:.6g} s"
+        raise TrajectoryRefusedError("times", index, "", requested, "times that increase strictly")
     if times[-1] > MAX_DURATION_S:
         raise TrajectoryRefusedError("times", n_points - 1, "", f"{times[-1]:.6g} s", f"up to {MAX_DURATION_S:g} s")
     return times
@@ -138,15 +138,15 @@ def _times(times_s: ArrayLike, n_points: int) -> Floats:
 def _check_points(
     joints: Sequence[str],
     points: Floats,
-    places: NDArray[np.intp],
+    indices: NDArray[np.intp],
     commanded: Floats,
     limits: MotionLimits,
     tolerance: Floats,
 ) -> None:
     # A joint commanded outside its range may begin there; the rows are judged to come inward.
-    held = commanded[places]
-    lower = np.rad2deg(np.minimum(limits.lower[places], held))
-    upper = np.rad2deg(np.maximum(limits.upper[places], held))
+    held = commanded[indices]
+    lower = np.rad2deg(np.minimum(limits.lower[indices], held))
+    upper = np.rad2deg(np.maximum(limits.upper[indices], held))
     degrees = np.rad2deg(points)
     outside = np.argwhere((degrees < lower - 1e-6) | (degrees > upper + 1e-6))
     if len(outside):
@@ -161,12 +161,13 @@ def _check_points(
 
 
 def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLimits) -> None:
-    found = limits.first_violation(rows, commanded[None], rest_at_end=True)
-    if found is None:
+    violation = limits.first_violation(rows, commanded[None], rest_at_end=True)
+    if violation is None:
         return
-    row_time = min(found.row * limits.dt_s, times[-1])
+    row_time = min(violation.row * limits.dt_s, times[-1])
     index = int(np.searchsorted(times, row_time, side="left"))
-    raise TrajectoryRefusedError(found.code, index, found.joint, f"{found.asked:.4g} {found.unit}", found.allowed)
+    requested = f"{violation.requested:.4g} {violation.unit}"
+    raise TrajectoryRefusedError(violation.code, index, violation.joint, requested, violation.allowed)
 
 
 def _fade(n_rows: int, dt_s: float) -> Floats:

@@ -1,4 +1,4 @@
-"""What the gate watches over several steps: the emergency stop, how joints follow, how often it is asked."""
+"""What the gate watches over several steps: the emergency stop, how joints follow, how often messages come."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ RATE_FACTOR = 1.2
 
 
 class EmergencyWatch:
-    """Whether the emergency stop is pressed; a source that has not been heard for `timeout_ms` counts as pressed."""
+    """Whether the emergency stop is pressed; a source that has sent nothing for `timeout_ms` counts as pressed."""
 
     def __init__(self, timeout_ms: float | None, start_ns: int) -> None:
         self._timeout_ms = timeout_ms
-        self._heard_ns = start_ns
+        self._received_ns = start_ns
         self._pressed = False
 
     def fault(self, now_ns: int, pressed: bool | None) -> Fault | None:
-        """Hear what the source says, None: nothing; the latest word stays until the next."""
+        """Take what the source sent, None: nothing; its latest state stays until the next."""
         if pressed is not None:
-            self._heard_ns, self._pressed = now_ns, pressed
-        self._heard_ns = min(self._heard_ns, now_ns)
+            self._received_ns, self._pressed = now_ns, pressed
+        self._received_ns = min(self._received_ns, now_ns)
         if self._pressed:
             return Fault("emergency_stop", "", "the emergency stop is pressed; release it, then arm again")
-        silent_ms = (now_ns - self._heard_ns) * 1e-6
-        if self._timeout_ms is None or silent_ms <= self._timeout_ms:
+        age_ms = (now_ns - self._received_ns) * 1e-6
+        if self._timeout_ms is None or age_ms <= self._timeout_ms:
             return None
-        sentence = (
-            f"the emergency stop was not heard for {silent_ms:.0f} ms, allowed {self._timeout_ms:.0f} ms, and counts "
-            "as pressed; bring its source back, then arm again"
+        message = (
+            f"no data from the emergency stop for {age_ms:.0f} ms, allowed {self._timeout_ms:.0f} ms: it counts as "
+            "pressed; restart its source, then arm again"
         )
-        return Fault("emergency_silent", "", sentence)
+        return Fault("emergency_silent", "", message)
 
 
 class FollowingWatch:
-    """Whether joints are where they are commanded. `allowed` [J], rad; None: not watched."""
+    """Whether joints follow their commands. `allowed` [J], rad; None: not watched."""
 
     def __init__(self, names: tuple[str, ...], allowed: Floats | None, timeout_ms: float) -> None:
         self._names = names
@@ -55,20 +55,20 @@ class FollowingWatch:
         return np.asarray(~(np.abs(measured.positions - measured.commanded) <= self._allowed))
 
     def fault(self, measured: Measured) -> Fault | None:
-        """Hear a report; the joint that has been too far away for too long, if any."""
+        """The joint that has been too far away for too long, with this report; None: no joint."""
         away = self.away(measured)
         self._since_ns = np.where(away, np.where(self._since_ns < 0, measured.captured_ns, self._since_ns), -1)
-        late = away & (measured.captured_ns - self._since_ns >= self._timeout_ns)
-        if self._allowed is None or not late.any():
+        overdue = away & (measured.captured_ns - self._since_ns >= self._timeout_ns)
+        if self._allowed is None or not overdue.any():
             return None
-        joint = int(np.argmax(late))
+        joint = int(np.argmax(overdue))
         error = np.rad2deg(abs(measured.positions[joint] - measured.commanded[joint]))
-        sentence = (
-            f"joint {self._names[joint]} is {error:.2f} deg from where it is commanded for "
+        message = (
+            f"joint {self._names[joint]} has been {error:.2f} deg from its commanded position for "
             f"{self._timeout_ns * 1e-6:.0f} ms, allowed {np.rad2deg(self._allowed[joint]):.2f} deg; "
-            "see what holds it, then arm again"
+            "see what blocks it, then arm again"
         )
-        return Fault("following", self._names[joint], sentence)
+        return Fault("following", self._names[joint], message)
 
 
 class RateWatch:

@@ -92,7 +92,7 @@ def test_stopped_for_a_second_in_motion_it_holds_and_drops_what_waited() -> None
         rig.tick()
     assert rig.driver.state is State.HOLD
     assert rig.output is not None
-    assert "stood still for 1.0" in rig.output.safety.faults[0].sentence
+    assert "stalled for 1.0" in rig.output.safety.faults[0].sentence
     assert rig.output.safety.faults[0].code == "driver_stalled"
     assert "arm again" in rig.output.safety.faults[0].sentence
     said = {status.trajectory_id: status for status in rig.statuses}

@@ -143,7 +143,7 @@ def test_a_robot_that_falls_silent_after_a_fault_is_told_by_that_fault_first() -
     rig = in_motion()
     rig.driver.on_fault(Fault("port_lost", "", "the port went away"))
     assert silent(rig) == ["port_lost", "robot_silent"]
-    assert rig.statuses[-1].reason.startswith("the port went away; the robot was last heard")
+    assert rig.statuses[-1].reason.startswith("the port went away; no data from the robot")
     rig.tick()
     rig.tick()
     assert rig.driver.state is State.DISARMED

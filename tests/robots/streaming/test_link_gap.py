@@ -67,12 +67,12 @@ class LinkedRig(Rig):
     ("to_robot", "to_driver", "code", "sentence"),
     [
         (True, False, "stream_under_run", "the robot ran out of rows after "),
-        (True, True, "robot_silent", "the robot was last heard 533 ms ago, allowed 500 ms; it comes to rest by itself"),
+        (True, True, "robot_silent", "no data from the robot for 533 ms, allowed 500 ms"),
         (
             False,
             True,
             "robot_silent",
-            "the robot was last heard 533 ms ago, allowed 500 ms; it comes to rest by itself",
+            "no data from the robot for 533 ms, allowed 500 ms",
         ),
     ],
     ids=["to the robot", "both ways", "to the driver"],

@@ -1,6 +1,6 @@
 """The arm driver's logic: accepted trajectories to batches of the robot's stream, through the safety gate.
 
-One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it is heard (thesis 5.2.1:
+One `tick` a camera period. A trajectory is checked whole and expanded to rows of 1 ms when it arrives (thesis 5.2.1:
 the components outside the trajectory keep their pose). Each tick then sends the rows from a guard behind the latest
 known index on, about 300 ms of them, and the gate adds the stop ramp. If ticks or batches stop, the robot rests by
 itself.
@@ -46,11 +46,11 @@ SAFETY_STATES = {
     State.HOLD: SafetyState.STATE_HOLD,
     State.ESTOP: SafetyState.STATE_ESTOP,
 }
-# A trajectory heard later than this after it was made is a replay or comes from a queue that was stuck.
+# A trajectory received later than this after it was made is a replay or comes from a queue that was stuck.
 MAX_TRAJECTORY_AGE_S = 1.0
 # One from the future has a clock of its own; a publisher's clock may be ahead by as much as this.
 MAX_TRAJECTORY_LEAD_S = 0.05
-# A driver that did nothing for longer has let the robot run out of rows; what waited for it meanwhile is dropped.
+# A driver that did nothing for longer has let the robot run out of rows; the messages that waited for it are dropped.
 MAX_STALL_S = 0.5
 # Batches that came too late make the guard longer, for this trajectory, and so a stop as much later.
 GUARD_STEP_MS = 70
@@ -60,7 +60,7 @@ TICKS_PER_PROGRESS = 5
 
 @dataclass(frozen=True)
 class DriverOutput:
-    """Messages that a tick gives; `stream` and `joint_states` are None where there is nothing new."""
+    """The messages of a tick; `stream` and `joint_states` are None where there is nothing new."""
 
     stream: StreamBatch | None
     joint_states: JointStates | None
@@ -71,16 +71,16 @@ class DriverOutput:
 class ArmDriver:
     """Drives all joints of a robot that plays a stream of rows: HOAP-3, or a servo arm by its loop.
 
-    Hear messages with the `on_…` methods, then call `tick`.
+    Pass messages to the `on_…` methods, then call `tick`.
 
     Args:
         description: Of the robot.
         settings: Of the safety gate.
-        clearance: For the gate; None: it does not look how near parts of the robot come to each other.
-        no_program: Why no program may arm the robot, asked whenever one wants to; "" only where it is verified that
-            the launch of this driver emulates the robot.
+        clearance: For the gate; None: it does not check how near parts of the robot come to each other.
+        no_program: Called whenever a program requests to arm: why none may; "" only where it is verified that the
+            launch of this driver emulates the robot.
 
-    The driver begins with its first tick. Arm words, stops and trajectories from before it are not heard, so a
+    The driver begins with its first tick and ignores arming requests, stops and trajectories from before it. So a
     restarted driver is disarmed, and what stopped an earlier one is not its reason; the stream's epoch is made of that
     tick's time. After a stop from before it, too, only a person arms.
     """
@@ -102,8 +102,8 @@ class ArmDriver:
         self._begin_at(0)
         self._report: RobotReport | None = None
         self._reported = False
-        self._words: list[ArmingRequest] = []
-        self._asked: list[tuple[JointTrajectory, int]] = []
+        self._arming_requests: list[ArmingRequest] = []
+        self._trajectories: list[tuple[JointTrajectory, int]] = []
         self._stop: Fault | None = None
         self._person_stops: list[tuple[int, Fault]] = []
         self._stopped_before = False
@@ -114,7 +114,7 @@ class ArmDriver:
         self._statuses: list[TrajectoryStatus] = []
         self._last_status: dict[str, TrajectoryStatus] = {}
         self._ticks = 0
-        self._refused = 0
+        self._rejected = 0
         self._guard_ms = description.stream.guard_ms
 
     def _begin_at(self, start_ns: int) -> None:
@@ -132,17 +132,17 @@ class ArmDriver:
 
     @property
     def sentence(self) -> str:
-        """How the gate stands, for people."""
+        """The state of the gate, for people."""
         if self._core.state is State.DISCONNECTED:
             return "disarmed, waiting for the robot"
-        return f"the safety gate says: {self._core.state.value}"
+        return f"safety gate: {self._core.state.value}"
 
     def on_robot_state(self, message: Hoap3State, captured_ns: int) -> None:
-        """Hear what the robot says of its stream and joints; a report that cannot be read counts as none."""
+        """Take the robot's report on its stream and joints; one that cannot be read counts as none."""
         report = RobotReport.of(message, captured_ns, self._description, self._report)
         if report is not None:
             before, execution = self._report, self._execution
-            # A first batch is sent until it is known to be played; what is refused of that was not late.
+            # A first batch is sent until it is known to be played; those rejected meanwhile were not late.
             begun = before is not None and execution is not None and before.next_index > execution.start_index
             if before is not None and begun and report.refused_batches > before.refused_batches:
                 self._guard_ms = min(self._guard_ms + GUARD_STEP_MS, LONGEST_GUARD_MS)
@@ -150,66 +150,67 @@ class ArmDriver:
             self._reported = True
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
-        """Hear the arming request of a person or, for an emulated robot, of a program."""
-        self._words.append(ArmingRequest(captured_ns, message.source, message.armed, message.by_person))
+        """Take the arming request of a person or, for an emulated robot, of a program."""
+        self._arming_requests.append(ArmingRequest(captured_ns, message.source, message.armed, message.by_person))
 
     def on_stop(self, message: StopRequest, captured_ns: int) -> None:
-        """Hear a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
+        """Take a person's stop: the next `tick` begins a controlled stop and latches it, whatever the gate does."""
         fault = Fault(PERSON_STOP, "", f"stopped from the {message.source or 'bus'} by a person")
         self._person_stops.append((captured_ns, fault))
 
     @property
     def wants_to_arm(self) -> bool:
-        """Whether a word was heard that may arm and that no `tick` has judged yet."""
-        return any(word.armed and (word.by_person or not self._why_no_program()) for word in self._words)
+        """Whether a request waits for the next `tick` that may arm."""
+        return any(one.armed and (one.by_person or not self._why_no_program()) for one in self._arming_requests)
 
     def _why_no_program(self) -> str:
         touched = self._stopped_before or not self._core.untouched
         return self._no_program() or (TOUCHED if touched else "")
 
     def on_fault(self, fault: Fault) -> None:
-        """Hear what is wrong with the robot: the next `tick` begins a controlled stop and latches it."""
+        """Take a fault of the robot: the next `tick` begins a controlled stop and latches it."""
         self._stop = fault
 
     def on_arming_checks(self, faults: tuple[Fault, ...], began_ns: int | None = None) -> None:
-        """Hear which checks of the robot fail now, and when they began; while one does, nobody arms."""
+        """Take the checks of the robot that fail now, and when they began; while one fails, nobody arms."""
         self._arming_faults, self._checks_began_ns = faults, began_ns
 
     def on_emergency(self, pressed: bool) -> None:
-        """Hear the emergency stop; pressed once since the last `tick` is pressed."""
+        """Take the state of the emergency stop; pressed once since the last `tick` counts as pressed."""
         self._emergency = pressed or bool(self._emergency)
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
-        """Hear a trajectory: `tick` accepts or refuses it by its own time.
+        """Take a trajectory: `tick` accepts or rejects it by its own time.
 
-        The same id again is answered with its latest status and not played twice.
+        A trajectory whose id is known is not played again; its latest status is sent once more.
         """
-        self._asked.append((message, captured_ns))
+        self._trajectories.append((message, captured_ns))
 
     def tick(self, now_ns: int) -> DriverOutput:
-        """One camera period: what to send to the robot and what to say of it."""
+        """One camera period: what to send to the robot and what to publish of it."""
         if not self._ticks:
             self._begin_at(now_ns)
         stalled_s = (now_ns - self._now_ns) * 1e-9
         stalled_s = stalled_s if stalled_s > MAX_STALL_S else 0.0
         self._now_ns = now_ns
         self._ticks += 1
-        self._judge_asked(stalled_s)
+        self._judge_trajectories(stalled_s)
         self._judge_stops()
-        words: list[ArmingRequest | None] = [*self._words] or [None]
-        self._words.clear()
+        requests: list[ArmingRequest | None] = [*self._arming_requests] or [None]
+        self._arming_requests.clear()
         measured = self._report.measured(self._writer.epoch) if self._report else None
         stop = self._stop or self._fault_of_stall(stalled_s) or self._fault_of_stream(now_ns)
         proposal = self._proposal(now_ns)
         targets = None
-        for word in words:
+        for request in requests:
             checks = self._arming_faults, self._emergency, self._checks_began_ns
-            no_program = self._why_no_program() if word is not None and word.armed and not word.by_person else ""
-            inputs = Inputs(measured, word, proposal, stop, *checks, no_program)
-            given, _, _ = self._core.step(now_ns, inputs)
-            targets = given or targets
+            by_program = request is not None and request.armed and not request.by_person
+            no_program = self._why_no_program() if by_program else ""
+            inputs = Inputs(measured, request, proposal, stop, *checks, no_program)
+            accepted, _, _ = self._core.step(now_ns, inputs)
+            targets = accepted or targets
         self._emergency = self._checks_began_ns = None
-        if self._core.state is not State.DISCONNECTED:  # there a stop waits until the robot is heard again
+        if self._core.state is not State.DISCONNECTED:  # there a stop waits for data from the robot
             self._stop = None
         stream = self._writer.batch(targets.first_index, targets.rows, targets.ramp_rows) if targets else None
         self._follow(now_ns)
@@ -219,7 +220,7 @@ class ArmDriver:
         return DriverOutput(stream, joint_states, statuses, self._safety_state(now_ns))
 
     def _judge_stops(self) -> None:
-        """A stop from before this driver began is no reason for how it stands: what it stopped was another's."""
+        """Latch stops; one from before this driver began stopped an earlier driver and is not its fault."""
         for captured_ns, fault in self._person_stops:
             if captured_ns < self._began_ns:
                 self._stopped_before = True
@@ -227,10 +228,10 @@ class ArmDriver:
                 self._stop = fault
         self._person_stops.clear()
 
-    def _judge_asked(self, stalled_s: float) -> None:
-        """Accept or refuse what was heard since the last tick."""
-        asked, self._asked = self._asked, []
-        for message, captured_ns in asked:
+    def _judge_trajectories(self, stalled_s: float) -> None:
+        """Accept or reject what came since the last tick."""
+        trajectories, self._trajectories = self._trajectories, []
+        for message, captured_ns in trajectories:
             known = self._last_status.get(message.id)
             if known is not None:
                 self._statuses.append(known)
@@ -239,12 +240,12 @@ class ArmDriver:
                 if stalled_s:
                     allowed = f"up to {MAX_STALL_S:g} s; send it again"
                     raise TrajectoryRefusedError(
-                        "stale", -1, "", f"the driver stood still for {stalled_s:.2f} s", allowed
+                        "stale", -1, "", f"a driver that stalled for {stalled_s:.2f} s", allowed
                     )
                 self._begin(message, captured_ns)
-            except TrajectoryRefusedError as refusal:
-                self._refused += 1
-                self._say(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(refusal), refusal.code)
+            except TrajectoryRefusedError as error:
+                self._rejected += 1
+                self._add_status(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(error), error.code)
 
     def _begin(self, message: JointTrajectory, captured_ns: int) -> None:
         report = self._report
@@ -272,7 +273,7 @@ class ArmDriver:
         start_index = report.next_index if report.epoch == self._writer.epoch else 0
         self._guard_ms = self._description.stream.guard_ms
         self._execution = Execution(message.id, path.rows, path.dt_s, start_index, self._now_ns)
-        self._say(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
+        self._add_status(message.id, TrajectoryStatus.STATE_ACCEPTED, 0.0, path.duration_s, "")
 
     def _proposal(self, now_ns: int) -> Proposal | None:
         execution, report = self._execution, self._report
@@ -289,11 +290,11 @@ class ArmDriver:
     def _fault_of_stall(self, stalled_s: float) -> Fault | None:
         if not stalled_s or self._execution is None or self._core.state is not State.ARMED:
             return None
-        sentence = (
-            f"the driver itself stood still for {stalled_s:.2f} s, allowed {MAX_STALL_S:g} s, so what it would send "
-            "is too old; the robot rests by its stop ramp; arm again"
+        message = (
+            f"the driver itself stalled for {stalled_s:.2f} s, allowed {MAX_STALL_S:g} s, so the next rows are too "
+            "old; the robot comes to rest by its stop ramp; arm again"
         )
-        return Fault("driver_stalled", "", sentence)
+        return Fault("driver_stalled", "", message)
 
     def _fault_of_stream(self, now_ns: int) -> Fault | None:
         if self._execution is None or self._report is None or self._core.state is not State.ARMED:
@@ -301,7 +302,7 @@ class ArmDriver:
         return self._execution.fault(self._report, self._writer.epoch, now_ns)
 
     def _follow(self, now_ns: int) -> None:
-        """Say how the trajectory fares; end it when the robot's own state says so."""
+        """Report the progress of the trajectory; end it when the robot reports its end."""
         execution, report = self._execution, self._report
         if execution is None or report is None:
             return
@@ -311,18 +312,18 @@ class ArmDriver:
             return
         if self._core.state is not State.ARMED:
             reason = "; ".join(fault.sentence for fault in self._core.faults) or "disarmed"
-            self._say(name, TrajectoryStatus.STATE_STOPPED, time_s, duration_s, reason)
+            self._add_status(name, TrajectoryStatus.STATE_STOPPED, time_s, duration_s, reason)
             self._execution = None
             return
         ending = execution.ending(report, self._writer.epoch, now_ns, self._description)
         if ending is not None:
             state = TrajectoryStatus.STATE_STOPPED if ending else TrajectoryStatus.STATE_SUCCEEDED
-            self._say(name, state, duration_s, duration_s, ending)
+            self._add_status(name, state, duration_s, duration_s, ending)
             self._execution = None
         elif self._ticks % TICKS_PER_PROGRESS == 0:
-            self._say(name, TrajectoryStatus.STATE_EXECUTING, time_s, duration_s, "")
+            self._add_status(name, TrajectoryStatus.STATE_EXECUTING, time_s, duration_s, "")
 
-    def _say(
+    def _add_status(
         self,
         name: str,
         state: TrajectoryStatus.State,
@@ -336,13 +337,13 @@ class ArmDriver:
         )
         status.captured.FromNanoseconds(self._now_ns)
         self._statuses.append(status)
-        if state != TrajectoryStatus.STATE_REFUSED:  # a refused one that is sent again is judged again
+        if state != TrajectoryStatus.STATE_REFUSED:  # a rejected one that is sent again is judged again
             self._last_status[name] = status
             while len(self._last_status) > 100:
                 del self._last_status[next(iter(self._last_status))]
 
     def _safety_state(self, now_ns: int) -> SafetyState:
-        message = SafetyState(state=SAFETY_STATES[self._core.state], refused_trajectories=self._refused)
+        message = SafetyState(state=SAFETY_STATES[self._core.state], refused_trajectories=self._rejected)
         message.captured.FromNanoseconds(now_ns)
         message.faults.extend(
             SafetyFault(code=fault.code, joint=fault.joint, sentence=fault.sentence) for fault in self._core.faults
@@ -353,8 +354,8 @@ class ArmDriver:
 def _start_tolerance(description: RobotDescription) -> Floats:
     """How far a trajectory may begin from the commanded pose, [J], rad.
 
-    Fingers that hold something are measured far from where they are commanded, and nobody but this driver knows the
-    command. The way from there to the trajectory is judged like the rest of it.
+    Fingers that hold something are measured far from where they are commanded, and only this driver knows the
+    command. The movement from there to the trajectory is judged like the rest of it.
     """
     tolerance = np.full(description.n_joints, np.deg2rad(description.stream.start_tolerance_deg))
     tolerance[list(description.gripper_indices)] = np.inf

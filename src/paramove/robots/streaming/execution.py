@@ -1,4 +1,4 @@
-"""One trajectory while the robot plays it: which rows come next, whether the stream fares well, when it is done."""
+"""One trajectory while the robot plays it: which rows come next, whether the stream has failed, when it is done."""
 
 from __future__ import annotations
 
@@ -59,22 +59,22 @@ class Execution:
         return float(np.clip(report.next_index - self.start_index, 0, len(self.rows) - 1)) * self.dt_s
 
     def fault(self, report: RobotReport, epoch: int, now_ns: int) -> Fault | None:
-        """What is wrong with the stream: it never began, ran out or was lost; None if it fares well."""
+        """What is wrong with the stream: it never began, ran out or was lost; None if it is all right."""
         begun = report.epoch == epoch and report.next_index > self.start_index
         if not begun:
             if now_ns - self.begun_ns < START_TIMEOUT_S * 1e9:
                 return None
-            why = f"; the robot says: {report.refusal}" if report.refusal else ""
+            why = f"; the robot reports: {report.refusal}" if report.refusal else ""
             return Fault("stream_not_begun", "", f"nothing was played within {START_TIMEOUT_S:g} s{why}")
         ran_out = report.at_rest or report.playing == Hoap3State.PLAYING_STOP_RAMP
         if not ran_out or report.next_index >= self.end_index:
             return None
-        place = f"{report.next_index - self.start_index} of {len(self.rows) - 1} rows"
-        why = f"; the robot says: {report.refusal}" if report.refusal else ""
-        return Fault("stream_under_run", "", f"the robot ran out of rows after {place} and stops{why}; arm again")
+        progress = f"{report.next_index - self.start_index} of {len(self.rows) - 1} rows"
+        why = f"; the robot reports: {report.refusal}" if report.refusal else ""
+        return Fault("stream_under_run", "", f"the robot ran out of rows after {progress} and stops{why}; arm again")
 
     def ending(self, report: RobotReport, epoch: int, now_ns: int, description: RobotDescription) -> str | None:
-        """None while it lasts, "" once the robot has played all and is there, else why it failed."""
+        """None while it lasts, "" once the robot has played all rows and arrived, else why it failed."""
         if report.epoch != epoch or report.next_index < self.end_index or not report.at_rest:
             return None
         if self.played_ns is None:

@@ -1,4 +1,4 @@
-"""What the robot says of its stream and joints, in radians."""
+"""What the robot reports of its stream and joints, in radians."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class RobotReport:
     def of(
         cls, message: Hoap3State, captured_ns: int, description: RobotDescription, before: RobotReport | None
     ) -> RobotReport | None:
-        """Read a message; None if its counts are not those of this robot, for nothing may be made up in their place."""
+        """Read a message; None if its counts are not those of this robot: they are not replaced by invented ones."""
         units = description.units
         try:
             positions = units.to_radians(list(message.counts))
-            # A robot that does not say what it holds is taken to hold where it is.
+            # A robot that does not report its targets is taken to hold its position.
             commanded = units.to_radians(list(message.target_counts)) if message.target_counts else positions
         except JointRangeError:
             return None
@@ -63,7 +63,7 @@ class RobotReport:
         return self.playing in (Hoap3State.PLAYING_NOTHING, Hoap3State.PLAYING_HELD)
 
     def measured(self, epoch: int) -> Measured:
-        """As the safety gate hears it; of another epoch no row counts as played."""
+        """As input of the safety gate; of another epoch no row counts as played."""
         index = self.next_index if self.epoch == epoch else 0
         return Measured(self.captured_ns, self.positions, self.commanded, self.at_rest, index)
 

@@ -2,7 +2,7 @@
 
 The next batch replaces the ramp from an index that is not yet played. So nothing has to be decided when batches stop
 coming: the robot plays the ramp that it already has. `StreamReader` is the robot's side (the simulator uses it); it
-plays one frame a millisecond and refuses, as a whole, every batch that it could not play smoothly.
+plays one frame a millisecond and rejects, as a whole, every batch that it could not play smoothly.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MAX_FRAMES = 5000
 # the limit.
 SPAN_S = 0.004
 BEYOND = float(np.deg2rad(2.0))
-"""A joint that rests so far beyond its range, against its stop, may be kept there; the gate judges how far it may."""
+"""A joint that rests so far beyond its range, against its stop, may be held there; the gate judges how far it may."""
 _FRAME_TYPE = np.dtype("<i2")
 
 
@@ -71,7 +71,7 @@ class StreamReader:
     Attributes:
         epoch: Of the stream being played; 0 before any.
         next_index: Of the frame to be played next.
-        refused_batches: How many batches were refused.
+        refused_batches: How many batches were rejected.
         refusal: Why the latest of them was.
     """
 
@@ -132,20 +132,20 @@ class StreamReader:
         return self.target
 
     def offer(self, batch: StreamBatch) -> bool:
-        """Take a batch, or refuse it as a whole and keep what is buffered. Returns whether it was taken."""
-        refusal = self._refusal_of_form(batch)
-        if not refusal:
+        """Take a batch, or reject it as a whole and keep the buffer. Returns whether it was taken."""
+        reason = self._error_of_form(batch)
+        if not reason:
             frames = np.frombuffer(batch.frames, dtype=_FRAME_TYPE).reshape(-1, batch.joint_count).astype(np.int16)
-            refusal = self._refusal_of_place(batch, len(frames)) or self._refusal_of_frames(batch, frames)
-        if refusal:
+            reason = self._error_of_index(batch, len(frames)) or self._error_of_frames(batch, frames)
+        if reason:
             self.refused_batches += 1
-            self.refusal = refusal
+            self.refusal = reason
             return False
         if batch.epoch != self.epoch:
             self.epoch = batch.epoch
             self.next_index = batch.first_index
-        kept = batch.first_index - self.next_index
-        self._coming = np.concatenate([self._coming[:kept], frames])
+        n_before = batch.first_index - self.next_index
+        self._coming = np.concatenate([self._coming[:n_before], frames])
         self._ramp_frames = batch.stop_ramp_frames
         return True
 
@@ -164,7 +164,7 @@ class StreamReader:
         state.captured.FromNanoseconds(captured_ns)
         return state
 
-    def _refusal_of_form(self, batch: StreamBatch) -> str:
+    def _error_of_form(self, batch: StreamBatch) -> str:
         n_joints = len(self._units.names)
         if not batch.epoch:
             return "epoch 0, a sender's epoch is 1 or more"
@@ -177,10 +177,10 @@ class StreamReader:
             return f"{len(batch.frames)} bytes, allowed 1 to {MAX_FRAMES} frames of {n_joints} 16 bit numbers"
         if batch.stop_ramp_frames > n_frames:
             return f"a stop ramp of {batch.stop_ramp_frames} frames, the batch has {n_frames}"
-        found = zlib.crc32(batch.frames)
-        return "" if found == batch.crc else f"CRC {found:08x}, the batch says {batch.crc:08x}"
+        crc = zlib.crc32(batch.frames)
+        return "" if crc == batch.crc else f"CRC {crc:08x}, the batch has {batch.crc:08x}"
 
-    def _refusal_of_place(self, batch: StreamBatch, n_frames: int) -> str:
+    def _error_of_index(self, batch: StreamBatch, n_frames: int) -> str:
         if batch.epoch != self.epoch:
             return "" if self.at_rest else f"epoch {batch.epoch} while {self.epoch} is played; allowed only at rest"
         if batch.first_index < self.next_index:
@@ -191,10 +191,10 @@ class StreamReader:
         depth = batch.first_index + n_frames - self.next_index
         return "" if depth <= MAX_FRAMES else f"{depth} frames to be played, allowed {MAX_FRAMES}: the buffer is full"
 
-    def _refusal_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
-        kept = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
+    def _error_of_frames(self, batch: StreamBatch, frames: Frames) -> str:
+        n_before = batch.first_index - self.next_index if batch.epoch == self.epoch else 0
         span = self._span
-        before = np.concatenate([self._played, self._coming[:kept]])[-2 * span :]
+        before = np.concatenate([self._played, self._coming[:n_before]])[-2 * span :]
         whole = np.concatenate([before, frames, np.repeat(frames[-1:], 2 * span, axis=0)]).astype(np.float64)
         outside = (frames < self._low) | (frames > self._high)
         steps = np.abs(np.diff(whole[2 * span - 1 :], axis=0))
@@ -207,7 +207,7 @@ class StreamReader:
             if bad.any():
                 row, joint = (int(i) for i in np.argwhere(bad)[0])
                 limits = (self._low[joint], self._high[joint], self._step[joint], self._bend[joint])
-                way = whole[2 * span - 1 + row : 2 * span + 1 + row, joint]
-                told = what.format(values[row, joint], *limits, *way)
-                return f"frame {row}, joint {self._units.names[joint]}: {told}"
+                step = whole[2 * span - 1 + row : 2 * span + 1 + row, joint]
+                detail = what.format(values[row, joint], *limits, *step)
+                return f"frame {row}, joint {self._units.names[joint]}: {detail}"
         return ""

@@ -9,7 +9,7 @@ import pytest
 
 from paramove.robots.dynamixel.arm.servo_arm import ServoArm, Timeouts
 from paramove.robots.dynamixel.arm.servo_checks import JointServo
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoRefusedError
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoRejectedError
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import JointCalibration
@@ -143,10 +143,8 @@ def test_a_calibrated_arm_whose_position_limits_are_others_is_not_armed(emulator
     change(emulator, 2, f"{end} Position Limit", found)
     (fault,) = arm.check()
     assert (fault.code, fault.joint) == ("servo_settings", "wrist")
-    assert fault.sentence == (
-        f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}: once this driver has ended, "
-        "`paramove arm verify --write` sets it, `--adopt` takes it over into the calibration"
-    )
+    assert f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}" in fault.sentence
+    assert all(option in fault.sentence for option in ("`paramove arm verify --write`", "`--adopt`"))
     assert memory(emulator, "Torque Enable") == [0, 0, 0]
 
 
@@ -154,13 +152,11 @@ def test_an_adapter_that_keeps_answers_for_16_ms_is_told_with_time_and_remedy(em
     emulator.faults = WireFaults(delay_s=0.016)
     (fault,) = ServoArm(JOINTS, ServoChain(port), period_s=0.010).check()
     assert fault.code == "bus_slow"
-    told = re.fullmatch(
-        r"reading the servos takes ([0-9.]+) ms, allowed 10\.0 ms: raise the baud rate, or set the adapter's latency "
-        r"timer to 1 ms \(`paramove doctor` tells how\)",
-        fault.sentence,
+    facts = re.search(
+        r"takes ([0-9.]+) ms, allowed 10\.0 ms: .*latency timer to 1 ms .*`paramove doctor`", fault.sentence
     )
-    assert told is not None
-    assert float(told[1]) >= 16.0
+    assert facts is not None
+    assert float(facts[1]) >= 16.0
     assert memory(emulator, "Torque Enable") == [0, 0, 0]
 
 
@@ -171,12 +167,10 @@ def test_servos_that_stopped_by_themselves_are_told_take_no_goal_and_hold_again_
         pass
     fault = arm.look_after_watchdogs()
     assert (fault.code, fault.joint) == ("watchdog_tripped", "pan")
-    assert "servo 1 (pan) has stopped by itself, for it heard nothing for 1000 ms" in fault.sentence
-    assert fault.sentence.endswith("arm again, which clears its watchdog")
+    assert "servo 1 (pan) has stopped by itself" in fault.sentence
+    assert "1000 ms" in fault.sentence
     goal = XL430_W250.registers["Goal Position"]
-    with pytest.raises(
-        ServoRefusedError, match=r"servo 1 says that the value is out of range: write Goal Position = 10"
-    ):
+    with pytest.raises(ServoRejectedError, match=r"servo 1 .*out of range: write Goal Position = 10"):
         ServoChain(port).write(1, goal, 1010)
     assert arm.take_hold() == ()
     assert memory(emulator, "Goal Position") == [1000, 2000, 3000]
@@ -221,9 +215,9 @@ def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port)
 
     for place, who in ((0, "servo 1 (pan) for"), (1, "servo 1 (pan), servo 2 (lift) for")):
         change(emulator, place, "ID", 9 + place)
-        told(f"nothing was heard of {who}")
+        told(f"no data from {who}")
     change(emulator, 2, "ID", 19)
-    fault = told("nothing was heard of any servo for")
+    fault = told("no data from any servo for")
     assert (fault.code, fault.joint) == ("joint_silent", "")
     assert fault.sentence.endswith("check cables and the motors' power")
 

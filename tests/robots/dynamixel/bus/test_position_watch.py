@@ -36,7 +36,7 @@ def test_a_servo_with_torque_turns_as_fast_as_its_motor_since_it_was_last_asked(
     assert watch().accepts(1, 2048 + sign * way, ((age_ms - 1) * MS, age_ms * MS), torque=True)
     made = watch()
     assert not made.accepts(1, 2048 + sign * (way + 1), ((age_ms - 1) * MS, age_ms * MS), torque=True)
-    assert (made.jump.number, made.jump.before, made.jump.found) == (1, 2048, 2048 + sign * (way + 1))
+    assert (made.jump.number, made.jump.before, made.jump.position) == (1, 2048, 2048 + sign * (way + 1))
     assert made.jump.seconds == pytest.approx(1e-3 * age_ms)
 
 
@@ -52,7 +52,7 @@ def test_a_rejected_position_moves_nothing_and_a_true_one_is_believed_at_once():
     assert not made.accepts(1, 3000, (9 * MS, 10 * MS), torque=True)
     assert not made.accepts(1, 3000, (19 * MS, 20 * MS), torque=True)
     assert made.accepts(1, 2050, (29 * MS, 30 * MS), torque=True)
-    assert made.jump.found == 3000
+    assert made.jump.position == 3000
 
 
 def test_a_servo_that_stays_where_it_was_turned_is_believed_after_a_while():

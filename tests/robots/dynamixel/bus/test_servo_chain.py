@@ -9,7 +9,7 @@ from paramove.robots.dynamixel.bus.servo_chain import (
     ATTEMPTS_S,
     PingedServo,
     ServoChain,
-    ServoRefusedError,
+    ServoRejectedError,
     ServoSilentError,
 )
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
@@ -78,14 +78,14 @@ def test_one_packet_writes_to_several(chain):
 
 def test_a_refusal_names_servo_register_and_reason(chain):
     chain.write(1, REGISTERS["Torque Enable"], 1)
-    with pytest.raises(ServoRefusedError, match=r"servo 1 .*EEPROM is locked while torque is on.*write ID = 5"):
+    with pytest.raises(ServoRejectedError, match=r"servo 1 .*EEPROM is locked while torque is on.*write ID = 5"):
         chain.write(1, REGISTERS["ID"], 5)
 
 
 def test_a_servo_with_a_hardware_error_refuses_torque_and_what_clears_it_is_told(chain, emulator):
     with emulator.lock:
         emulator.bus.servos[0].memory["Hardware Error Status"] = 0x20
-    with pytest.raises(ServoRefusedError, match=r"servo 1 .*after a hardware error .*`reboot` clears it"):
+    with pytest.raises(ServoRejectedError, match=r"servo 1 .*after a hardware error .*`reboot` clears it"):
         chain.write(1, REGISTERS["Torque Enable"], 1)
 
 
@@ -188,12 +188,12 @@ def test_silent_servos_are_asked_less_often_and_are_heard_as_soon_as_they_talk_a
     monkeypatch.setattr("paramove.robots.dynamixel.bus.servo_chain.REST_S", 100.0)
     with emulator.lock:
         silenced(chain)
-        asked = chain.counts.asked
+        asked = chain.counts.expected
         assert not chain.has_room()
     ends_s = time.monotonic() + 60.0
     while not chain.has_room():
         assert time.monotonic() < ends_s, "answers that came late were not heard"
-    assert chain.counts.asked == asked
+    assert chain.counts.expected == asked
     chain.port.latency_s = PATIENT_S
     assert positions(chain, 1, 2, 3) == {number: int(place) for number, place in PLACES.items()}
 

@@ -39,7 +39,7 @@ def test_a_loaded_joint_is_refused(arm, number, name, load, monkeypatch):
     check_unloaded(arm.chain, servo)
     read = arm.chain.read
     monkeypatch.setattr(arm.chain, "read", lambda who, one: load if one.name == name else read(who, one))
-    with pytest.raises(ServoLoadedError, match=rf"servo {number} holds its joint with (30|29) % .* say --yes"):
+    with pytest.raises(ServoLoadedError, match=rf"servo {number} holds its joint with (30|29) % .* --yes"):
         check_unloaded(arm.chain, servo)
     with arm.emulator.lock:
         arm.emulator.bus.servos[number - 1].memory["Torque Enable"] = 0

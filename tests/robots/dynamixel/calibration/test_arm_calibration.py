@@ -103,7 +103,7 @@ def test_a_missing_file_is_told_with_the_remedy(tmp_path):
         ("min_counts: 1000", "min_counts: 1000.0", r"joints.pan.min_counts: input should be a valid integer"),
         ("zero_counts: 2048", "zero_counts: .inf", r"'.inf' is refused"),
         ("sign: 1", "sign: 0", r"joints.pan.sign: input should be 1 or -1, found 0"),
-        ("max_counts: 3000", "max_counts: 4500", "joint pan: max_counts 4500 is beyond the turn"),
+        ("max_counts: 3000", "max_counts: 4500", "joint pan: max_counts 4500 is beyond the one turn"),
         ("max_counts: 5400", "max_counts: 7500", "joint elbow: expected at most 3968 counts"),
         ("id: 2", "id: 1", "ID 1 is given twice"),
         ("homing_offset: 0", "homing_offset: 3", "joints.pan.homing_offset: input should be 0, found 3"),

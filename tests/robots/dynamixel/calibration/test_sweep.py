@@ -130,12 +130,12 @@ def test_what_cannot_be_calibrated_is_refused_with_the_reason():
         shown([0.0, 3.0 / COUNTS_PER_RAD], 1, 100).travel()
     with pytest.raises(CalibrationError, match=r"elbow was moved by 4096 counts.*turn it by at most 348 deg"):
         shown(np.linspace(0.0, 2.0 * np.pi, 50), 1, 100).travel()
-    with pytest.raises(CalibrationError, match=r"moved by 1252 counts between two looks.*more slowly"):
+    with pytest.raises(CalibrationError, match=r"moved by 1252 counts between two readings.*more slowly"):
         shown([0.0, 1.92], 1, 100).travel()
     travel = shown(BACK_AND_FORTH, 1, 2000).travel()
     with pytest.raises(CalibrationError, match=r"moved by 33 counts.*show a direction"):
         calibrated_joint(SERVO, planned(), travel, 2000, 33)
-    with pytest.raises(CalibrationError, match=r"posture is at 3000 counts, outside of the travel"):
+    with pytest.raises(CalibrationError, match=r"posture is at 3000 counts, outside of the demonstrated travel"):
         calibrated_joint(SERVO, planned(), travel, 3000, 100)
     with pytest.raises(CalibrationError, match=r"would reach from -1\d deg|would reach from -?\d+ to \d+ deg"):
         calibrated_joint(SERVO, planned(), travel, int(encoder(RANGE[1], 1, 2000)), -100)

@@ -238,7 +238,7 @@ def test_the_state_and_what_was_found_are_told(bench):
         ("dup 1 xl999", "servo model 'xl999' is not known"),
         ("delay -1", "delay_s is finite and not negative"),
         ("faults lots=0.1", "called 'lots': lost"),
-        ("faults lost=2", "lost is a share of 0 to 1"),
+        ("faults lost=2", "lost is a fraction of 0 to 1"),
         ("faults lost", "expected a number, found ''"),
     ],
 )

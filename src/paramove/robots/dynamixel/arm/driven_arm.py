@@ -1,4 +1,4 @@
-"""A servo arm as the arm's driver node sees it: messages in, messages out, the loop in a thread of its own between."""
+"""A servo arm for the arm's driver node: messages in, messages out, the loop in a thread of its own between."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from paramove.robots.streaming import ArmDriver
 from paramove.safety import SafetySettings, SelfCollision, State
 
 FOLLOWING = float(np.deg2rad(10.0))
-"""How far a joint may be from where it is commanded: more means that somebody or something holds it."""
+"""How far a joint may be from its commanded position: more means that somebody or something holds it."""
 EMERGENCY_MS = 500.0
-SILENCE = 1.5
-"""Times the loop's timeout is the gate's, so that the loop, which knows the servos, tells first who is silent."""
+GATE_TIMEOUT_FACTOR = 1.5
+"""Times the loop's timeout is the gate's, so that the loop, which knows the servos, first reports which has no data."""
 SLOW_NS, MOTORS_NS = 1_000_000_000 // 15, 1_000_000_000
 
 
@@ -54,7 +54,7 @@ class DrivenArm:
         following = np.full(description.n_joints, FOLLOWING)
         following[list(description.gripper_indices)] = np.inf
         safety = SafetySettings(
-            measured_timeout_ms=SILENCE * settings.timeouts.silent_s * 1e3,
+            measured_timeout_ms=GATE_TIMEOUT_FACTOR * settings.timeouts.silent_s * 1e3,
             following=following,
             emergency_timeout_ms=EMERGENCY_MS if settings.stop_inputs.are_there else None,
         )
@@ -76,12 +76,12 @@ class DrivenArm:
 
     @property
     def sentence(self) -> str:
-        """How the arm stands, for people."""
+        """The state of the arm, for people."""
         return self._driver.sentence
 
     @property
     def trouble(self) -> str:
-        """What is wrong: a lost port, silent servos, low voltage, what presses the emergency stop, servos that are not
+        """What is wrong: a lost port, servos without data, low voltage, a pressed emergency stop, servos that are not
         emulated though they should be; "" if nothing is.
 
         Raises:
@@ -92,28 +92,28 @@ class DrivenArm:
         loop = self._loop
         return (
             loop.lost
-            or loop.arm.unheard()
+            or loop.arm.not_responding()
             or "; ".join(filter(None, (self._caution, loop.pressed, *loop.arm.warnings())))
         )
 
     def on_trajectory(self, message: JointTrajectory, captured_ns: int) -> None:
-        """Hear a trajectory; the loop accepts or refuses it within a period."""
+        """Take a trajectory; the loop accepts or rejects it within a period."""
         with self._loop.lock:
             self._driver.on_trajectory(message, captured_ns)
 
     def on_arm_request(self, message: ArmRequest, captured_ns: int) -> None:
-        """Hear an arming request, to arm or disarm."""
+        """Take an arming request, to arm or disarm."""
         with self._loop.lock:
             self._driver.on_arm_request(message, captured_ns)
 
     def on_stop(self, message: StopRequest, captured_ns: int) -> None:
-        """Hear a person's stop: what is played from the next period on is the stop ramp."""
+        """Take a person's stop: the stop ramp begins in the next period."""
         with self._loop.lock:
             self._driver.on_stop(message, captured_ns)
         self._loop.tick()
 
     def said(self) -> Iterator[tuple[Topic, Any, int]]:
-        """What is to be said since the last time: topic, message, and when what it tells of was so, ns."""
+        """What is to be published since the last call: topic, message, and the time of its data, ns."""
         with contextlib.suppress(BlockingIOError):
             os.read(self.readable, 4096)
         output, now_ns = self._loop.take(), time.monotonic_ns()
@@ -144,7 +144,7 @@ def self_collision(description: RobotDescription) -> SelfCollision:
 
 
 def motor_status(arm: ServoArm, now_ns: int) -> MotorStatus:
-    """What the servos of an arm said of themselves, and how long ago they were heard."""
+    """The state of the servos of an arm, and the age of their data."""
     message = MotorStatus(warnings=arm.warnings())
     message.captured.FromNanoseconds(now_ns)
     for servo in arm.servos:

@@ -17,13 +17,13 @@ from paramove.robots.dynamixel.bus.servo_models import model_named
 from paramove.robots.dynamixel.bus.servo_port import PortLostError
 
 WATCHDOG_S = 0.2
-"""A servo that hears nothing for so long gives up its current by itself."""
-SHARE = 1.0 / 3.0
-"""Of a servo's current limit: more is never asked for."""
+"""A servo without data for so long switches its current off by itself."""
+CURRENT_FRACTION = 1.0 / 3.0
+"""Of a servo's current limit: the maximum of a goal."""
 
 
 class ArmWeight:
-    """What the joints of an arm's chain bear at rest, as its model has it; nothing that the arm holds is in it."""
+    """Torques of an arm's chain at rest, by its model, without anything that the arm holds."""
 
     def __init__(self, description: RobotDescription) -> None:
         self._model = mujoco.MjModel.from_xml_path(str(description.model_path))
@@ -40,7 +40,7 @@ class ArmWeight:
 
 
 class GravityCompensatedArm(TorqueOffArm):
-    """As a limp arm, but every look at it renews the currents that carry its weight. The gripper is limp.
+    """As an arm without torque, but every reading renews the currents that carry its weight. The gripper is limp.
 
     A servo's torque is taken as proportional to its current, as from 0 to stall; friction holds what that misses.
 
@@ -59,78 +59,78 @@ class GravityCompensatedArm(TorqueOffArm):
         self._carrying = description.chain.indices
         self._weight = ArmWeight(description)
         self._per_torque = np.zeros(description.n_joints)
-        for place in self._carrying:
-            model = model_named(description.motors[place])
+        for index in self._carrying:
+            model = model_named(description.motors[index])
             if model.current_unit is None:
                 raise InputError(
-                    f"{description.joint_names[place]} has a {model.name}, which has no current mode: lead this arm "
+                    f"{description.joint_names[index]} has a {model.name}, which has no current mode: lead this arm "
                     "without --float"
                 )
             amperes = model.stall_amperes / model.stall_torque
-            sign = np.sign(description.units.counts_per_rad[place])
-            self._per_torque[place] = sign * amperes / model.current_unit
+            sign = np.sign(description.units.counts_per_rad[index])
+            self._per_torque[index] = sign * amperes / model.current_unit
         self._maximum: dict[int, int] = {}
         self._modes: dict[int, int] = {}
         self._commanded_s = 0.0
 
     def release(self) -> None:
         """Each servo in turn: torque off, current mode, and the current that carries its part of the arm."""
-        while (found := super().measured()) is None:
+        while (measured := super().measured()) is None:
             pass  # until it gives up
-        torques = self._weight.torques(found[1])
-        for place, number in enumerate(self._numbers):
-            registers = self._models[place].registers
-            if place in self._carrying:
+        torques = self._weight.torques(measured[1])
+        for index, number in enumerate(self._numbers):
+            registers = self._models[index].registers
+            if index in self._carrying:
                 self._modes[number] = self._chain.read(number, registers["Operating Mode"])
-                self._maximum[number] = int(SHARE * self._chain.read(number, registers["Current Limit"]))
+                self._maximum[number] = int(CURRENT_FRACTION * self._chain.read(number, registers["Current Limit"]))
             self._chain.write(number, registers["Torque Enable"], 0)
-            if place in self._carrying:
+            if index in self._carrying:
                 self._chain.write(number, registers["Operating Mode"], CURRENT_MODE)
                 self._chain.write(number, registers["Torque Enable"], 1)
-                self._chain.write(number, registers["Goal Current"], self._current(place, torques))
+                self._chain.write(number, registers["Goal Current"], self._current(index, torques))
 
     def measured(self) -> tuple[int, Floats] | None:
-        """As of a limp arm; where the arm is not known for 0.2 s, it carries nothing until it is."""
-        found = super().measured()
-        silent_s = time.monotonic() - self._commanded_s
-        if found is not None:
-            if silent_s > 0.5 * WATCHDOG_S:
+        """As of an arm without torque; without a position for 0.2 s, the currents are 0 until there is one."""
+        measured = super().measured()
+        age_s = time.monotonic() - self._commanded_s
+        if measured is not None:
+            if age_s > 0.5 * WATCHDOG_S:
                 self._renew_watchdogs()
-            self._carry(self._weight.torques(found[1]))
+            self._carry(self._weight.torques(measured[1]))
             self._commanded_s = time.monotonic()
-        elif silent_s > WATCHDOG_S:
+        elif age_s > WATCHDOG_S:
             self._carry(np.zeros(len(self._numbers)))
-        return found
+        return measured
 
     def put_down(self) -> tuple[str, ...]:
-        """As of a limp arm: torque off, and the mode that was; each servo on its own. The arm falls unless it is held.
+        """Torque off, and the former mode; each servo on its own. The arm falls unless it is held.
 
-        A servo that does not hear it gives up its current by its watchdog.
+        A servo without a connection switches its current off by its watchdog.
         """
         failed = []
-        for place in self._carrying:
-            number, registers = self._numbers[place], self._models[place].registers
+        for index in self._carrying:
+            number, registers = self._numbers[index], self._models[index].registers
             try:
                 self._chain.write(number, registers["Torque Enable"], 0)
                 self._chain.write(number, registers["Bus Watchdog"], 0)
                 if number in self._modes:
                     self._chain.write(number, registers["Operating Mode"], self._modes[number])
             except (ServoError, PortLostError) as error:
-                failed.append(f"{self._joints[place]}: {error}")
+                failed.append(f"{self._joints[index]}: {error}")
         return tuple(failed)
 
     def _carry(self, torques: Floats) -> None:
-        goals = {self._numbers[place]: self._current(place, torques) for place in self._carrying}
+        goals = {self._numbers[index]: self._current(index, torques) for index in self._carrying}
         self._chain.sync_write(self._models[self._carrying[0]].registers["Goal Current"], goals)
 
-    def _current(self, place: int, torques: Floats) -> int:
+    def _current(self, index: int, torques: Floats) -> int:
         """Of one servo, in its units."""
-        maximum = self._maximum[self._numbers[place]]
-        return max(-maximum, min(maximum, round(float(self._per_torque[place] * torques[place]))))
+        maximum = self._maximum[self._numbers[index]]
+        return max(-maximum, min(maximum, round(float(self._per_torque[index] * torques[index]))))
 
     def _renew_watchdogs(self) -> None:
-        """One that has tripped keeps the goals locked until it is told 0."""
-        for place in self._carrying:
-            register = self._models[place].registers["Bus Watchdog"]
+        """One that has tripped locks the goals until 0 is written."""
+        for index in self._carrying:
+            register = self._models[index].registers["Bus Watchdog"]
             for value in (0, round(WATCHDOG_S / WATCHDOG_UNIT_S)):
-                self._chain.write(self._numbers[place], register, value)
+                self._chain.write(self._numbers[index], register, value)

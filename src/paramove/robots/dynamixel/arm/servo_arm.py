@@ -31,18 +31,18 @@ Counts = NDArray[np.int16]
 
 GAINS = ("Position P Gain", "Position I Gain", "Position D Gain")
 WATCHDOG_UNIT_S, WATCHDOG_TRIPPED = 0.020, 0xFF
-NOISE_SHARE, NOISE_EXCHANGES = 0.2, 50
-"""More exchanges with damaged bytes than this, of about so many, and the wire is not fit to move by."""
-LOW_VOLTAGE_SHARE = 0.10
+NOISE_FRACTION, NOISE_EXCHANGES = 0.2, 50
+"""With more damaged exchanges than this, of about so many, the arm must not move."""
+LOW_VOLTAGE_MARGIN = 0.10
 
 
 @dataclass(frozen=True)
 class Timeouts:
-    """How long silence and slowness are borne.
+    """How long missing data and slow reads are accepted.
 
     Attributes:
-        silent_s: By the loop, of a servo.
-        watchdog_s: By a servo, of the bus; then it stops by itself. 0.02 to 2.54 s.
+        silent_s: By the loop, without data of a servo.
+        watchdog_s: By a servo, without data on the bus; then it stops by itself. 0.02 to 2.54 s.
         read_s: For reading all servos once, also by the checks before arming; None: a period of the loop.
     """
 
@@ -60,12 +60,12 @@ class Timeouts:
 
 @dataclass(frozen=True, eq=False)
 class ArmReading:
-    """What the servos said last; arrays [J].
+    """The latest data of the servos; arrays [J].
 
     Attributes:
-        at_ns: When the latest answer came, of the monotonic clock.
-        counts: Positions, pulses; of a joint that was never heard there is no reading at all.
-        ages_s: Of each joint's latest answer.
+        at_ns: When the latest reply came, of the monotonic clock.
+        counts: Positions, pulses; there is no reading before all joints have replied.
+        ages_s: Of each joint's latest reply.
     """
 
     at_ns: int
@@ -75,7 +75,7 @@ class ArmReading:
 
 @dataclass
 class ServoHealth:
-    """What a servo said of itself at 1 Hz; None before."""
+    """State of a servo, read at 1 Hz; None before."""
 
     voltage: float | None = None
     temperature: int | None = None
@@ -122,10 +122,10 @@ class ServoArm:
         return () if fault is None else (fault,)
 
     def take_hold(self) -> tuple[Fault, ...]:
-        """Torque on where the servos stand, then the bus watchdog. Nothing moves: the goal is the present position.
+        """Torque on at the present positions, then the bus watchdog. Nothing moves: the goal is the present position.
 
         Returns:
-            Why it did not work; then what had no torque before has none again.
+            Why it failed; then servos without torque before have none again.
         """
         faults, torque_off, turns = [], [], []
         for servo in self.servos:
@@ -147,24 +147,24 @@ class ServoArm:
     def _hold(self, servo: JointServo, torque: bool) -> int:
         """The goal, which is the present position. Raises ServoError."""
         number, registers = servo.number, self._registers
-        self._chain.write(number, registers["Bus Watchdog"], 0)  # a tripped one keeps the goals locked
+        self._chain.write(number, registers["Bus Watchdog"], 0)  # a tripped one locks the goals
         goal = self._position(number, torque)
         self._chain.write(number, registers["Goal Position"], goal)
-        if (found := self._chain.read(number, registers["Goal Position"])) != goal:
-            raise ServoError(number, f"servo {number} was told the goal {goal} and has {found}: reboot it")
-        fence = {"Profile Velocity": servo.profile_velocity, "Profile Acceleration": 0}
-        for name, value in {**fence, **dict(zip(GAINS, servo.gains or (), strict=False))}.items():
+        if (read := self._chain.read(number, registers["Goal Position"])) != goal:
+            raise ServoError(number, f"servo {number} has the goal {read}, expected {goal}: reboot it")
+        profile = {"Profile Velocity": servo.profile_velocity, "Profile Acceleration": 0}
+        for name, value in {**profile, **dict(zip(GAINS, servo.gains or (), strict=False))}.items():
             self._chain.write(number, registers[name], value)
         if servo.grip_current is not None:
             self._chain.write(number, servo.model.registers["Goal Current"], servo.grip_current)
         self._chain.write(number, registers["Torque Enable"], 1)
         if not self._chain.read(number, registers["Torque Enable"]):
-            raise ServoError(number, f"servo {number} was told to hold and does not: reboot it")
+            raise ServoError(number, f"servo {number} has no torque after it was switched on: reboot it")
         self._chain.write(number, registers["Bus Watchdog"], round(self._timeouts.watchdog_s / WATCHDOG_UNIT_S))
         return goal
 
     def _position(self, number: int, torque: bool) -> int:
-        """Where a servo stands, as patiently as other numbers are read. Raises ServoError."""
+        """Position of a servo, with the attempts of any read. Raises ServoError."""
         asked_ns = time.monotonic_ns()
         position = self._chain.read(number, self._registers[POSITION])
         self._watch.jump = None
@@ -173,10 +173,10 @@ class ServoArm:
         return position
 
     def let_go(self, torque_off: bool) -> tuple[str, ...]:
-        """The last word to every servo, each on its own: no watchdog any more and, if asked for, no torque.
+        """End control of every servo, each on its own: watchdog off and, if requested, torque off.
 
         Returns:
-            What did not work, in words.
+            What failed, for people.
         """
         self.holds = False
         return self._release(self.servos) if torque_off else self._write_each(self.servos, {"Bus Watchdog": 0})
@@ -201,9 +201,9 @@ class ServoArm:
         self._chain.sync_write(self._registers["Goal Position"], goals)
 
     def measured(self) -> ArmReading | None:
-        """Where the joints are; None until all were heard once.
+        """Positions of the joints; None until all have replied once.
 
-        One that does not answer, or with a position that cannot be true, keeps its last one.
+        A joint without a reply, or with a position that cannot be true, keeps its last one.
         """
         # One that has lost its torque has been rebooted, and may have begun in another turn.
         held = {one.number for one in self.servos if self.holds and self.health[one.joint].torque is not False}
@@ -217,9 +217,9 @@ class ServoArm:
             return None
         now_ns = time.monotonic_ns()
         positions = [answer.values[POSITION] for answer in known]
-        for joint, (servo, place) in enumerate(zip(self.servos, positions, strict=True)):
+        for joint, (servo, position) in enumerate(zip(self.servos, positions, strict=True)):
             if servo.number not in held:  # while it holds, they stay the same
-                self._turns[joint] = servo.turns(place)
+                self._turns[joint] = servo.turns(position)
         counts = np.array(positions) - PULSES_PER_TURN * np.array(self._turns)
         return ArmReading(
             at_ns=max(answer.at_ns for answer in known),
@@ -228,70 +228,68 @@ class ServoArm:
         )
 
     def fault_of_answers(self, reading: ArmReading) -> Fault | None:
-        """A joint that jumped, joints that are silent for too long, or a wire that damages too much."""
+        """A joint that jumped, joints without data for too long, or too many damaged exchanges."""
         if self._watch.jump is not None:
             return self._fault_of_jump()
         allowed_s = self._timeouts.silent_s
-        late = [self.servos[place] for place in np.flatnonzero(reading.ages_s > allowed_s)]
-        if not late:
+        missing = [self.servos[joint] for joint in np.flatnonzero(reading.ages_s > allowed_s)]
+        if not missing:
             return self._fault_of_noise()
-        names = "any servo" if len(late) == len(self.servos) > 1 else ", ".join(map(str, late))
-        remedy = "its cable and its power" if len(late) == 1 else "cables and the motors' power"
-        silent_ms = 1e3 * reading.ages_s[reading.ages_s > allowed_s].min()
-        sentence = (
-            f"nothing was heard of {names} for {silent_ms:.0f} ms, allowed {1e3 * allowed_s:.0f} ms: check {remedy}"
-        )
-        return Fault("joint_silent", late[0].joint if len(late) == 1 else "", sentence)
+        names = "any servo" if len(missing) == len(self.servos) > 1 else ", ".join(map(str, missing))
+        remedy = "its cable and its power" if len(missing) == 1 else "cables and the motors' power"
+        age_ms = 1e3 * reading.ages_s[reading.ages_s > allowed_s].min()
+        message = f"no data from {names} for {age_ms:.0f} ms, allowed {1e3 * allowed_s:.0f} ms: check {remedy}"
+        return Fault("joint_silent", missing[0].joint if len(missing) == 1 else "", message)
 
     def _fault_of_jump(self) -> Fault | None:
         jump, self._watch.jump = self._watch.jump, None
         if jump is None:
             return None
         servo = self.servos[self._numbers.index(jump.number)]
-        sentence = (
-            f"{servo} {jump}, so that this reply is rejected: check cable, plugs and supply; two servos may have one "
+        message = (
+            f"{servo} {jump}; this reply is rejected: check cable, plugs and supply; two servos may have one "
             "ID, or another program talks on the bus"
         )
-        return Fault("joint_jumped", servo.joint, sentence)
+        return Fault("joint_jumped", servo.joint, message)
 
     def _fault_of_noise(self) -> Fault | None:
         counts = self._chain.counts
         exchanges, noisy = counts.exchanges - self._noise_mark[0], counts.noisy - self._noise_mark[1]
         if exchanges >= NOISE_EXCHANGES:
             self._noise_mark = (counts.exchanges, counts.noisy)
-            self._noise = f"{noisy} of the last {exchanges}" if noisy > NOISE_SHARE * exchanges else ""
+            self._noise = f"{noisy} of the last {exchanges}" if noisy > NOISE_FRACTION * exchanges else ""
         if not self._noise:
             return None
-        sentence = (
-            f"{self._noise} exchanges on the bus were damaged, allowed {NOISE_SHARE:.0%}: check cable, plugs and "
+        message = (
+            f"{self._noise} exchanges on the bus were damaged, allowed {NOISE_FRACTION:.0%}: check cable, plugs and "
             "supply; two servos may have one ID, or another program talks on the bus"
         )
-        return Fault("bus_noise", "", sentence)
+        return Fault("bus_noise", "", message)
 
     def look_after(self) -> Fault | None:
-        """Read torque and errors of all servos; the first thing that is wrong with one that should hold."""
-        found = None
-        for servo, health, (torque, error) in self._told("Torque Enable", "Hardware Error Status"):
+        """Read torque and errors of all servos; the first fault of one that should hold."""
+        fault = None
+        for servo, health, (torque, error) in self._read_each("Torque Enable", "Hardware Error Status"):
             health.torque, health.hardware_error = bool(torque), error
-            found = found or self._fault_of_health(servo, health)
-        return found
+            fault = fault or self._fault_of_health(servo, health)
+        return fault
 
     def look_after_supply(self) -> Fault | None:
-        """Read voltage and temperature of all servos; a voltage outside of what a model allows is a fault."""
-        found = None
-        for servo, health, (tenths, temperature) in self._told("Present Input Voltage", "Present Temperature"):
+        """Read voltage and temperature of all servos; a voltage outside of a model's limits is a fault."""
+        fault = None
+        for servo, health, (tenths, temperature) in self._read_each("Present Input Voltage", "Present Temperature"):
             health.voltage, health.temperature = 0.1 * tenths, temperature
             low, high = (0.1 * servo.model.registers[f"{end} Voltage Limit"].initial for end in ENDS)
-            found = found or voltage_fault(servo, health.voltage, low, high)
-        return found
+            fault = fault or voltage_fault(servo, health.voltage, low, high)
+        return fault
 
     def look_after_watchdogs(self) -> Fault | None:
-        """Read the bus watchdogs of all servos; one that has tripped takes no goal until somebody arms again."""
-        tripped = [servo for servo, _, (units,) in self._told("Bus Watchdog") if units == WATCHDOG_TRIPPED]
+        """Read the bus watchdogs of all servos; one that has tripped takes no goal until the arm is armed again."""
+        tripped = [servo for servo, _, (units,) in self._read_each("Bus Watchdog") if units == WATCHDOG_TRIPPED]
         return watchdog_fault(tripped[0], self._timeouts.watchdog_s) if tripped else None
 
-    def _told(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
-        """Of each servo that answers, its health so far and these registers."""
+    def _read_each(self, *names: str) -> Iterator[tuple[JointServo, ServoHealth, list[int]]]:
+        """Of each servo that replies, its health so far and these registers."""
         answers = self._read(*names)
         for servo in self.servos:
             if servo.number in answers:
@@ -299,30 +297,32 @@ class ServoArm:
                 yield servo, self.health[servo.joint], [values[name] for name in names]
 
     def _read(self, *names: str) -> dict[int, Answered]:
-        """Of the servos that answer. The loop does not wait for an arm that is silent; it goes on telling it goals."""
+        """Of the servos that reply. The loop does not wait for an arm that is not responding; it still sends goals."""
         if not self._chain.has_room():
             return {}
         return self._chain.sync_read(self._numbers, [self._registers[name] for name in names])
 
-    def unheard(self) -> str:
-        """Which servos have never answered, in words; "" if all have."""
-        silent = [servo for servo in self.servos if self.health[servo.joint].answers is None]
-        if not silent or not self._chain.counts.exchanges:
+    def not_responding(self) -> str:
+        """Message about the servos that have never replied; "" if all have."""
+        missing = [servo for servo in self.servos if self.health[servo.joint].answers is None]
+        if not missing or not self._chain.counts.exchanges:
             return ""
-        names, rate = ", ".join(map(str, silent)), self._chain.port.baud_rate
+        names, rate = ", ".join(map(str, missing)), self._chain.port.baud_rate
         return (
             f"no answer yet from {names} at {rate} bit/s: check the motors' power, cables, IDs and baud rate; "
             "`paramove arm scan` looks for them, once this driver has ended"
         )
 
     def warnings(self) -> tuple[str, ...]:
-        """What is not yet a fault, in words."""
-        said = []
+        """Messages about values close to a fault."""
+        messages = []
         for servo in self.servos:
             voltage, low = self.health[servo.joint].voltage, 0.1 * servo.model.registers["Min Voltage Limit"].initial
-            if voltage is not None and voltage < (1.0 + LOW_VOLTAGE_SHARE) * low:
-                said.append(f"{servo.joint} has {voltage:.1f} V, its limit is {low:.1f} V: charge or check the supply")
-        return tuple(said)
+            if voltage is not None and voltage < (1.0 + LOW_VOLTAGE_MARGIN) * low:
+                messages.append(
+                    f"{servo.joint} has {voltage:.1f} V, its limit is {low:.1f} V: charge or check the supply"
+                )
+        return tuple(messages)
 
     def _fault_of_health(self, servo: JointServo, health: ServoHealth) -> Fault | None:
         if health.hardware_error:

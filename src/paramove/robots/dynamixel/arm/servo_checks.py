@@ -1,4 +1,4 @@
-"""What keeps the servos of an arm from being armed, and what is wrong with one that moves, as faults for the gate."""
+"""Checks of an arm's servos before arming and in motion, with faults for the gate."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class JointServo:
         joint: Name of the joint.
         number: ID of the servo.
         model: Of the servo.
-        calibration: Of the joint; None: it is set as it came, and counts within one turn.
+        calibration: Of the joint; None: it has the factory settings, and counts within one turn.
         grip_current: Of a gripper that holds with a limited current, in the servo's units; None: position mode.
         gains: P, I and D of the servo's position loop, in its units; None: those that it has.
-        velocity: That the servo never exceeds, whatever goal it is told, rad/s; None: what it can.
+        velocity: That the servo never exceeds, whatever its goal, rad/s; None: its maximum.
     """
 
     joint: str
@@ -66,8 +66,8 @@ class JointServo:
         return 0 if self.calibration is None else self.calibration.homing_offset
 
     @property
-    def fence(self) -> dict[str, int]:
-        """Position limits that a calibrated joint must have; in other modes a servo does not look at them."""
+    def position_limits(self) -> dict[str, int]:
+        """Position limits that a calibrated joint must have; in other modes a servo ignores them."""
         if self.calibration is None or self.mode != POSITION_MODE:
             return {}
         return {"Min Position Limit": self.calibration.min_counts, "Max Position Limit": self.calibration.max_counts}
@@ -97,65 +97,65 @@ def bus_fault(read_all: Callable[[], object], period_s: float) -> Fault | None:
     median_s = float(np.median(times_s))
     if median_s <= period_s:
         return None
-    sentence = (
+    message = (
         f"reading the servos takes {1e3 * median_s:.1f} ms, allowed {1e3 * period_s:.1f} ms: raise the baud rate, or "
-        "set the adapter's latency timer to 1 ms (`paramove doctor` tells how)"
+        "set the adapter's latency timer to 1 ms (`paramove doctor` prints the command)"
     )
-    return Fault("bus_slow", "", sentence)
+    return Fault("bus_slow", "", message)
 
 
 def hardware_fault(servo: JointServo, error: int) -> Fault:
     """Of Hardware Error Status (70)."""
     known = hardware_errors(error)
-    sentence = (
+    message = (
         f"{servo} has a hardware error: {' and '.join(one.words for one in known)} (register 70 is 0x{error:02x}); "
         f"{'; '.join(one.remedy for one in known)}; then, {ENDED} `paramove arm reboot {servo.number}`"
     )
-    return Fault("hardware_error", servo.joint, sentence)
+    return Fault("hardware_error", servo.joint, message)
 
 
 def voltage_fault(servo: JointServo, voltage: float, low: float, high: float) -> Fault | None:
     """Of Present Input Voltage (144), V, and its limits."""
     if low <= voltage <= high:
         return None
-    sentence = f"{servo} has {voltage:.1f} V, allowed {low:.1f} to {high:.1f} V: check the power supply and its cable"
-    return Fault("servo_voltage", servo.joint, sentence)
+    message = f"{servo} has {voltage:.1f} V, allowed {low:.1f} to {high:.1f} V: check the power supply and its cable"
+    return Fault("servo_voltage", servo.joint, message)
 
 
 def torque_fault(servo: JointServo) -> Fault:
     """Of Torque Enable (64) that is 0 though the servo should hold."""
-    sentence = (
+    message = (
         f"{servo} has lost its torque: it was switched off, lost power or was rebooted; the arm must be armed again"
     )
-    return Fault("torque_lost", servo.joint, sentence)
+    return Fault("torque_lost", servo.joint, message)
 
 
 def watchdog_fault(servo: JointServo, watchdog_s: float) -> Fault:
     """Of Bus Watchdog (98) that has tripped: until it is cleared the servo takes no goal."""
-    sentence = (
-        f"{servo} has stopped by itself, for it heard nothing for {1e3 * watchdog_s:.0f} ms: this computer was too "
-        "busy, or a cable was loose; arm again, which clears its watchdog"
+    message = (
+        f"{servo} has stopped by itself, without data for {1e3 * watchdog_s:.0f} ms: this computer was too busy, or a "
+        "cable was loose; arm again, which clears its watchdog"
     )
-    return Fault("watchdog_tripped", servo.joint, sentence)
+    return Fault("watchdog_tripped", servo.joint, message)
 
 
 def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
     pinged = chain.ping(servo.number)
     if pinged is None:
-        sentence = f"{servo} does not answer: check cable, power and ID; {ENDED} `paramove arm scan` looks for it"
-        return [Fault("servo_missing", servo.joint, sentence)]
+        message = f"{servo} does not answer: check cable, power and ID; {ENDED} `paramove arm scan` looks for it"
+        return [Fault("servo_missing", servo.joint, message)]
     if pinged.model_number != servo.model.number:
-        sentence = (
+        message = (
             f"{servo} is of model {pinged.model_number}, expected {servo.model.number} ({servo.model.name}): is it "
             "another arm, or are two IDs exchanged?"
         )
-        return [Fault("servo_model", servo.joint, sentence)]
+        return [Fault("servo_model", servo.joint, message)]
     if pinged.firmware < OLDEST_FIRMWARE:
-        sentence = (
+        message = (
             f"{servo} has firmware {pinged.firmware}, at least {OLDEST_FIRMWARE} is needed: update it with Dynamixel "
             "Wizard"
         )
-        return [Fault("servo_firmware", servo.joint, sentence)]
+        return [Fault("servo_firmware", servo.joint, message)]
     try:
         return [*_faults_of_settings(servo, chain), *_faults_of_state(servo, chain)]
     except ServoError as error:
@@ -163,14 +163,19 @@ def _faults_of(servo: JointServo, chain: ServoChain) -> list[Fault]:
 
 
 def _faults_of_settings(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
-    wanted = {"Operating Mode": servo.mode, "Drive Mode": 0, "Homing Offset": servo.homing_offset, **servo.fence}
-    for name, value in wanted.items():
+    expected = {
+        "Operating Mode": servo.mode,
+        "Drive Mode": 0,
+        "Homing Offset": servo.homing_offset,
+        **servo.position_limits,
+    }
+    for name, value in expected.items():
         found = chain.read(servo.number, servo.model.registers[name])
         if found != value:
-            sentence = f"{servo} has {name} {found}, expected {value}: {ENDED} `paramove arm verify --write` sets it"
-            if name in servo.fence:
-                sentence += ", `--adopt` takes it over into the calibration"
-            yield Fault("servo_settings", servo.joint, sentence)
+            message = f"{servo} has {name} {found}, expected {value}: {ENDED} `paramove arm verify --write` sets it"
+            if name in servo.position_limits:
+                message += ", `--adopt` copies it into the calibration"
+            yield Fault("servo_settings", servo.joint, message)
 
 
 def _faults_of_state(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
@@ -184,5 +189,5 @@ def _faults_of_state(servo: JointServo, chain: ServoChain) -> Iterable[Fault]:
         yield fault
     temperature, limit = read("Present Temperature"), read("Temperature Limit")
     if temperature >= limit:
-        sentence = f"{servo} has {temperature} degrees Celsius, allowed {limit}: let it cool down"
-        yield Fault("servo_hot", servo.joint, sentence)
+        message = f"{servo} has {temperature} degrees Celsius, allowed {limit}: let it cool down"
+        yield Fault("servo_hot", servo.joint, message)

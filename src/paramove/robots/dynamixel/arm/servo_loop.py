@@ -1,7 +1,7 @@
 """The loop of a servo arm: one thread that owns the port, plays the rows that the safety gate lets pass, and reads.
 
 What HOAP-3 does on the robot is done here: a `StreamReader` holds the rows, which end in a stop ramp, and plays one a
-period. So an arm whose driver has nothing more to say comes to rest in the same way.
+period. So an arm whose driver has stopped comes to rest in the same way.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from paramove.robots.dynamixel.bus.servo_port import PortLostError, ServoPort
 from paramove.robots.streaming import ArmDriver, DriverOutput, StreamReader
 from paramove.safety import Fault, State
 
-EXIT_SPEED_SHARE = 0.5
+EXIT_SPEED_FRACTION = 0.5
 """Of the operating velocity."""
 EXIT_PEAK = 1.875
 """Highest velocity of a movement with smooth ends, of its mean."""
 SHORTEST_EXIT_S = 0.5
 LONGEST_EXIT_S = 4.0
-"""With all that belongs to it: a launcher kills a driver 5 s after it was asked to end."""
+"""In total: a launcher kills a driver 5 s after its request to end."""
 EXIT_MARGIN_S = 0.5
-"""Until the arm has settled and every servo has heard the last word."""
+"""Until the arm has settled and every servo has its final settings."""
 _log = logging.getLogger(__name__)
 
 MOVING = (State.ARMED, State.STOPPING)
 HOLDING = (*MOVING, State.HOLD, State.ESTOP)
 HEALTH_STEPS, SUPPLY_STEPS = 10, 100
 REOPEN_S = 0.5
-WATCHDOG_SHARE = 0.5
-"""After a silence of the loop of this part of what a servo bears, it is asked whether it has stopped by itself."""
+WATCHDOG_FRACTION = 0.5
+"""Of the servos' watchdog: after a longer pause of the loop they are asked whether they have stopped by themselves."""
 REST_S = 0.0002
-"""A loop that is late gives up its lock for so long each period: else it takes it again before whoever waits for it."""
+"""A loop that is late releases its lock for so long each period: otherwise other threads never get it."""
 NOT_EMULATED = "its servos are not emulated by this launch"
 SETTLED_S, LONGEST_SETTLING_S = 0.1, 0.4
-"""Servos lag behind their goals: at the end an arm has come to rest if for so long none moves by more than a pulse."""
+"""Servos lag behind their goals: an arm has come to rest when none moves by more than a pulse for so long."""
 TICK_S = 0.02
-"""The driver's logic is asked so often; at once where something is wrong."""
+"""Period of the driver's logic; on a fault it runs at once."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ class LoopSettings:
     Attributes:
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         timeouts: For servos and reads.
-        standing_faults: That keep the arm from being armed, whatever its servos say.
+        standing_faults: That keep the arm from being armed, whatever its servos report.
         stop_inputs: Files that press the emergency stop.
         rest: Angles by joint, rad, to which the armed arm goes slowly at a normal end, and then goes limp; without time
             or where anything is wrong it holds. None: at the end it is left as when it is disarmed.
-        emulated_by: The launch that was seen to emulate the servos, which is verified at every open of the port; None:
+        emulated_by: The launch that emulates the servos, which is verified at every open of the port; None:
             they count as real.
-        caution: What a person should know of this arm in any case.
+        caution: A message to show in any case.
     """
 
     torque_off: bool = False
@@ -94,7 +94,7 @@ class ServoLoop:
         servos: Its servos, in the order of the robot's joint vector.
         port: Closed; it is opened here, and again after it was lost.
         settings: How it is driven.
-        said: Called in the loop's thread when `take` has something.
+        on_output: Called in the loop's thread when `take` has something.
 
     Raises:
         InputError: On entering: the port is missing, forbidden or in use.
@@ -107,26 +107,26 @@ class ServoLoop:
         servos: tuple[JointServo, ...],
         port: ServoPort,
         settings: LoopSettings,
-        said: Callable[[], None],
+        on_output: Callable[[], None],
     ) -> None:
         self.driver = driver
         self.lost = ""
         """Why the port is not open; "" while it is."""
         self.pressed = ""
-        """What presses the emergency stop, in words; "" if nothing does."""
+        """Why the emergency stop is pressed, for people; "" if it is not."""
         self.lock = threading.Lock()
-        """Held while the loop uses the driver; hold it to tell the driver something."""
+        """Held while the loop uses the driver; hold it to call the driver."""
         self._description = description
         self._period_s = 1e-6 * description.stream.period_us
         self._port = port
         self._servos = servos
         self._settings = settings
-        self._said = said
+        self._on_output = on_output
         self._arm = ServoArm(servos, ServoChain(port), self._period_s, settings.timeouts)
         self._reader: StreamReader | None = None
         self._output: list[DriverOutput] = []
         self._step = 0
-        self._begun_s, self._silent_s = time.monotonic(), 0.0
+        self._begun_s, self._pause_s = time.monotonic(), 0.0
         self._urgent = self._ended = self._normal_end = False
         self._tick_steps = max(1, round(TICK_S / self._period_s))
         self._reopen_s = 0.0
@@ -152,30 +152,30 @@ class ServoLoop:
         self._port.close()
 
     def take(self) -> list[DriverOutput]:
-        """What the driver said since the last time."""
+        """The driver's output since the last call."""
         with self.lock:
             output, self._output = self._output, []
         return output
 
     def tick(self) -> None:
-        """The driver's next word at once: a stop does not wait for the next period."""
+        """Run the driver's logic at once: a stop does not wait for the next period."""
         with self.lock:
             self._tick(time.monotonic_ns())
 
     @property
     def has_failed(self) -> bool:
-        """Whether the loop has ended though nobody asked it to; its thread has written why."""
+        """Whether the loop has ended without a request; its thread has logged why."""
         return self._ended and not self._stopped.is_set()
 
     def _run(self) -> None:
         try:
             due_s = time.monotonic()
             while not self._stopped.is_set():
-                # What is late is not made up for.
+                # Lost periods are not made up for.
                 due_s = max(due_s + self._period_s, time.monotonic() - self._period_s)
                 with self.lock:
                     self._one_period()
-                self._said()
+                self._on_output()
                 self._stopped.wait(max(REST_S, due_s - time.monotonic()))
             rests = self._normal_end and self._settings.rest is not None and self._goes_to(self._settings.rest)
             with self.lock:
@@ -185,7 +185,7 @@ class ServoLoop:
 
     def _one_period(self) -> None:
         begun_s, self._begun_s = self._begun_s, time.monotonic()
-        self._silent_s = self._begun_s - begun_s
+        self._pause_s = self._begun_s - begun_s
         self._look_at_emergency_stop()
         try:
             if self.lost:
@@ -196,7 +196,7 @@ class ServoLoop:
             self.lost = str(error)
             self._reopen_s = time.monotonic() + REOPEN_S
             self._reader = None
-            self._tell(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
+            self._report(Fault("port_lost", "", f"{error} The arm rests by its servos' own watchdog; arm again"))
         if self._urgent or self._step % self._tick_steps == 0:
             self._tick(time.monotonic_ns())
         self._step += 1
@@ -218,8 +218,8 @@ class ServoLoop:
         if reader is None or not self._arm.holds:
             reader = self._reader = StreamReader(self._description, reading.counts)
         fault = self._fault(reading)
-        if fault is not None and self.driver.state in MOVING:  # else it is looked for before arming
-            self._tell(fault)
+        if fault is not None and self.driver.state in MOVING:  # else the checks before arming detect it
+            self._report(fault)
         if self.driver.wants_to_arm and self.driver.state not in MOVING:
             reading = self._prepare() or reading  # the checks took longer than a reading counts
             self._urgent = True
@@ -229,7 +229,7 @@ class ServoLoop:
         self.driver.on_robot_state(reader.state(reading.counts, reading.at_ns), reading.at_ns)
 
     def _prepare(self) -> ArmReading | None:
-        """Check the servos and let them hold where they are, before the gate hears the word to arm."""
+        """Check the servos and let them hold their positions, before the gate gets the arming request."""
         began_ns = time.monotonic_ns()
         faults = self._settings.standing_faults or self._arm.check() or self._arm.take_hold()
         self.driver.on_arming_checks(faults, began_ns)
@@ -237,7 +237,7 @@ class ServoLoop:
 
     def _fault(self, reading: ArmReading) -> Fault | None:
         fault = self._arm.fault_of_answers(reading)
-        if self._arm.holds and self._silent_s > WATCHDOG_SHARE * self._settings.timeouts.watchdog_s:
+        if self._arm.holds and self._pause_s > WATCHDOG_FRACTION * self._settings.timeouts.watchdog_s:
             fault = self._arm.look_after_watchdogs() or fault
         if self._step % HEALTH_STEPS == 0:
             fault = self._arm.look_after() or fault
@@ -245,7 +245,7 @@ class ServoLoop:
             fault = self._arm.look_after_supply() or fault
         return fault
 
-    def _tell(self, fault: Fault) -> None:
+    def _report(self, fault: Fault) -> None:
         self.driver.on_fault(fault)
         self._urgent = True
 
@@ -257,7 +257,7 @@ class ServoLoop:
         self._output.append(output)
 
     def _open(self) -> None:
-        """Raises InputError also if what is driven as emulated is so no more."""
+        """Raises InputError also if servos that are driven as emulated no longer are."""
         self._port.open()
         reason = self._settings.emulated_by and self._settings.emulated_by.why_not_servos(self._port.device)
         if reason:
@@ -265,7 +265,7 @@ class ServoLoop:
             raise InputError(f"{self._port.name} does not lead to the servos of this launch: {reason}. Launch again")
 
     def _reopen(self) -> None:
-        """Under the same name, which is that of the adapter and not of its place."""
+        """Under the same name, which is that of the adapter and not of its USB socket."""
         if time.monotonic() < self._reopen_s:
             return
         try:
@@ -279,48 +279,48 @@ class ServoLoop:
 
     def _let_go(self, torque_off: bool) -> None:
         for failed in self._arm.let_go(torque_off):
-            _log.warning("a servo did not hear the last word: %s", failed)
+            _log.warning("a servo did not take its final settings: %s", failed)
 
     def _goes_to(self, rest: Mapping[str, float]) -> bool:
-        """Go to rest, slowly and through the gate; whether the arm is there. It is not where anything is wrong."""
-        ends_s, name, sentence = time.monotonic() + LONGEST_EXIT_S, "", "it is not armed"
+        """Go to rest, slowly and through the gate; whether the arm arrived. On any fault it does not."""
+        ends_s, name, reason = time.monotonic() + LONGEST_EXIT_S, "", "it is not armed"
         reader = self._reader
         if reader is not None and not reader.at_rest:
-            reader, sentence = None, "it was moving, and stops"
+            reader, reason = None, "it was moving, and stops"
         while reader is not None and not self.lost and self.driver.state is State.ARMED:
             if not name:
                 start = self._description.units.to_radians(reader.target)
                 message, duration_s = movement_to(self._description, start, rest, f"rest {time.monotonic_ns()}")
-                sentence = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
+                reason = f"it would take {duration_s:.1f} s, and a launcher would kill this driver before"
                 if time.monotonic() + duration_s + EXIT_MARGIN_S > ends_s:
                     break
-                name, sentence = message.id, "it was stopped on its way"
+                name, reason = message.id, "it was stopped before it arrived"
                 with self.lock:
                     self.driver.on_trajectory(message, time.monotonic_ns())
             elif time.monotonic() > ends_s:
-                sentence = "it took too long"
+                reason = "it took too long"
                 break
             self._stopped_period()
-            heard = [one for output in self.take() for one in output.statuses if one.trajectory_id == name]
-            if heard and heard[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
+            statuses = [one for output in self.take() for one in output.statuses if one.trajectory_id == name]
+            if statuses and statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED:
                 return True
-            if heard and heard[-1].code == "busy":  # the movement before has not settled yet
+            if statuses and statuses[-1].code == "busy":  # the movement before has not settled yet
                 name = ""
-            elif heard and heard[-1].reason:
-                sentence = heard[-1].reason
+            elif statuses and statuses[-1].reason:
+                reason = statuses[-1].reason
                 break
-        _log.warning("the arm holds where it is and does not go to rest: %s", self.lost or sentence)
+        _log.warning("the arm holds its position and does not go to rest: %s", self.lost or reason)
         return False
 
     def _stopped_period(self) -> None:
-        """One more period of a loop that was asked to end."""
+        """One more period of a loop that is ending."""
         begun_s = time.monotonic()
         with self.lock:
             self._one_period()
         time.sleep(max(0.0, begun_s + self._period_s - time.monotonic()))
 
     def _end(self, rests: bool) -> None:
-        """Come to rest by what the reader still holds, wait for the servos, then the last word to each of them."""
+        """Come to rest by the rows of the reader, wait for the servos, then write their final settings."""
         measured: deque[Counts] = deque(maxlen=1 + round(SETTLED_S / self._period_s))
         stands_s = None
         try:
@@ -348,11 +348,11 @@ def movement_to(
 
     It is judged by the safety gate as any other.
     """
-    places = [description.index(joint) for joint in angles]
+    indices = [description.index(joint) for joint in angles]
     goal = np.array(list(angles.values()))
-    slow = EXIT_SPEED_SHARE * description.operating_velocity[places]
-    duration_s = float(max(SHORTEST_EXIT_S, (EXIT_PEAK * np.abs(goal - start[places]) / slow).max(initial=0.0)))
+    slow = EXIT_SPEED_FRACTION * description.operating_velocity[indices]
+    duration_s = float(max(SHORTEST_EXIT_S, (EXIT_PEAK * np.abs(goal - start[indices]) / slow).max(initial=0.0)))
     message = JointTrajectory(id=name, joints=list(angles))
-    for time_s, point in ((0.0, start[places]), (duration_s, goal)):
+    for time_s, point in ((0.0, start[indices]), (duration_s, goal)):
         message.points.add(time_s=time_s, position_rad=point.tolist())
     return message, duration_s

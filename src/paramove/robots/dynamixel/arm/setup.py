@@ -22,17 +22,16 @@ from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.calibration.arm_calibration import ArmCalibration
 from paramove.safety import Fault
 
-LATENCY_SHARE = 0.8
-"""Of the time for reading all servos: so long the loop may wait for one. A missing one costs periods, one that is late
-costs none."""
+LATENCY_FRACTION = 0.8
+"""Of the time for reading all servos: the timeout of one. A missing one costs periods, a delayed reply costs none."""
 
 
 class EmulatedLimits(OldNames):
-    """What is allowed to servos that the launch itself emulates, and to no others.
+    """Limits for servos that the launch itself emulates, and for no others.
 
     Attributes:
-        timeouts: For servos and reads: they share the processors with everything else, and may be late.
-        nominal: Whether they are even for an arm that everybody assembles differently.
+        timeouts: For servos and reads: they share the processors with everything else, and may be delayed.
+        nominal: Whether an arm that everybody assembles differently needs no calibration.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -48,18 +47,17 @@ class ServoArmSetup(OldNames):
 
     Attributes:
         robot: Folder of the arm's description.
-        port: Of its bus, seen from the run's folder: a link in /dev/serial/by-id, whose name has the adapter's number.
+        port: Of its bus, relative to the run's folder: a link in /dev/serial/by-id, named by the adapter's number.
         torque_off: Whether the arm goes limp when it is disarmed and at the end; by default it holds.
         timeouts: For servos and reads.
         calibration: File of `paramove arm calibrate`; without, zeros are those of the description.
         stop_file: The emergency stop is pressed while there is a file of this name, for programs that watch a button.
-        stop_line: File in which the system shows the line of a stop button, such as /sys/class/gpio/gpio17/value; read
-            at every period of the loop.
-        stop_line_pressed: What it reads while the button is pressed, or its wire is cut; all but the other value is
-            pressed.
+        stop_line: File in which the system presents the line of a stop button, such as /sys/class/gpio/gpio17/value;
+            read at every period of the loop.
+        stop_line_pressed: Its value while the button is pressed, or its wire is cut; only the other value is released.
         on_exit: At a normal end: left as when it is disarmed, or slowly to `rest_deg`, then limp.
         rest_deg: Where the arm can go limp without harm, degrees by joint; joints without stay where they are.
-        emulated: Takes the place of `timeouts` where the driver verifies, at every open of the port, that this very
+        emulated: Replaces `timeouts` where the driver verifies, at every open of the port, that this very
             launch emulates the servos; only then a program may arm them. None: they count as real in any case.
     """
 
@@ -119,7 +117,7 @@ class ServoArmSetup(OldNames):
 
 
 def calibrated(description: RobotDescription, calibration: ArmCalibration) -> RobotDescription:
-    """The description with the units of one arm, and not beyond the travel that was shown. Raises CalibrationError."""
+    """The description with the units of one arm, within the demonstrated travel. Raises CalibrationError."""
     d = description
     units = calibration.units(d.joint_names, d.lower, d.upper)
     soft_lower, soft_upper = np.maximum(d.soft_lower, units.lower), np.minimum(d.soft_upper, units.upper)
@@ -136,18 +134,20 @@ def servo_port(description: RobotDescription, name: str, read_s: float | None = 
     """
     if description.bus is None:
         raise DescriptionError(f"{description.name} has no servo bus in its robot.yaml: it is driven by another node")
-    return ServoPort(name, description.bus.baud_rate, LATENCY_SHARE * (read_s or 1e-6 * description.stream.period_us))
+    return ServoPort(
+        name, description.bus.baud_rate, LATENCY_FRACTION * (read_s or 1e-6 * description.stream.period_us)
+    )
 
 
 def uncalibrated(description: RobotDescription) -> tuple[Fault, ...]:
     """Of an arm whose zeros every owner has to measure."""
     if description.bus is None or not description.bus.calibrate:
         return ()
-    sentence = (
+    message = (
         f"{description.name} is assembled differently by everybody, and this one is not calibrated: run `paramove arm "
         "calibrate`, then name its file as the driver's `calibration`"
     )
-    return (Fault("not_calibrated", "", sentence),)
+    return (Fault("not_calibrated", "", message),)
 
 
 def joint_servos(description: RobotDescription, calibration: ArmCalibration | None = None) -> tuple[JointServo, ...]:

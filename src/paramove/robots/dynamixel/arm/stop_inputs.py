@@ -1,4 +1,4 @@
-"""Emergency stops that are files: one that a program makes, and the line of a button as the system shows it."""
+"""Emergency stops that are files: one that a program creates, and the line of a button as the system presents it."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class StopInputs:
 
     Attributes:
         file: Pressed while there is a file of this name; None: there is no such stop.
-        line: File in which the system shows a line, 0 or 1, such as /sys/class/gpio/gpio17/value; None: no line.
-            Pressed is all but the one value that says "released": also what cannot be read, and a file that is gone.
+        line: File in which the system presents a line, 0 or 1, such as /sys/class/gpio/gpio17/value; None: no line.
+            Only the one value of "released" is not pressed: a line that cannot be read, or a missing file, is pressed.
         line_pressed: Its value while the button is pressed; with a button that opens its circuit, and a resistor that
             pulls the line up, 1: then a cut wire is pressed too.
     """
@@ -28,23 +28,23 @@ class StopInputs:
 
     @property
     def are_there(self) -> bool:
-        """Whether the arm has such a stop at all."""
+        """Whether the arm has such a stop."""
         return self.file is not None or self.line is not None
 
     def pressed(self) -> str:
-        """What presses the emergency stop now, in words; "" if nothing does."""
+        """Why the emergency stop is pressed, for people; "" if it is not."""
         by_file = "" if self.file is None else _pressed_by_file(self.file)
         return by_file or ("" if self.line is None else self._pressed_by_line(self.line))
 
     def _pressed_by_line(self, line: Path) -> str:
         released = str(1 - self.line_pressed)
         try:
-            found = _first_bytes(line)
+            value = _first_bytes(line)
         except OSError as error:
             return f"the emergency stop counts as pressed: {line} cannot be read ({error.strerror})"
-        if found == released:
+        if value == released:
             return ""
-        return f"the emergency stop is pressed: {line} reads {found!r}, released is {released!r}"
+        return f"the emergency stop is pressed: {line} reads {value!r}, released is {released!r}"
 
 
 def _pressed_by_file(file: Path) -> str:
@@ -58,7 +58,7 @@ def _pressed_by_file(file: Path) -> str:
 
 
 def _first_bytes(path: Path) -> str:
-    """Waits for nobody, whatever lies there. Raises OSError."""
+    """Does not block, whatever kind of file it is. Raises OSError."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         return os.read(descriptor, MAX_BYTES).decode("ascii", "backslashreplace").strip()

@@ -11,11 +11,11 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentErr
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 
 GIVES_UP = 25
-"""Looks in a row without an answer from a servo."""
+"""Readings in a row without a reply of a servo."""
 
 
 class TorqueOffArm:
-    """`release` its servos, then look where they are.
+    """`release` its servos, then read their positions.
 
     Args:
         chain: At the arm's baud rate.
@@ -32,7 +32,7 @@ class TorqueOffArm:
         self._units = description.units
         middle = 0.5 * (description.units.lower + description.units.upper)
         self._middle = self._units.zero_counts + self._units.counts_per_rad * middle
-        self._silent = 0
+        self._misses = 0
 
     def release(self) -> None:
         """Torque off; who holds the arm carries its weight from now on."""
@@ -40,25 +40,25 @@ class TorqueOffArm:
             self._chain.write(number, model.registers["Torque Enable"], 0)
 
     def put_down(self) -> tuple[str, ...]:
-        """The last word to the servos; without torque there is none.
+        """Put the arm in its final state; without torque nothing is to be done.
 
         Returns:
-            What did not work, in words.
+            What failed, for people.
         """
         return ()
 
     def measured(self) -> tuple[int, Floats] | None:
         """When, ns of the monotonic clock, and the angles of all joints, [J], rad.
 
-        None while an answer is missing, or says what cannot be true.
+        None while a reply is missing, or has a position that cannot be true.
 
         Raises:
-            ServoSilentError: A servo has not answered for long.
+            ServoSilentError: A servo has not replied for long.
         """
         answers = self._watch.read(self._chain)
         missing = [number for number in self._numbers if number not in answers]
-        self._silent = self._silent + 1 if missing else 0
-        if self._silent > GIVES_UP:
+        self._misses = self._misses + 1 if missing else 0
+        if self._misses > GIVES_UP:
             raise ServoSilentError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
         if missing:
             return None

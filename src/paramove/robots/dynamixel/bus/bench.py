@@ -16,7 +16,7 @@ from paramove.robots.dynamixel.bus.servo_port import BITS_PER_BYTE
 RATES_HZ = (50, 100, 200, 250, 333, 500, 1000)
 STATE = ("Present Velocity", "Present Position")
 """At the same addresses in all models of the X series."""
-SHARE = 0.8
+BUS_FRACTION = 0.8
 """Of a period that the bus may take: the rest is the program's."""
 GOAL_BYTES, WRITE_BYTES = 5, 14
 SLOW_TIMER_MS = 2
@@ -28,10 +28,10 @@ class BusBench:
     """What was measured.
 
     Attributes:
-        baud_rate: bit/s. servos: How many answered for.
+        baud_rate: bit/s. servos: How many were read.
         p50_ms, p99_ms, longest_ms: Of one read of all servos' velocities and positions, complete ones only; NaN
             without any.
-        complete, rounds: Reads in which all answered, and all reads.
+        complete, rounds: Reads in which all replied, and all reads.
         errors: What went wrong, by kind.
         rates_hz: Those that the bus can hold for 99 of 100 cycles of reading and writing goals.
     """
@@ -68,11 +68,11 @@ def bench_bus(chain: ServoChain, numbers: Sequence[int], rounds: int) -> BusBenc
 
 def held_rates(cycle_ms: float) -> tuple[int, ...]:
     """Of `RATES_HZ` those whose period such a cycle leaves room for; none for NaN."""
-    return tuple(rate for rate in RATES_HZ if cycle_ms <= SHARE * 1e3 / rate)
+    return tuple(rate for rate in RATES_HZ if cycle_ms <= BUS_FRACTION * 1e3 / rate)
 
 
 def latency_timer_ms(device: str, usb_serial: Path = USB_SERIAL) -> int | None:
-    """For how long an adapter waits for more bytes before it hands over those it has; None if it does not say."""
+    """For how long an adapter waits for more bytes before it hands over those it has; None if it is unknown."""
     try:
         return int((usb_serial / Path(device).name / "latency_timer").read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -83,9 +83,9 @@ def slow_timer(device: str, timer_ms: int) -> str:
     """What to do about an adapter that waits too long, "" if it does not."""
     if timer_ms <= SLOW_TIMER_MS:
         return ""
-    place = USB_SERIAL / Path(device).name / "latency_timer"
+    file = USB_SERIAL / Path(device).name / "latency_timer"
     return (
-        f"the adapter's latency timer is {timer_ms} ms, so each answer waits for it: echo 1 | sudo tee {place}; for "
+        f"the adapter's latency timer is {timer_ms} ms, so each answer waits for it: echo 1 | sudo tee {file}; for "
         'good: ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1" in '
         "/etc/udev/rules.d/99-latency.rules"
     )

@@ -16,12 +16,12 @@ BEFORE_LENGTH = 5
 BEFORE_INSTRUCTION = BEFORE_LENGTH + 2
 BROADCAST = 254
 LONGEST_LENGTH = 1024
-"""Of what follows the length; a larger one is noise. The SDK sends and takes no more either."""
+"""Maximum of what follows the length; a larger one is noise. The SDK has the same maximum."""
 POLYNOMIAL = 0x8005
 
 
 class Instruction(IntEnum):
-    """What a packet asks for; `STATUS` is the answer."""
+    """What a packet requests; `STATUS` is the reply."""
 
     PING = 0x01
     READ = 0x02
@@ -63,7 +63,7 @@ class Packet:
     """A packet without what the wire adds.
 
     Attributes:
-        id: Of the servo that is asked or that answers, or `BROADCAST`.
+        id: Of the servo that is asked or that replies, or `BROADCAST`.
         instruction: One of `Instruction`, or a number that no servo knows.
         parameters: Without stuffing.
     """
@@ -115,7 +115,7 @@ def decoded(data: bytes) -> Packet:
 
 
 class PacketReader:
-    """Finds packets in what comes in, byte by byte or in any pieces; what is none is passed over."""
+    """Finds packets in received bytes, in pieces of any size; other bytes are skipped."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -132,8 +132,8 @@ class PacketReader:
     def feed(self, data: bytes) -> Iterator[Packet | DamagedPacket]:
         """The packets that these bytes complete."""
         self._bytes += data
-        while (found := self._next()) is not None:
-            yield found
+        while (packet := self._next()) is not None:
+            yield packet
 
     def _next(self) -> Packet | DamagedPacket | None:
         while self._to_header():
@@ -152,14 +152,14 @@ class PacketReader:
         return None
 
     def _to_header(self) -> bool:
-        """Drop what stands before the next header; whether header, id and length are there."""
+        """Drop the bytes before the next header; whether header, id and length are there."""
         while True:
-            place = self._bytes.find(HEADER)
-            if place < 0:
-                kept = next((n for n in (2, 1) if self._bytes.endswith(HEADER[:n])), 0)
-                del self._bytes[: len(self._bytes) - kept]
+            start = self._bytes.find(HEADER)
+            if start < 0:
+                n_begun = next((n for n in (2, 1) if self._bytes.endswith(HEADER[:n])), 0)
+                del self._bytes[: len(self._bytes) - n_begun]
                 return False
-            del self._bytes[:place]
+            del self._bytes[:start]
             if len(self._bytes) < BEFORE_INSTRUCTION:
                 return False
             if self._bytes[3] != 0xFD:  # else it is stuffed: not a header

@@ -1,7 +1,7 @@
 """Whether a measured position can be true: a servo turns no faster than its motor or a hand turns it.
 
 A reply may have a sound checksum and the ID of a servo that was asked, and still be another's. Nothing on the wire
-tells it from a true one, but the joint would have jumped.
+distinguishes it from a true one, but the joint would have jumped.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NOISE = 8
 AGREES_S = 0.02
 """Positions that must come twice are at most as far apart as a servo turns in this time,"""
 RECENT = 2
-"""and in so many exchanges: behind a missing servo one is heard in every second."""
+"""and in so many exchanges: behind a missing servo one replies in every second."""
 DEG_PER_PULSE = 360.0 / PULSES_PER_TURN
 POSITION = "Present Position"
 
@@ -31,15 +31,15 @@ class Jump:
 
     number: int
     before: int
-    found: int
+    position: int
     seconds: float
     allowed: float
 
     def __str__(self) -> str:
-        way = DEG_PER_PULSE * abs(self.found - self.before)
+        jump_deg = DEG_PER_PULSE * abs(self.position - self.before)
         return (
-            f"jumped by {way:.1f} deg, from {self.before} to {self.found} pulses, within {1e3 * self.seconds:.1f} ms, "
-            f"allowed {DEG_PER_PULSE * self.allowed:.1f} deg"
+            f"jumped by {jump_deg:.1f} deg, from {self.before} to {self.position} pulses, "
+            f"within {1e3 * self.seconds:.1f} ms, allowed {DEG_PER_PULSE * self.allowed:.1f} deg"
         )
 
 
@@ -50,7 +50,7 @@ class PositionWatch:
         models: Of the servos, by ID.
 
     Attributes:
-        jump: The first that was rejected since somebody set this to None.
+        jump: The first that was rejected since this was set to None.
     """
 
     def __init__(self, models: Mapping[int, ServoModel]) -> None:
@@ -62,38 +62,38 @@ class PositionWatch:
         self._exchanges = 0
 
     def read(self, chain: ServoChain, held: Collection[int] = ()) -> dict[int, Answered]:
-        """Positions, by ID, of the servos that answer with one that can be true; those of `held` have torque.
+        """Positions, by ID, of the servos that reply with one that can be true; those of `held` have torque.
 
-        Where all of them answer, each is its own. Where one is missing its ID may stand on another's answer: all are
-        asked once more, and what is known only from such answers must come twice. Raises PortLostError.
+        Where all of them reply, each reply is its own. Where one is missing, its ID may stand on another's reply: all
+        are asked once more, and a position known only from such replies must come twice. Raises PortLostError.
         """
         numbers, exchanges = list(self._speeds), list[dict[int, Answered]]()
-        for order in (1, -1):  # a servo waits for the answer of the one before it: behind a missing one none may answer
+        for order in (1, -1):  # a servo waits for the reply of the one before it: behind a missing one none may reply
             exchanges.append(chain.read_once(numbers[::order], [self._register]))
             if len(exchanges[-1]) == len(numbers):
                 del exchanges[:-1]
                 break
             if not chain.has_room():
                 break
-        found = {}
+        accepted = {}
         for answers in exchanges:
             self._exchanges += 1
             complete = len(answers) == len(numbers)
             for number, one in answers.items():
                 times_ns = (one.asked_ns, one.at_ns)
                 if self.accepts(number, one.values[POSITION], times_ns, torque=number in held, complete=complete):
-                    found[number] = one
-        return found
+                    accepted[number] = one
+        return accepted
 
     def accepts(
         self, number: int, position: int, times_ns: tuple[int, int], *, torque: bool, complete: bool = True
     ) -> bool:
-        """Whether a servo can stand there, pulses, at any time between the question and its answer.
+        """Whether a servo can be at this position, pulses, at any time between the request and the reply.
 
-        The way from the last accepted position is at most what the servo turns in the time since that was asked for:
-        by its motor at the highest voltage or, without torque, by a hand. While it has torque it loses no turn; without
-        it whole turns do not count, for a servo that was switched off begins within one again. Where the answers are
-        not `complete`, it moves as slowly as with torque, and the last answer agrees.
+        The distance from the last accepted position is at most what the servo turns in the time since the request for
+        that: by its motor at the highest voltage or, without torque, by a hand. With torque it loses no turn; without,
+        whole turns do not count, for a servo that was switched off begins within one again. Where the replies are not
+        `complete`, it must move as slowly as with torque, and the last reply must agree.
         """
         asked_ns, at_ns = times_ns
         speed = self._speeds[number]
@@ -101,18 +101,18 @@ class PositionWatch:
             speed = max(speed, HAND_SPEED * PULSES_PER_TURN / (2.0 * math.pi))
 
         def jump(before: tuple[int, ...], longest_s: float = math.inf) -> Jump | None:
-            way = position - before[0] if torque else difference(position, before[0])
+            distance = position - before[0] if torque else difference(position, before[0])
             seconds = 1e-9 * (at_ns - before[1])
             allowed = NOISE + speed * min(seconds, longest_s)
             if torque:
                 allowed = min(allowed, PULSES_PER_TURN / 2)
-            return None if abs(way) <= allowed else Jump(number, before[0], position, seconds, allowed)
+            return None if abs(distance) <= allowed else Jump(number, before[0], position, seconds, allowed)
 
         accepted, answered = self._accepted.get(number), self._answered.get(number)
         self._answered[number] = (position, asked_ns, self._exchanges)
-        found = None if accepted is None else jump(accepted)
-        if found is not None:
-            self.jump = self.jump or found
+        rejected = None if accepted is None else jump(accepted)
+        if rejected is not None:
+            self.jump = self.jump or rejected
             return False
         recent = answered is not None and self._exchanges - answered[2] <= RECENT
         if not complete and (answered is None or not recent or jump(answered, AGREES_S) is not None):
@@ -127,5 +127,5 @@ def difference(later: int, earlier: int) -> int:
 
 
 def _top_speed(model: ServoModel) -> float:
-    """Pulses per second without load at the highest voltage that the model bears."""
+    """Pulses per second without load at the maximum voltage of the model."""
     return model.top_speed / 60.0 * PULSES_PER_TURN * 0.1 * model.registers["Max Voltage Limit"].initial / model.voltage

@@ -1,6 +1,6 @@
-"""Who is on a bus and how it is: servos of any ID, at any baud rate. They are only asked: nothing is written.
+"""The servos of a bus and their state, of any ID and at any baud rate. A scan only reads.
 
-Two servos of one ID talk at the same time, so what comes is damaged or no packet at all. Such IDs are found by asking
+Two servos of one ID reply at the same time: the reply is damaged or no packet at all. Such IDs are detected by asking
 one after the other.
 """
 
@@ -25,9 +25,9 @@ ALL_IDS = range(253)
 NOBODYS_ID = 253
 """An ID that no servo can have (ROBOTIS e-Manual, "Protocol 2.0", Packet ID)."""
 READS = 3
-"""Of each servo: answers of two with one ID differ, so that sooner or later they are damaged."""
+"""Of each servo: replies of two with one ID differ, so that sooner or later they are damaged."""
 SHORT_LATENCY_S = 0.02
-"""For IDs that most likely nobody has; an adapter's latency timer is 16 ms at most."""
+"""For IDs that most likely no servo has; an adapter's latency timer is 16 ms at most."""
 LOOKED_AT = (
     "Torque Enable", "Hardware Error Status", "Present Input Voltage", "Present Temperature", "Temperature Limit",
     "Min Voltage Limit", "Max Voltage Limit",
@@ -36,16 +36,16 @@ LOOKED_AT = (
 
 @dataclass(frozen=True)
 class FoundServo:
-    """What a servo, or several with the same ID, told.
+    """What a servo, or several with the same ID, reported.
 
     Attributes:
         number: ID.
         model: Name of its kind as in dynamixel-sdk, "" if that does not know it.
-        model_number, firmware: As it says; 0 if nothing that it said was understood.
-        baud_rate: At which it answers, bit/s.
-        at_once: How many answers to one ping were understood.
-        failed: How many of the `READS` were not answered, or with damage.
-        garbled: Whether nothing but damage came, to all reads or to all pings.
+        model_number, firmware: As it reports them; 0 if no reply was understood.
+        baud_rate: At which it replies, bit/s.
+        at_once: How many replies to one ping were understood.
+        failed: How many of the `READS` had no reply, or a damaged one.
+        garbled: Whether all replies were damaged, to all reads or to all pings.
         values: Those of `LOOKED_AT` that its model has and that could be read.
     """
 
@@ -98,14 +98,14 @@ class FoundServo:
 
     @property
     def fault(self) -> str:
-        """What is wrong with its answers, as a sentence without the subject; "" if nothing is."""
+        """What is wrong with its replies, a clause without the subject; "" if nothing is."""
         if self.at_once > 1:
             return f"answers {self.at_once} times to one question: {self.at_once} servos have this ID"
         if self.garbled:
             return "answers with damaged bytes: probably two servos have this ID; else a cable is bad"
         if self.failed:
-            told = f"failed in {self.failed} of {READS} reads: another servo with this ID, or a bad cable"
-            return told + (", or Status Return Level (68) is 0" if self.failed == READS else "")
+            detail = f"failed in {self.failed} of {READS} reads: another servo with this ID, or a bad cable"
+            return detail + (", or Status Return Level (68) is 0" if self.failed == READS else "")
         return ""
 
     @property
@@ -113,18 +113,18 @@ class FoundServo:
         """For the fault."""
         if self.is_shared:
             return "connect one of them alone and give it another ID with `paramove arm setup`"
-        return "connect it alone and look again, then with another cable"
+        return "connect it alone and scan again, then with another cable"
 
 
 @dataclass(frozen=True)
 class BusScan:
-    """What a scan has found.
+    """The result of a scan.
 
     Attributes:
         servos: In the order of the baud rates, by ID.
-        asked: Baud rates at which was asked; without those that the adapter does not have.
-        damaged: Of these, those with damaged answers to the question to all.
-        foreign: Of these, those at which something came in, but nothing of a servo.
+        asked: Baud rates that were scanned; without those that the adapter does not have.
+        damaged: Of these, those with damaged replies to the ping of all.
+        foreign: Of these, those with bytes that are no reply of a servo.
     """
 
     servos: list[FoundServo] = field(default_factory=list)
@@ -134,28 +134,28 @@ class BusScan:
 
     @property
     def faults(self) -> list[str]:
-        """What is wrong with the bus as a whole, in sentences."""
-        told = []
+        """Messages about the bus as a whole."""
+        messages = []
         if self.damaged:
-            shown = listed(self.damaged)
-            told.append(f"answers at {shown} bit/s are damaged: several servos have the same ID, or a bad cable")
+            rates = listed(self.damaged)
+            messages.append(f"answers at {rates} bit/s are damaged: several servos have the same ID, or a bad cable")
         if self.foreign:
-            shown = listed(self.foreign)
-            told.append(f"what comes in at {shown} bit/s is no answer of a servo: another device, or a bad cable")
-        return told
+            rates = listed(self.foreign)
+            messages.append(f"bytes at {rates} bit/s are no answer of a servo: another device, or a bad cable")
+        return messages
 
     def findings(self, baud_rate: int = 0) -> list[str]:
-        """Sentences about all that is not as it should be. `baud_rate`: that is configured, 0 if none is."""
-        told = self.faults
+        """Messages about all that is wrong. `baud_rate`: the configured one, 0 if none is."""
+        messages = self.faults
         for rate, count in Counter(one.baud_rate for one in self.servos).items():
             if baud_rate not in (0, rate):
-                told.append(f"found {count} servo{'s' * (count != 1)} at {rate}, configured {baud_rate}")
+                messages.append(f"found {count} servo{'s' * (count != 1)} at {rate}, configured {baud_rate}")
         faulty = (one for one in self.servos if one.fault)
-        return told + [f"ID {one.number} at {one.baud_rate} {one.fault}; {one.remedy}" for one in faulty]
+        return messages + [f"ID {one.number} at {one.baud_rate} {one.fault}; {one.remedy}" for one in faulty]
 
 
 def listed(rates: Sequence[int]) -> str:
-    """For a sentence."""
+    """Separated by commas."""
     return ", ".join(map(str, rates))
 
 
@@ -168,7 +168,7 @@ def model_name(number: int) -> str:
 
 
 def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, ids: Sequence[int] = ALL_IDS) -> BusScan:
-    """Ask all servos at each of these baud rates, and where something is not understood these IDs one by one.
+    """Ping all servos at each of these baud rates, and where a reply is not understood these IDs one by one.
 
     The port is left at the baud rate that it had. Raises PortLostError, and InputError for a rate that no servo has.
     """
@@ -182,13 +182,13 @@ def scan_bus(chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, id
             except (ValueError, OSError):  # pyserial has both for a rate that an adapter does not have
                 continue
             scan.asked.append(rate)
-            _ask_all(chain, ids, scan)
+            _scan_rate(chain, ids, scan)
     finally:
         chain.port.setBaudRate(before)
     return scan
 
 
-def _ask_all(chain: ServoChain, ids: Sequence[int], scan: BusScan) -> None:
+def _scan_rate(chain: ServoChain, ids: Sequence[int], scan: BusScan) -> None:
     """At the port's baud rate."""
     before = replace(chain.counts)
     pinged = chain.ping_all()
@@ -206,20 +206,20 @@ def _ask_all(chain: ServoChain, ids: Sequence[int], scan: BusScan) -> None:
 
 
 def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[FoundServo]:
-    """Servos of these IDs, until what is not understood comes from somebody who was not asked."""
+    """Servos of these IDs; ends where bytes that are not understood come from a device that was not asked."""
     for number in ids:
-        servo = _asked(chain, number)
-        if servo is not None and servo.garbled and _asked(chain, NOBODYS_ID) is not None:
+        servo = _servo_with_id(chain, number)
+        if servo is not None and servo.garbled and _servo_with_id(chain, NOBODYS_ID) is not None:
             return
         if servo is not None:
             yield servo
 
 
-def _asked(chain: ServoChain, number: int) -> FoundServo | None:
-    """None if there is silence."""
+def _servo_with_id(chain: ServoChain, number: int) -> FoundServo | None:
+    """None if nothing comes."""
     for _ in range(READS):
         before = _not_understood(chain)
-        pinged = _pinged_in_vain(chain, number)
+        pinged = _quick_ping(chain, number)
         if pinged is not None:
             return looked_at(chain, pinged)
         if _not_understood(chain) == before:
@@ -231,17 +231,17 @@ def _not_understood(chain: ServoChain) -> int:
     return chain.counts.noise + chain.counts.stray
 
 
-def _pinged_in_vain(chain: ServoChain, number: int) -> PingedServo | None:
-    """Most likely, and so with short timeouts."""
+def _quick_ping(chain: ServoChain, number: int) -> PingedServo | None:
+    """With short timeouts: most likely no servo has this ID."""
     latency_s, chain.port.latency_s = chain.port.latency_s, min(chain.port.latency_s, SHORT_LATENCY_S)
     try:
-        return chain.ping(number, patient=False)
+        return chain.ping(number, retry=False)
     finally:
         chain.port.latency_s = latency_s
 
 
 def looked_at(chain: ServoChain, pinged: PingedServo) -> FoundServo:
-    """A servo that answered to a ping, with what its registers say. Raises PortLostError."""
+    """A servo that replied to a ping, with its registers. Raises PortLostError."""
     registers, before = _registers(pinged.model_number), _not_understood(chain)
     values, failed = dict[str, int](), 0
     for _ in range(READS if registers else 0):

@@ -1,4 +1,4 @@
-"""USB adapters of serial buses, told apart by their serial numbers: /dev/ttyUSB0 is another one after the next boot."""
+"""USB adapters of serial buses, identified by their serial numbers: /dev/ttyUSB0 may be another after the next boot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BY_ID = Path("/dev/serial/by-id")
 BY_ID_VARIABLE = "PARAMOVE_SERIAL_BY_ID"
 INTERFACE = re.compile(r"-if\d+(-port\d+)?$")
 NOTHING_FOUND = (
-    "plug in the adapter and switch on its power; `ls /dev/ttyUSB* /dev/ttyACM*` shows whether the system sees it, "
+    "plug in the adapter and switch on its power; `ls /dev/ttyUSB* /dev/ttyACM*` shows whether the system detects it, "
     "`sudo usermod -aG dialout $USER` and a new login let you open it, and in a container the folder must be passed in"
 )
 
@@ -71,13 +71,13 @@ def serial_adapter(serial: str = "", by_id: Path | None = None) -> SerialAdapter
     found = serial_adapters(folder)
     if not found:
         raise InputError(f"no serial adapter in {folder}: {NOTHING_FOUND}", missing=True)
-    told = ", ".join(f"{one.serial} ({one.device})" for one in found)
-    wanted = [one for one in found if serial in ("", one.serial)]
-    if not wanted:
-        raise InputError(f"no serial adapter {serial!r} in {folder}, found {told}", missing=True)
-    twice = [number for number, count in Counter(one.serial for one in wanted).items() if count > 1]
+    listed = ", ".join(f"{one.serial} ({one.device})" for one in found)
+    matches = [one for one in found if serial in ("", one.serial)]
+    if not matches:
+        raise InputError(f"no serial adapter {serial!r} in {folder}, found {listed}", missing=True)
+    twice = [number for number, count in Counter(one.serial for one in matches).items() if count > 1]
     if twice:
-        raise InputError(f"two adapters have the serial number {twice[0]!r}, found {told}: unplug one of them")
-    if len(wanted) > 1:
-        raise InputError(f"several serial adapters, found {told}: name one by its number with --serial")
-    return wanted[0]
+        raise InputError(f"two adapters have the serial number {twice[0]!r}, found {listed}: unplug one of them")
+    if len(matches) > 1:
+        raise InputError(f"several serial adapters, found {listed}: name one by its number with --serial")
+    return matches[0]

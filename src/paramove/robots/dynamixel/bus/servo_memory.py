@@ -1,4 +1,4 @@
-"""The control table of one servo: reading, checked writing, and what stands for other addresses."""
+"""The control table of one servo: reading, checked writing, and indirect addresses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paramove.robots.dynamixel.bus.packets import StatusError
 from paramove.robots.dynamixel.bus.servo_models import FIRST_INDIRECT, RAM_BEGINS, Register, ServoModel
 
 MULTI_TURN = 1_048_575
-"""Greatest goal position in the extended modes, pulses, either way (e-Manual, "Goal Position")."""
+"""Maximum goal position in the extended modes, pulses, either way (e-Manual, "Goal Position")."""
 CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODES, PWM_MODE = 0, 1, 3, (4, 5), 16
 CURRENT_BASED_POSITION_MODE = 5
 GOALS = {
@@ -29,7 +29,7 @@ TRIPPED = 0xFF
 
 
 class RefusedError(Exception):
-    """What was asked for cannot be; carries the error number of the answer."""
+    """A request that a servo rejects, with the error number of its reply."""
 
     def __init__(self, error: StatusError) -> None:
         super().__init__(error.name)
@@ -42,7 +42,7 @@ class ServoMemory:
     def __init__(self, model: ServoModel) -> None:
         self.model = model
         self._bytes = bytearray(model.size)
-        self._values: dict[str, int] = {}  # what the bytes say: the servo looks at it thousands of times a second
+        self._values: dict[str, int] = {}  # of the bytes: the servo reads them thousands of times a second
         self._backup: bytes | None = None
         self._at = {one.address + i: one for one in model.registers.values() for i in range(one.size)}
         self.reset(0)
@@ -72,7 +72,7 @@ class ServoMemory:
             self[name] = self.model.registers[name].initial
 
     def back_up(self) -> None:
-        """Keeps the table, also without power."""
+        """Stores the table, also without power."""
         self["Backup Ready"] = 1
         self._backup = bytes(self._bytes)
 
@@ -84,15 +84,15 @@ class ServoMemory:
         """Gains, profile and indirect addresses from the backup, if there is one."""
         if self._restore(self.model.registers[name] for name in GAINS_AND_PROFILE) and self._backup is not None:
             for block in self.model.indirect:
-                places = slice(block.addresses, block.addresses + 2 * block.count)
-                self._bytes[places] = self._backup[places]
+                addresses = slice(block.addresses, block.addresses + 2 * block.count)
+                self._bytes[addresses] = self._backup[addresses]
 
     def _restore(self, registers: Iterable[Register]) -> bool:
         if self._backup is None:
             return False
         for register in registers:
-            kept = self._backup[register.address : register.address + register.size]
-            self[register.name] = int.from_bytes(kept, "little")
+            stored = self._backup[register.address : register.address + register.size]
+            self[register.name] = int.from_bytes(stored, "little")
         return True
 
     def register(self, name: str) -> Register:
@@ -119,7 +119,7 @@ class ServoMemory:
             raise RefusedError(StatusError.ACCESS)
         if address + size <= FIRST_INDIRECT:
             return bytes(self._bytes[address : address + size])
-        return bytes(self._bytes[self._meant(place)] for place in range(address, address + size))
+        return bytes(self._bytes[self._meant(byte_address)] for byte_address in range(address, address + size))
 
     def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
         """The registers that would be written and their values. Raises RefusedError if one of them cannot be.
@@ -130,56 +130,58 @@ class ServoMemory:
             raise RefusedError(StatusError.ACCESS)
         written: dict[int, int] = {}
         indirect: dict[int, int] = {}
-        for place, byte in zip(range(address, address + len(data)), data, strict=True):
-            if self._is_indirect_address(place):
-                indirect[place] = byte
+        for byte_address, byte in zip(range(address, address + len(data)), data, strict=True):
+            if self._is_indirect_address(byte_address):
+                indirect[byte_address] = byte
             else:
-                written[self._meant(place)] = byte
+                written[self._meant(byte_address)] = byte
         self._check_indirect(indirect)
         return [self._checked(register, written) for register in self._touched(written)]
 
     def write(self, address: int, data: bytes) -> set[str]:
-        """Bytes that were checked. What they do is up to the servo, which is told the registers that they are of."""
+        """Write bytes that were checked; returns the names of their registers. Their effect is up to the servo."""
         written: set[str] = set()
-        for place, byte in zip(range(address, address + len(data)), data, strict=True):
-            target = place if self._is_indirect_address(place) else self._meant(place)
+        for byte_address, byte in zip(range(address, address + len(data)), data, strict=True):
+            target = byte_address if self._is_indirect_address(byte_address) else self._meant(byte_address)
             self._bytes[target] = byte
             if target in self._at:
                 written.add(self._at[target].name)
         for name in written:
             register = self.model.registers[name]
-            told = self._bytes[register.address : register.address + register.size]
-            self._values[name] = int.from_bytes(told, "little", signed=register.signed)
+            stored = self._bytes[register.address : register.address + register.size]
+            self._values[name] = int.from_bytes(stored, "little", signed=register.signed)
         return written
 
     def _check_indirect(self, written: dict[int, int]) -> None:
         """Indirect addresses are of two bytes, and lead to RAM. Raises RefusedError if these cannot be written."""
         if written and self["Torque Enable"]:
             raise RefusedError(StatusError.ACCESS)
-        for place, byte in written.items():
-            if place ^ 1 not in written:
+        for byte_address, byte in written.items():
+            if byte_address ^ 1 not in written:
                 raise RefusedError(StatusError.DATA_LENGTH)
-            if place % 2 == 0 and not RAM_BEGINS <= byte + 256 * written[place + 1] < len(self._bytes):
+            if byte_address % 2 == 0 and not RAM_BEGINS <= byte + 256 * written[byte_address + 1] < len(self._bytes):
                 raise RefusedError(StatusError.DATA_RANGE)
 
     def _touched(self, written: dict[int, int]) -> list[Register]:
-        found: dict[str, Register] = {}
-        for place in written:
-            if place >= FIRST_INDIRECT and place not in self._at:
+        touched: dict[str, Register] = {}
+        for byte_address in written:
+            if byte_address >= FIRST_INDIRECT and byte_address not in self._at:
                 continue  # data of the indirect access that stand for nothing else
-            register = self._at.get(place)
+            register = self._at.get(byte_address)
             if register is None or not register.writable:
                 raise RefusedError(StatusError.ACCESS)
             if register.address < RAM_BEGINS and self["Torque Enable"]:
                 raise RefusedError(StatusError.ACCESS)
-            found[register.name] = register
-        return list(found.values())
+            touched[register.name] = register
+        return list(touched.values())
 
     def _checked(self, register: Register, written: dict[int, int]) -> tuple[Register, int]:
-        places = range(register.address, register.address + register.size)
-        if any(place not in written for place in places):
+        addresses = range(register.address, register.address + register.size)
+        if any(byte_address not in written for byte_address in addresses):
             raise RefusedError(StatusError.DATA_LENGTH)
-        value = int.from_bytes(bytes(written[place] for place in places), "little", signed=register.signed)
+        value = int.from_bytes(
+            bytes(written[byte_address] for byte_address in addresses), "little", signed=register.signed
+        )
         assert register.allowed is not None
         low, high = register.allowed
         if (low is not None and value < low) or (high is not None and value > high):
@@ -204,14 +206,14 @@ class ServoMemory:
         limit = {"Goal PWM": "PWM Limit", "Goal Current": "Current Limit", "Goal Velocity": "Velocity Limit"}.get(name)
         return (None, None) if limit is None else (-self[limit], self[limit])
 
-    def _is_indirect_address(self, place: int) -> bool:
-        return any(one.addresses <= place < one.addresses + 2 * one.count for one in self.model.indirect)
+    def _is_indirect_address(self, byte_address: int) -> bool:
+        return any(one.addresses <= byte_address < one.addresses + 2 * one.count for one in self.model.indirect)
 
-    def _meant(self, place: int) -> int:
-        """The address for which a byte of indirect data stands; any other stands for itself."""
+    def _meant(self, byte_address: int) -> int:
+        """The address that a byte of indirect data is mapped to; any other is its own."""
         for block in self.model.indirect:
-            if block.data <= place < block.data + block.count:
-                at = block.addresses + 2 * (place - block.data)
+            if block.data <= byte_address < block.data + block.count:
+                at = block.addresses + 2 * (byte_address - block.data)
                 meant = int.from_bytes(self._bytes[at : at + 2], "little")
-                return meant if RAM_BEGINS <= meant < len(self._bytes) else place
-        return place
+                return meant if RAM_BEGINS <= meant < len(self._bytes) else byte_address
+        return byte_address

@@ -1,4 +1,4 @@
-"""Control tables of the servo models: where each number stands, what it begins with, and what may be written.
+"""Control tables of the servo models: address, initial value and allowed range of each number.
 
 Addresses and sizes are those of the tables that come with dynamixel-sdk, but for `NOT_OF_THE_SDK`. Initial values,
 ranges and speeds are from the ROBOTIS e-Manual, pages "XM430-W350", "XM430-W210", "XL430-W250", "XL330-M288-T" and
@@ -16,7 +16,7 @@ from dynamixel_easy_sdk.control_table import ControlTable
 from paramove.documents import InputError
 
 RAM_BEGINS = 64
-"""Addresses below are kept without power, and locked while torque is on."""
+"""Addresses below are stored without power, and locked while torque is on."""
 FIRST_INDIRECT = 168
 """From here on addresses and data of the indirect access; data below are registers."""
 PULSES_PER_TURN = 4096
@@ -73,7 +73,7 @@ class ServoModel:
         top_speed: Without load at the recommended voltage, rev/min.
         voltage: Recommended, V.
         stall_torque: Held still with full power at the recommended voltage, N m; so many `stall_amperes` then flow.
-        current_unit: Amperes of one unit of current; None for a model that tells load, 0.1 % of the stall torque each.
+        current_unit: Amperes of one unit of current; None for a model that reports load in 0.1 % of the stall torque.
         firmware: Version that an emulated servo reports. Of an XL330 at most 52: above, ROBOTIS's tables contradict
             each other. Bus watchdog and clear need 42 or above; fast reads, backup, Startup Configuration and torque
             on by goal need 45, and 46 in an XL330.
@@ -166,13 +166,13 @@ XL330_BLOCKS, XL330_BLOCKS_BEFORE = (IndirectBlock(168, 208, 20),), (IndirectBlo
 def _registers(number: int, **others: tuple[int, Range]) -> dict[str, Register]:
     """Of the SDK's table, with names of `others` written with underscores for spaces."""
     special = {name.replace("_", " "): value for name, value in others.items()}
-    places = {name: (item.address, item.size) for name, item in ControlTable.getControlTable(number).items()}
-    found = {"Model Number": Register("Model Number", 0, 2, number)}
-    for name, (address, size) in (places | NOT_OF_THE_SDK).items():
-        if name not in found and not name.startswith("Indirect"):
+    items = {name: (item.address, item.size) for name, item in ControlTable.getControlTable(number).items()}
+    registers = {"Model Number": Register("Model Number", 0, 2, number)}
+    for name, (address, size) in (items | NOT_OF_THE_SDK).items():
+        if name not in registers and not name.startswith("Indirect"):
             initial, allowed = special.get(name, WRITABLE.get(name, (0, None)))
-            found[name] = Register(name, address, size, initial, allowed)
-    return found
+            registers[name] = Register(name, address, size, initial, allowed)
+    return registers
 
 
 XM430_W350 = ServoModel(
@@ -217,7 +217,7 @@ BAUD_RATES = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4
 def model_named(name: str) -> ServoModel:
     """Raises InputError for a model without a table here."""
     if name not in MODELS:
-        raise InputError(f"servo model {name!r} is not known, found are {', '.join(sorted(MODELS))}")
+        raise InputError(f"servo model {name!r} is not known; known models: {', '.join(sorted(MODELS))}")
     return MODELS[name]
 
 

@@ -1,8 +1,8 @@
 # ruff: noqa: N802 - the packet handlers of dynamixel-sdk call these names
-"""The serial port of a Dynamixel bus, in the place of the SDK's PortHandler and without what is wrong with that one.
+"""The serial port of a Dynamixel bus, instead of the SDK's PortHandler and without its faults.
 
-The SDK's (4.1.0) stays busy for ever after an unplugged cable, waits 34 ms for a servo that is not there, asks the
-clock on the wall, spins while it waits, lets a second program open the port, and sends FF FF FD within a packet bare.
+The SDK's (4.1.0) stays busy for ever after an unplugged cable, waits 34 ms for a servo that is not there, uses the
+wall clock, spins while it waits, lets a second program open the port, and sends FF FF FD within a packet bare.
 pyserial's own writing spins for ever at an adapter that hangs.
 """
 
@@ -28,7 +28,7 @@ from paramove.robots.dynamixel.bus.serial_adapters import default_by_id, serial_
 
 BITS_PER_BYTE = 10
 SLOWEST, FASTEST = 9_600, 4_500_000
-"""bit/s, of all that Dynamixel servos talk at (e-Manual, "Baud Rate")."""
+"""bit/s, of all baud rates of Dynamixel servos (e-Manual, "Baud Rate")."""
 LATENCY_S = 0.004
 """Beyond the time of the bytes and the servo's own delay; an adapter with a latency timer of 16 ms needs more."""
 LONGEST_RETURN_DELAY_S = 254 * 2e-6
@@ -46,13 +46,13 @@ class ServoPort:
     Args:
         name: For example /dev/ttyUSB0, or a link in /dev/serial/by-id.
         baud_rate: bit/s.
-        latency_s: That an answer may take beyond the time of its bytes.
+        latency_s: That a reply may take beyond the time of its bytes.
 
     Attributes:
         is_using: Whether an exchange is under way; the packet handlers set it.
-        low_latency: Whether the adapter was told to hand over bytes at once; a pseudo-terminal cannot be.
-        timeout_s: For the answer that was last waited for.
-        return_delay_s: That a servo may take before it answers; the longest that can be set, until it is known.
+        low_latency: Whether the adapter was set to hand over bytes at once; a pseudo-terminal has no such setting.
+        timeout_s: Of the last wait for a reply.
+        return_delay_s: That a servo may take before it replies; the longest that can be set, until it is known.
     """
 
     def __init__(self, name: str, baud_rate: int = 1_000_000, latency_s: float = LATENCY_S) -> None:
@@ -62,7 +62,7 @@ class ServoPort:
         self.return_delay_s = LONGEST_RETURN_DELAY_S
         self.timeout_s = 0.0
         self._due_s = 0.0
-        self._asked_bytes = 0
+        self._sent_bytes = 0
         self._serial: Any = None
 
     def __enter__(self) -> Self:
@@ -97,13 +97,13 @@ class ServoPort:
         port, self._serial = self._serial, None
         self.is_using = False
         if port is not None:
-            with contextlib.suppress(OSError, TypeError):  # a lost one may refuse, or have no descriptor any more
-                fcntl.ioctl(port.fd, termios.TIOCNXCL)  # the terminal would keep it while anybody has it open
+            with contextlib.suppress(OSError, TypeError):  # a lost one may fail, or have no descriptor any more
+                fcntl.ioctl(port.fd, termios.TIOCNXCL)  # the terminal would stay exclusive while anybody has it open
             with contextlib.suppress(OSError):
                 port.close()
 
     def getBaudRate(self) -> int:
-        """As the packet handlers ask for it."""
+        """For the packet handlers."""
         return self.baud_rate
 
     def setBaudRate(self, baudrate: int) -> bool:
@@ -125,11 +125,11 @@ class ServoPort:
         if HEADER in content:
             data = encoded(Packet(data[BEFORE_LENGTH - 1], content[0], content[1:]))
         self._do(lambda port: _write(port, data))
-        self._asked_bytes = len(data)
+        self._sent_bytes = len(data)
         return len(packet)
 
     def readPort(self, length: int) -> bytes:
-        """At most so many bytes, waiting for the first of them until the answer is overdue."""
+        """At most so many bytes, waiting for the first of them until the reply is overdue."""
         return bytes(self._do(lambda port: self._read(port, length)))
 
     def _read(self, port: Any, length: int) -> bytes:
@@ -142,16 +142,16 @@ class ServoPort:
         return data
 
     def setPacketTimeout(self, packet_length: int, answers: int = 1, timeout_s: float = 0.0) -> None:
-        """For so many bytes of so many answers to what was just sent, and so much longer, from now on."""
-        wire_s = (self._asked_bytes + packet_length) * BITS_PER_BYTE / self.baud_rate
+        """For so many bytes of so many replies to what was just sent, and so much longer, from now on."""
+        wire_s = (self._sent_bytes + packet_length) * BITS_PER_BYTE / self.baud_rate
         self._wait_for(wire_s + answers * self.return_delay_s + self.latency_s + timeout_s)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """For an answer that takes at most so long, from now on."""
+        """For a reply that takes at most so long, from now on."""
         self._wait_for(1e-3 * msec)
 
     def isPacketTimeout(self) -> bool:
-        """Whether the answer is overdue."""
+        """Whether the reply is overdue."""
         return time.monotonic() >= self._due_s
 
     def _wait_for(self, timeout_s: float) -> None:
@@ -165,7 +165,7 @@ class ServoPort:
             return work(self._serial)
         except (OSError, termios.error, TypeError) as error:  # pyserial has all of them for a port that went away
             self.close()
-            raise PortLostError(f"{self.name} went away ({_words(error)}): is its cable plugged in?") from error
+            raise PortLostError(f"{self.name} went away ({_text(error)}): is its cable plugged in?") from error
 
 
 def _write(port: Any, data: bytes) -> None:
@@ -183,7 +183,7 @@ def _write(port: Any, data: bytes) -> None:
 
 def _check_baud_rate(baud_rate: int) -> None:
     if not SLOWEST <= baud_rate <= FASTEST:
-        raise InputError(f"servos talk at {SLOWEST} to {FASTEST} bit/s, found {baud_rate}")
+        raise InputError(f"the baud rate of a servo is {SLOWEST} to {FASTEST} bit/s, found {baud_rate}")
 
 
 def _reason(name: str, error: serial.SerialException) -> str:
@@ -202,6 +202,6 @@ def _reason(name: str, error: serial.SerialException) -> str:
     return f"{name} cannot be opened as a serial port: {error}"
 
 
-def _words(error: Exception) -> str:
-    """Without the number; termios and the system give number and words as two arguments."""
+def _text(error: Exception) -> str:
+    """Without the number; termios and the system give number and text as two arguments."""
     return str(error.args[-1]) if error.args else type(error).__name__

@@ -10,21 +10,23 @@ from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
 
 TIMEOUT_S = 3.0
-LOADED_SHARE = 0.05
-"""Of the largest load or current: more is a joint that carries something."""
+LOADED_FRACTION = 0.05
+"""Of the maximum load or current: more is a joint that carries something."""
 FULL_LOAD = 1000
 """Present Load (126) in units of 0.1 %."""
 
 
 class ServoLoadedError(InputError):
-    """The servo holds its joint, which would fall."""
+    """The servo holds its joint, which would fall when it reboots."""
 
 
 def servo_before_reboot(chain: ServoChain, number: int) -> FoundServo:
     """The servo as it is. Raises ServoSilentError if it does not answer."""
     pinged = chain.ping(number)
     if pinged is None:
-        raise ServoSilentError(number, f"servo {number} does not answer; `paramove arm scan` shows who is there")
+        raise ServoSilentError(
+            number, f"servo {number} does not answer; `paramove arm scan` lists the servos of the bus"
+        )
     return looked_at(chain, pinged)
 
 
@@ -32,9 +34,9 @@ def reboot_sentences(servo: FoundServo) -> list[str]:
     """Its hardware errors in words, each with what helps."""
     if servo.hardware_error is None:
         return [f"servo {servo.number}: its hardware error cannot be read"]
-    found = hardware_errors(servo.hardware_error)
-    told = [f"servo {servo.number}: {one.words}; {one.remedy}" for one in found]
-    return told or [f"servo {servo.number}: no hardware error"]
+    errors = hardware_errors(servo.hardware_error)
+    messages = [f"servo {servo.number}: {one.words}; {one.remedy}" for one in errors]
+    return messages or [f"servo {servo.number}: no hardware error"]
 
 
 def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
@@ -43,14 +45,14 @@ def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
     if model is None or not servo.torque:
         return
     if "Present Load" in model.registers:
-        share = abs(chain.read(servo.number, model.registers["Present Load"])) / FULL_LOAD
+        load = abs(chain.read(servo.number, model.registers["Present Load"])) / FULL_LOAD
     else:
         maximum = chain.read(servo.number, model.registers["Current Limit"])
-        share = abs(chain.read(servo.number, model.registers["Present Current"])) / max(maximum, 1)
-    if share > LOADED_SHARE:
+        load = abs(chain.read(servo.number, model.registers["Present Current"])) / max(maximum, 1)
+    if load > LOADED_FRACTION:
         raise ServoLoadedError(
-            f"servo {servo.number} holds its joint with {100.0 * share:.0f} % of its force, which would fall: hold the "
-            "arm and say --yes"
+            f"servo {servo.number} holds its joint with {100.0 * load:.0f} % of its force and would drop it: hold the "
+            "arm and add --yes"
         )
 
 
@@ -59,7 +61,7 @@ def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -
     chain.reboot(number)
     end_s = time.monotonic() + timeout_s
     while time.monotonic() < end_s:
-        pinged = chain.ping(number, patient=False)
+        pinged = chain.ping(number, retry=False)
         if pinged is not None:
             return looked_at(chain, pinged)
     raise ServoSilentError(number, f"servo {number} does not answer {timeout_s:g} s after its reboot: check its power")

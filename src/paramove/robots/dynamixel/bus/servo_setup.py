@@ -11,7 +11,7 @@ from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentErr
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, ServoModel
 
 NO_DELAY = 0
-"""Of Return Delay Time (9): answers come at once, which a fast bus needs."""
+"""Of Return Delay Time (9): replies come at once, which a fast bus needs."""
 
 
 def only_servo(
@@ -20,7 +20,7 @@ def only_servo(
     """The one servo that is connected, whatever its ID and baud rate; see `scan_bus`.
 
     Raises:
-        InputError: None answers, more than one does, or its table is not known here.
+        InputError: None replies, more than one does, or its table is unknown here.
     """
     scan = scan_bus(chain, baud_rates, ids)
     if not scan.servos:
@@ -29,22 +29,22 @@ def only_servo(
             f"expected exactly one servo on the bus, found none at {listed(baud_rates)}: {why}", missing=True
         )
     if len(scan.servos) > 1 or scan.servos[0].is_shared:
-        told = ", ".join(f"ID {one.number} ({one.fault if one.is_shared else one.name})" for one in scan.servos)
-        raise InputError(f"expected exactly one servo on the bus, found {told}: connect one alone")
+        servos = ", ".join(f"ID {one.number} ({one.fault if one.is_shared else one.name})" for one in scan.servos)
+        raise InputError(f"expected exactly one servo on the bus, found {servos}: connect one alone")
     return scan.servos[0]
 
 
 def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, model: str = "") -> FoundServo:
-    """Give the only servo on the bus its ID and baud rate, and no delay before its answers; its torque goes off.
+    """Give the only servo on the bus its ID and baud rate, and no delay before its replies; its torque goes off.
 
     Args:
-        servo: As it was found; the port goes to its baud rate and stays at the new one.
+        servo: As a scan detected it; the port goes to its baud rate and stays at the new one.
         number: New ID.
         baud_rate: New one, bit/s.
         model: That it must be of, "" for any.
 
     Returns:
-        It, as it was found afterwards.
+        The servo, as a new scan detects it.
 
     Raises:
         InputError: It is of another model, or cannot have this ID or baud rate; nothing was written.
@@ -58,11 +58,11 @@ def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, mo
         chain.write(servo.number, registers["ID"], number)
     chain.write(number, registers["Return Delay Time"], NO_DELAY)
     if servo.baud_rate != baud_rate:
-        with contextlib.suppress(ServoSilentError):  # it may answer at the new rate already; see what is read back
+        with contextlib.suppress(ServoSilentError):  # it may reply at the new rate already; see what is read back
             chain.write(number, registers["Baud Rate"], BAUD_RATES.index(baud_rate))
         chain.port.setBaudRate(baud_rate)
-    wanted = {"ID": number, "Baud Rate": BAUD_RATES.index(baud_rate), "Return Delay Time": NO_DELAY}
-    for name, value in wanted.items():
+    expected = {"ID": number, "Baud Rate": BAUD_RATES.index(baud_rate), "Return Delay Time": NO_DELAY}
+    for name, value in expected.items():
         read = chain.read(number, registers[name])
         if read != value:
             raise InputError(f"servo {number}: {name} was written as {value}, but reads {read}; set it up once more")
@@ -74,11 +74,11 @@ def _checked(servo: FoundServo, number: int, baud_rate: int, model: str) -> Serv
         raise InputError(f"expected a servo {model} for ID {number}, found {servo.name}: connect the right one")
     table = servo.table
     if table is None:
-        raise InputError(f"the table of {servo.name} is not known here: set it up with its maker's tool")
+        raise InputError(f"the table of {servo.name} is unknown here: set it up with its maker's tool")
     low, high = table.registers["ID"].allowed or (0, 0)
     if not (low or 0) <= number <= (high or 0):
         raise InputError(f"an ID is {low} to {high}, found {number}")
     rates = BAUD_RATES[: 1 + ((table.registers["Baud Rate"].allowed or (0, 0))[1] or 0)]
     if baud_rate not in rates:
-        raise InputError(f"{table.name} can talk at {', '.join(map(str, rates))}, found {baud_rate}")
+        raise InputError(f"{table.name} has the baud rates {', '.join(map(str, rates))}, found {baud_rate}")
     return table

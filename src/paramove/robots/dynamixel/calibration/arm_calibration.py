@@ -1,9 +1,9 @@
 """Calibration of one arm: how its servos' counts become joint angles. A file that may be edited, one for each adapter.
 
-Present Position of a Dynamixel servo is the place of its encoder within one turn, plus Homing Offset (20), whenever
+Present Position of a Dynamixel servo is the angle of its encoder within one turn, plus Homing Offset (20), whenever
 torque is switched on in Position Control Mode, and after every start in the other modes (ROBOTIS e-Manual, "Present
-Position"). The seam of the encoder thus stays where it is whatever the offset, which is kept at 0. A joint whose travel
-crosses it works in Extended Position Control Mode, and `JointCalibration.turns` says how many turns its counts are off.
+Position"). The seam of the encoder thus does not depend on the offset, which stays 0. A joint whose travel crosses it
+works in Extended Position Control Mode, and `JointCalibration.turns` gives the turns by which its counts are off.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_na
 POSITION: Literal[3] = 3
 EXTENDED: Literal[4] = 4
 CURRENT_BASED: Literal[5] = 5
-"""Values of Operating Mode (11) with a goal position; the first keeps to one turn and to the servo's own limits."""
+"""Values of Operating Mode (11) with a goal position; the first is limited to one turn and the servo's own limits."""
 SEAM_MARGIN = 64
 """Counts that a travel must stay away from the encoder's seam, 5.6 degrees: joints sag, and stops give way."""
 LONGEST_TRAVEL = PULSES_PER_TURN - 2 * SEAM_MARGIN
@@ -41,7 +41,7 @@ HEADER = """\
 
 
 class CalibrationError(InputError):
-    """A calibration that cannot be used or made; says what was found and what helps."""
+    """A calibration that cannot be used or made; the message has the cause and the remedy."""
 
 
 class _Part(BaseModel):
@@ -115,29 +115,31 @@ class ArmCalibration(_Part):
             CalibrationError: It is missing, damaged, contradicts itself, is of another adapter than `serial`, or was
                 edited and not signed.
         """
-        found = cls.read(path)
-        if found.bus.serial != serial:
+        calibration = cls.read(path)
+        if calibration.bus.serial != serial:
             raise CalibrationError(
-                f"{path} is of the arm behind adapter {found.bus.serial}, this one is {serial}: run `paramove arm "
-                "calibrate` for it; if only the adapter was exchanged, change bus.serial and run `paramove arm verify "
-                "--sign`"
+                f"{path} is of the arm behind adapter {calibration.bus.serial}, this one is {serial}: run `paramove "
+                "arm calibrate` for it; if only the adapter was exchanged, change bus.serial and run `paramove arm "
+                "verify --sign`"
             )
-        if found.sha256 != found.content_sha256():
+        if calibration.sha256 != calibration.content_sha256():
             raise CalibrationError(
                 f"{path} is not as it was written (sha256 differs): if you edited it, run `paramove arm verify "
                 "--sign`; if not, it is damaged: run `paramove arm calibrate`"
             )
-        return found
+        return calibration
 
     @classmethod
     def read(cls, path: Path) -> Self:
         """As `load`, but of whatever adapter and signature."""
         try:
-            found = cls.model_validate(read_document(path, "calibration of an arm", CalibrationError, _REMEDY).data)
+            calibration = cls.model_validate(
+                read_document(path, "calibration of an arm", CalibrationError, _REMEDY).data
+            )
         except ValidationError as error:
             raise CalibrationError(f"{path}: {findings(error)}; {_REMEDY}") from error
-        found.check(str(path))
-        return found
+        calibration.check(str(path))
+        return calibration
 
     def check(self, where: str) -> None:
         """Raises CalibrationError, which begins with `where`, if the numbers contradict each other."""
@@ -167,7 +169,7 @@ class ArmCalibration(_Part):
             _writer().dump(content, file)
 
     def units(self, joint_names: Sequence[str], lower: ArrayLike, upper: ArrayLike) -> JointUnits:
-        """Units of these joints, each within its described range and the travel that was shown, whichever is less.
+        """Units of these joints, each within its described range and the demonstrated travel, whichever is less.
 
         Args:
             joint_names: J of them.
@@ -201,12 +203,12 @@ _REMEDY = "correct it and run `paramove arm verify --sign`, or run `paramove arm
 
 def sign_again(path: Path) -> ArmCalibration:
     """Renew the signature of a file that was edited; comments and layout stay. Raises CalibrationError and OSError."""
-    found = ArmCalibration.read(path)
-    text, sha256 = path.read_text(encoding="utf-8"), found.content_sha256()
-    kept = re.sub(r"^sha256:.*\n?", "", text, flags=re.M)
+    calibration = ArmCalibration.read(path)
+    text, sha256 = path.read_text(encoding="utf-8"), calibration.content_sha256()
+    unsigned = re.sub(r"^sha256:.*\n?", "", text, flags=re.M)
     with replacing(path) as unfinished:
-        unfinished.write_text(f"{kept.rstrip()}\nsha256: {sha256}\n", encoding="utf-8")
-    return found.model_copy(update={"sha256": sha256})
+        unfinished.write_text(f"{unsigned.rstrip()}\nsha256: {sha256}\n", encoding="utf-8")
+    return calibration.model_copy(update={"sha256": sha256})
 
 
 def _contradiction(joint: JointCalibration) -> str:
@@ -218,7 +220,7 @@ def _contradiction(joint: JointCalibration) -> str:
     if travel > LONGEST_TRAVEL:
         return f"expected at most {LONGEST_TRAVEL} counts from min_counts to max_counts, found {travel}"
     if joint.operating_mode == POSITION and joint.max_counts >= PULSES_PER_TURN:
-        return f"max_counts {joint.max_counts} is beyond the turn to which operating mode {POSITION} keeps"
+        return f"max_counts {joint.max_counts} is beyond the one turn of operating mode {POSITION}"
     if joint.operating_mode not in model_named(joint.model).modes:
         return f"{joint.model} has no operating mode {joint.operating_mode}"
     return ""

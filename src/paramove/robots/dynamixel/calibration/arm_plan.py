@@ -1,4 +1,4 @@
-"""What an arm's description asks of its servos: which one drives which joint, and how it is calibrated."""
+"""The servos of an arm by its description: which one drives which joint, and how it is calibrated."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ ROLL = (
     "the hand turns counterclockwise, seen from behind the arm",
 )
 ANGLE = ("its angle grows, as its description has it", "its angle falls, as its description has it")
-"""Where a joint moves with a growing and with a falling angle."""
+"""How a joint moves with a growing and with a falling angle."""
 ROOM = math.radians(15.0)
-"""That a joint needs to show its direction."""
+"""That a joint needs to demonstrate its direction."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class PlannedServo:
         lower, upper: Range of the joint, rad.
         posture: Its angle in the posture in which the arm is held for calibration, rad.
         sign: 1 where the servo counts up with the angle in the arm as it is described, else -1.
-        grows: Whether its direction is shown with a growing angle; not where the posture leaves no room for that.
+        grows: Whether its direction is demonstrated with a growing angle; not where the posture has no room for it.
         direction: Where the joint moves then, in words.
         grips: Whether it holds with a limited current, in Current-based Position Control Mode.
     """
@@ -76,19 +76,19 @@ def load_plan(folder: Path) -> ArmPlan:
         raise InputError(
             f"{folder}: {robot.name} has no servos on a bus, expected `bus` and a `servo_id` of every joint"
         )
-    words = {} if robot.chain is None else _directions(robot.chain)
+    directions = {} if robot.chain is None else _directions(robot.chain)
     servos = []
-    for place, joint in enumerate(robot.joint_names):
-        grows = bool(robot.upper[place] >= ROOM)
+    for index, joint in enumerate(robot.joint_names):
+        grows = bool(robot.upper[index] >= ROOM)
         servo = PlannedServo(
             joint=joint,
-            number=robot.servo_ids[place],
-            model=model_named(robot.motors[place]).name,
-            lower=float(robot.lower[place]),
-            upper=float(robot.upper[place]),
-            sign=1 if robot.units.counts_per_rad[place] > 0 else -1,
+            number=robot.servo_ids[index],
+            model=model_named(robot.motors[index]).name,
+            lower=float(robot.lower[index]),
+            upper=float(robot.upper[index]),
+            sign=1 if robot.units.counts_per_rad[index] > 0 else -1,
             grows=grows,
-            direction=words.get(joint, ANGLE)[0 if grows else 1],
+            direction=directions.get(joint, ANGLE)[0 if grows else 1],
             grips=robot.chain is not None and robot.chain.grip_current_ma is not None and joint == robot.chain.gripper,
         )
         servos.append(servo)
@@ -97,6 +97,8 @@ def load_plan(folder: Path) -> ArmPlan:
 
 def _directions(chain: Chain) -> dict[str, tuple[str, str]]:
     """Of a yaw, three pitches, perhaps a roll, and the gripper."""
-    words = dict(zip(chain.joints, (YAW, PITCH, PITCH, PITCH, ROLL), strict=False))
+    directions = dict(zip(chain.joints, (YAW, PITCH, PITCH, PITCH, ROLL), strict=False))
     opens, closes = "the gripper opens", "the gripper closes"
-    return words | {chain.gripper: (opens, closes) if chain.gripper_open > chain.gripper_closed else (closes, opens)}
+    return directions | {
+        chain.gripper: (opens, closes) if chain.gripper_open > chain.gripper_closed else (closes, opens)
+    }

@@ -1,4 +1,4 @@
-"""Where the calibration of an arm is kept."""
+"""Where the calibration of an arm is stored."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DATA_VARIABLE = "PARAMOVE_DATA"
 
 
 def calibration_path(serial: str, data: Path | None = None) -> Path:
-    """Where the calibration of the arm behind this adapter is kept.
+    """Where the calibration of the arm behind this adapter is stored.
 
     Args:
         serial: USB serial number of the adapter.
@@ -24,7 +24,7 @@ def calibration_path(serial: str, data: Path | None = None) -> Path:
 
 
 def check_can_be_kept(path: Path) -> None:
-    """Look whether a calibration can be written there, before somebody takes the trouble. Raises OSError."""
+    """Check that a calibration can be written there, before a person begins it. Raises OSError."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     path.parent.mkdir(parents=True, exist_ok=True)

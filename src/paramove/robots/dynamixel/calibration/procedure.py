@@ -1,4 +1,4 @@
-"""Calibrates an arm together with the person who moves it: what is asked, measured and written, step by step."""
+"""Calibrates an arm together with the person who moves it: requests, measurements and writes, step by step."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from paramove.robots.dynamixel.calibration.sweep import SMALLEST_MOVE, JointSwee
 
 ATTEMPTS = 3
 GIVES_UP = 25
-"""Looks in a row without an answer from a servo, half a second or so."""
+"""Readings in a row without a reply of a servo, half a second or so."""
 
 
 class Person(Protocol):
     """Who moves the arm."""
 
-    def tell(self, sentence: str) -> None:
-        """Say something that needs no answer."""
+    def tell(self, message: str) -> None:
+        """Show a message that needs no answer."""
 
     def until_done(self, request: str, look: Callable[[], list[str]]) -> None:
-        """Ask for something, and call `look` again and again, showing its lines, until the person says it is done."""
+        """Show a request, and the lines of `look` again and again, until the person confirms that it is done."""
 
 
 class ArmCalibrator:
-    """One calibration. `run` asks, measures, writes the servos' settings and returns what is to be saved.
+    """One calibration. `run` guides the person, measures, writes the servos' settings and returns what to save.
 
     Args:
         chain: At the arm's baud rate.
@@ -51,11 +51,11 @@ class ArmCalibrator:
     def __init__(self, chain: ServoChain, plan: ArmPlan, serial: str, person: Person) -> None:
         self._chain, self._plan, self._serial, self._person = chain, plan, serial, person
         self._watch = PositionWatch({servo.number: model_named(servo.model) for servo in plan.servos})
-        self._silent = 0
+        self._misses = 0
 
     def run(self, created: str, tool: str) -> ArmCalibration:
         """Raises CalibrationError, ServoError and PortLostError; settings are written at the very end."""
-        found = self._found()
+        servos = self._detected()
         self._person.until_done("Hold the arm, it becomes limp.", list)
         self._release()
         travels = {sweep.joint: sweep.travel() for sweep in self._sweep()}
@@ -64,35 +64,35 @@ class ArmCalibrator:
         for servo in self._plan.servos:
             step = self._direction(servo)
             joints[servo.joint] = calibrated_joint(
-                found[servo.joint], servo, travels[servo.joint], held[servo.number], step
+                servos[servo.joint], servo, travels[servo.joint], held[servo.number], step
             )
         for servo in self._plan.servos:
             for remark in remarks(joints[servo.joint], servo):
                 self._person.tell(remark)
-        self._person.until_done("Move the arm and compare the angles with what you see.", lambda: self._angles(joints))
+        self._person.until_done("Move the arm and compare the angles with the real ones.", lambda: self._angles(joints))
         for joint in joints.values():
             write_settings(self._chain, joint)
         bus = CalibratedBus(serial=self._serial, baud_rate=self._plan.baud_rate)
         return ArmCalibration(created=created, tool=tool, robot=self._plan.robot, bus=bus, joints=joints)
 
-    def _found(self) -> dict[str, FoundServo]:
+    def _detected(self) -> dict[str, FoundServo]:
         """The servos by joint. Raises CalibrationError with all that are missing or of another model."""
-        found, wrong = {}, []
+        detected, wrong = {}, []
         for servo in self._plan.servos:
             pinged = self._chain.ping(servo.number)
             if pinged is None:
                 wrong.append(f"{servo.joint}: expected {servo.model} with ID {servo.number}, none answers")
                 continue
-            found[servo.joint] = looked_at(self._chain, pinged)
-            if found[servo.joint].model != servo.model:
-                told = found[servo.joint].name
-                wrong.append(f"{servo.joint}: expected {servo.model} with ID {servo.number}, found {told}")
+            detected[servo.joint] = looked_at(self._chain, pinged)
+            if detected[servo.joint].model != servo.model:
+                name = detected[servo.joint].name
+                wrong.append(f"{servo.joint}: expected {servo.model} with ID {servo.number}, found {name}")
         if wrong:
             raise CalibrationError(
-                f"at {self._plan.baud_rate}: {'; '.join(wrong)}; `paramove arm scan` shows who is there, `paramove arm "
+                f"at {self._plan.baud_rate}: {'; '.join(wrong)}; `paramove arm scan` lists the servos, `paramove arm "
                 "setup` gives IDs and baud rate"
             )
-        return found
+        return detected
 
     def _release(self) -> None:
         for servo in self._plan.servos:
@@ -103,14 +103,14 @@ class ArmCalibrator:
                     self._chain.write(servo.number, registers[name], 0)
 
     def _positions(self) -> dict[int, int]:
-        """Of all servos; of those alone that answered while an answer is missing now and then, or cannot be true."""
+        """Of all servos; without those whose reply is missing, or has a position that cannot be true."""
         numbers = [servo.number for servo in self._plan.servos]
         answers = self._watch.read(self._chain)
         while self._watch.jump is not None:  # a true position can be after a while, however fast the joint was moved
             self._watch.jump = None
             answers |= self._watch.read(self._chain)
-        self._silent = 0 if len(answers) == len(numbers) else self._silent + 1
-        if self._silent > GIVES_UP:
+        self._misses = 0 if len(answers) == len(numbers) else self._misses + 1
+        if self._misses > GIVES_UP:
             missing = next(number for number in numbers if number not in answers)
             raise ServoSilentError(missing, f"servo {missing} no longer answers: check its cable and its power")
         return {number: answer.values[POSITION] for number, answer in answers.items()}
@@ -142,13 +142,14 @@ class ArmCalibrator:
     def _held(self) -> dict[int, int]:
         posture = ", ".join(f"{servo.joint} {np.rad2deg(servo.posture):.0f} deg" for servo in self._plan.servos)
         self._person.until_done(
-            f"Hold the arm in its posture for calibration, which its description shows: {posture}.", self._shown
+            f"Hold the arm in its posture for calibration, which its description shows: {posture}.",
+            self._position_lines,
         )
         return self._all_positions()
 
-    def _shown(self) -> list[str]:
+    def _position_lines(self) -> list[str]:
         positions = self._positions()
-        return [f"{servo.joint}: {positions.get(servo.number, 'silent')}" for servo in self._plan.servos]
+        return [f"{servo.joint}: {positions.get(servo.number, 'no data')}" for servo in self._plan.servos]
 
     def _direction(self, servo: PlannedServo) -> int:
         """Counts by which the person moves the joint in the direction of a growing angle."""
@@ -167,7 +168,7 @@ class ArmCalibrator:
             moved = sweep.present - start
             if abs(moved) >= SMALLEST_MOVE:
                 break
-            self._person.tell(f"{servo.joint} is where it was: leave it there after you have moved it.")
+            self._person.tell(f"{servo.joint} is back at its start: leave it where you have moved it.")
         return moved if servo.grows else -moved
 
     def _angles(self, joints: dict[str, JointCalibration]) -> list[str]:

@@ -27,7 +27,7 @@ SETTINGS = (
     "Max Position Limit",
     "Min Position Limit",
 )
-"""Kept without power; written while torque is off."""
+"""Stored without power; written while torque is off."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Difference:
 
 
 def settings(joint: JointCalibration) -> dict[str, int]:
-    """Values of `SETTINGS` that its servo must have. In the other modes a servo does not look at its limits."""
+    """Values of `SETTINGS` that its servo must have. In the other modes a servo ignores its limits."""
     within_turn = joint.operating_mode == POSITION
     return {
         "Return Delay Time": 0,
@@ -70,29 +70,29 @@ def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tupl
     """Write what differs, with torque off, and read it back.
 
     Returns:
-        By register, what stood there and what stands there now.
+        By register, the value before and the value now.
 
     Raises:
         CalibrationError: The servo is of another model, its torque is on, or a value does not stay.
-        ServoError: It does not answer, or refuses.
+        ServoError: It does not reply, or rejects a value.
     """
-    found, model = chain.ping(joint.id), model_named(joint.model)
-    if found is None:
+    pinged, model = chain.ping(joint.id), model_named(joint.model)
+    if pinged is None:
         raise ServoSilentError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
-    if found.model_number != model.number:
-        told = model_name(found.model_number) or found.model_number
-        raise CalibrationError(f"servo {joint.id} is a {told}, expected {joint.model}: nothing was written to it")
+    if pinged.model_number != model.number:
+        found = model_name(pinged.model_number) or pinged.model_number
+        raise CalibrationError(f"servo {joint.id} is a {found}, expected {joint.model}: nothing was written to it")
     if chain.read(joint.id, model.registers["Torque Enable"]):
         raise CalibrationError(
             f"servo {joint.id} has torque, and its settings are locked: hold the arm and run `paramove arm reboot "
             f"{joint.id}`"
         )
-    before, wanted = read_settings(chain, joint), settings(joint)
-    changed = {name: (before[name], value) for name, value in wanted.items() if before[name] != value}
+    before, expected = read_settings(chain, joint), settings(joint)
+    changed = {name: (before[name], value) for name, value in expected.items() if before[name] != value}
     for name in changed:
-        chain.write(joint.id, model.registers[name], wanted[name])
+        chain.write(joint.id, model.registers[name], expected[name])
     after = read_settings(chain, joint)
-    for name, value in wanted.items():
+    for name, value in expected.items():
         if after[name] != value:
             raise CalibrationError(f"servo {joint.id}: {name} was written as {value}, but reads {after[name]}")
     return changed
@@ -100,10 +100,10 @@ def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tupl
 
 def compare(chain: ServoChain, calibration: ArmCalibration, plan: ArmPlan | None = None) -> list[Difference]:
     """Everything in which description and servos differ from the file. Reads only. Raises PortLostError."""
-    found = [] if plan is None else _with_description(calibration, plan)
+    differences = [] if plan is None else _with_description(calibration, plan)
     for name, joint in calibration.joints.items():
-        found += _with_servo(chain, name, joint)
-    return found
+        differences += _with_servo(chain, name, joint)
+    return differences
 
 
 def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
@@ -119,9 +119,9 @@ def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
         if pinged is None:
             raise ServoSilentError(joint.id, f"joint {name}: servo {joint.id} does not answer")
         if pinged.model_number != model_named(joint.model).number:
-            told = model_name(pinged.model_number) or pinged.model_number
+            found = model_name(pinged.model_number) or pinged.model_number
             raise CalibrationError(
-                f"joint {name}: servo {joint.id} is a {told}, not a {joint.model}: calibrate the arm"
+                f"joint {name}: servo {joint.id} is a {found}, not a {joint.model}: calibrate the arm"
             )
         read = read_settings(chain, joint)
         if read["Homing Offset"] != 0:
@@ -167,10 +167,10 @@ def _with_servo(chain: ServoChain, name: str, joint: JointCalibration) -> list[D
         return [Difference(name, "servo", f"ID {joint.id}", None, SERVO)]
     model = model_named(joint.model)
     if pinged.model_number != model.number:
-        told = model_name(pinged.model_number) or pinged.model_number
-        return [Difference(name, "model", joint.model, told, SERVO)]
+        found = model_name(pinged.model_number) or pinged.model_number
+        return [Difference(name, "model", joint.model, found, SERVO)]
     pairs = [("firmware", joint.firmware, pinged.firmware)]
 
-    found = read_settings(chain, joint)
-    pairs += [(register, value, found[register]) for register, value in settings(joint).items()]
+    actual = read_settings(chain, joint)
+    pairs += [(register, value, actual[register]) for register, value in settings(joint).items()]
     return [Difference(name, what, one, other, SERVO) for what, one, other in pairs if one != other]

@@ -1,4 +1,4 @@
-"""From a joint moved by hand to its calibration: positions are unwrapped, and the encoder's seam is found.
+"""From a joint moved by hand to its calibration: positions are unwrapped, and the encoder's seam is located.
 
 Pure arithmetic over positions as a servo presents them, with Homing Offset (20) at 0.
 """
@@ -26,14 +26,14 @@ from paramove.robots.dynamixel.calibration.arm_calibration import (
 from paramove.robots.dynamixel.calibration.arm_plan import PlannedServo
 
 LARGEST_STEP = PULSES_PER_TURN // 4
-"""Between two looks; with half a turn nobody could say which way it went."""
+"""Between two readings; with half a turn the direction would be ambiguous."""
 SMALLEST_TRAVEL = 57
 """Counts, 5 degrees: less is a joint that was not moved."""
 SMALLEST_MOVE = 34
 """Counts, 3 degrees, that show a direction."""
-SHOWN_TOLERANCE = float(np.deg2rad(3.0))
-"""By which the travel that was shown may fall short of the described range without a remark."""
-MIN_SHARE = 0.5
+TRAVEL_TOLERANCE = float(np.deg2rad(3.0))
+"""By which the demonstrated travel may fall short of the described range without a remark."""
+MIN_FRACTION = 0.5
 """Of the described range that must lie in the travel: less, and posture or direction were not as described."""
 
 
@@ -71,12 +71,12 @@ class JointSweep:
         self.lowest, self.highest = min(self.lowest, self.present), max(self.highest, self.present)
 
     def travel(self) -> Travel:
-        """What was shown. Raises CalibrationError if it cannot be used."""
+        """The demonstrated travel. Raises CalibrationError if it cannot be used."""
         length = self.highest - self.lowest
         if self._widest_step > LARGEST_STEP:
             raise CalibrationError(
-                f"joint {self.joint} moved by {self._widest_step} counts between two looks, at most {LARGEST_STEP} can "
-                "be followed: move it more slowly"
+                f"joint {self.joint} moved by {self._widest_step} counts between two readings, at most {LARGEST_STEP} "
+                "can be followed: move it more slowly"
             )
         if length < SMALLEST_TRAVEL:
             raise CalibrationError(
@@ -85,8 +85,8 @@ class JointSweep:
             )
         if length > LONGEST_TRAVEL:
             raise CalibrationError(
-                f"joint {self.joint} was moved by {length} counts, but after power was off its encoder can tell only "
-                f"{LONGEST_TRAVEL} of the {PULSES_PER_TURN} of a turn apart: turn it by at most "
+                f"joint {self.joint} was moved by {length} counts, but after power was off its encoder distinguishes "
+                f"only {LONGEST_TRAVEL} of the {PULSES_PER_TURN} of a turn: turn it by at most "
                 f"{LONGEST_TRAVEL * 360 // PULSES_PER_TURN} deg"
             )
         lowest = self.lowest % PULSES_PER_TURN
@@ -96,10 +96,10 @@ class JointSweep:
 def calibrated_joint(
     servo: FoundServo, planned: PlannedServo, travel: Travel, held: int, step: int
 ) -> JointCalibration:
-    """A joint's calibration from what the person showed.
+    """A joint's calibration from the person's movements.
 
     Args:
-        servo: As it was found.
+        servo: As it was detected.
         planned: As the arm's description has it.
         travel: From a sweep.
         held: Position in the posture for calibration.
@@ -128,38 +128,40 @@ def calibrated_joint(
     counts = joint.counts(held)
     if not travel.lowest - SEAM_MARGIN <= counts <= travel.highest + SEAM_MARGIN:
         raise CalibrationError(
-            f"joint {planned.joint}: the posture is at {counts} counts, outside of the travel of {travel.lowest} to "
-            f"{travel.highest} that was shown: calibrate again, and move the joint to both of its ends"
+            f"joint {planned.joint}: the posture is at {counts} counts, outside of the demonstrated travel of "
+            f"{travel.lowest} to {travel.highest}: calibrate again, and move the joint to both of its ends"
         )
     zero = round(counts - joint.sign * planned.posture * COUNTS_PER_RAD)
     joint = joint.model_copy(update={"zero_counts": zero})
     low, high = joint.travel
-    if min(high, planned.upper) - max(low, planned.lower) < MIN_SHARE * (planned.upper - planned.lower):
+    if min(high, planned.upper) - max(low, planned.lower) < MIN_FRACTION * (planned.upper - planned.lower):
         raise CalibrationError(
-            f"joint {planned.joint} would reach from {_degrees(low, high)}, its description says "
-            f"{_degrees(planned.lower, planned.upper)}: the posture was not the described one, the joint was moved the "
-            "other way, or not to both of its ends; calibrate again"
+            f"joint {planned.joint} would reach from {_degrees(low, high)}, its description has "
+            f"{_degrees(planned.lower, planned.upper)}: the posture was not the described one, the joint was moved in "
+            "the opposite direction, or not to both of its ends; calibrate again"
         )
     return joint
 
 
 def remarks(joint: JointCalibration, planned: PlannedServo) -> list[str]:
-    """What a person should know of a joint's calibration, if anything."""
-    told = []
+    """Remarks on a joint's calibration for a person, if any."""
+    messages = []
     low, high = joint.travel
-    if low > planned.lower + SHOWN_TOLERANCE or high < planned.upper - SHOWN_TOLERANCE:
-        told.append(
+    if low > planned.lower + TRAVEL_TOLERANCE or high < planned.upper - TRAVEL_TOLERANCE:
+        messages.append(
             f"joint {planned.joint} was moved from {_degrees(low, high)} of {_degrees(planned.lower, planned.upper)}: "
-            "it will be kept to that"
+            "it will stay within that"
         )
     if joint.sign != planned.sign:
-        told.append(f"joint {planned.joint} counts the other way than described: its servo is mounted mirrored")
-    if joint.operating_mode == EXTENDED:
-        told.append(
-            f"joint {planned.joint} crosses the seam of its encoder: it works in the extended mode, in which the servo "
-            "itself does not keep to limits"
+        messages.append(
+            f"joint {planned.joint} counts in the opposite direction to the description: its servo is mounted mirrored"
         )
-    return told
+    if joint.operating_mode == EXTENDED:
+        messages.append(
+            f"joint {planned.joint} crosses the seam of its encoder: it works in the extended mode, in which the servo "
+            "itself has no limits"
+        )
+    return messages
 
 
 def _degrees(low: float, high: float) -> str:

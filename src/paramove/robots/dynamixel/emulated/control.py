@@ -93,7 +93,7 @@ def tell(path: Path, line: str) -> str:
     """Say one line to the socket there, and get what comes behind `ok`.
 
     Raises:
-        InputError: Nobody listens there, or the line was refused.
+        InputError: Nobody listens there, or the line was rejected.
     """
     with socket.socket(socket.AF_UNIX) as caller:
         caller.settimeout(ANSWER_S)
@@ -114,11 +114,11 @@ def _clear_away(path: Path) -> None:
     if not path.exists():
         return
     if not path.is_socket():
-        raise InputError(f"{path} is there already and no socket: name another place for the control socket")
+        raise InputError(f"{path} is there already and no socket: name another path for the control socket")
     with socket.socket(socket.AF_UNIX) as caller:
         try:
             caller.connect(str(path))
         except OSError:
             path.unlink(missing_ok=True)
         else:
-            raise InputError(f"{path} is the control socket of a running program: name another place")
+            raise InputError(f"{path} is the control socket of a running program: name another path")

@@ -58,7 +58,7 @@ class DynamixelEmulator:
             others.
 
     Raises:
-        InputError: Something else is in the place of the link, or another emulator serves it.
+        InputError: Something else is at the path of the link, or another emulator serves it.
 
     Attributes:
         faults: What goes wrong on the wire; may be replaced at any time.
@@ -131,7 +131,7 @@ class DynamixelEmulator:
             ours = self.link.is_symlink() and os.readlink(self.link).startswith(PSEUDO_TERMINALS)
             if os.path.lexists(self.link) and not ours:
                 raise InputError(
-                    f"{self.link} is there already and no link to a pseudo-terminal: name another place for the port"
+                    f"{self.link} is there already and no link to a pseudo-terminal: name another path for the port"
                 )
             self.link.unlink(missing_ok=True)
             self.link.symlink_to(self.port)
@@ -229,6 +229,6 @@ def _claim(link: Path) -> socket.socket:
         if error.errno != errno.EADDRINUSE:
             raise
         raise InputError(
-            f"{link} is the port of another emulator, which is running: end that one, or name another place"
+            f"{link} is the port of another emulator, which is running: end that one, or name another path"
         ) from None
     return claim

@@ -89,7 +89,7 @@ class MujocoMechanics:
         """One millisecond with these efforts; something holds the blocked ones.
 
         Raises:
-            RuntimeError: The world is no longer to be believed; MuJoCo's warning is named.
+            RuntimeError: The simulation has become unstable; MuJoCo's warning is named.
         """
         self.data.qfrc_applied[self._dof] = 0.0
         self.model.dof_damping[:] = self._own_damping

@@ -45,11 +45,11 @@ class WireFaults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Raises InputError for a share that is none or a time that is negative."""
+        """Raises InputError for a fraction beyond 0 to 1 or a time that is negative."""
         for one in fields(self):
             value = getattr(self, one.name)
             if one.name not in ("late_s", "delay_s", "echo", "seed") and not 0.0 <= value <= 1.0:
-                raise InputError(f"{one.name} is a share of 0 to 1, found {value}")
+                raise InputError(f"{one.name} is a fraction of 0 to 1, found {value}")
         for name in ("late_s", "delay_s"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError(f"{name} is finite and not negative, found {getattr(self, name)}")
