@@ -34,8 +34,8 @@ class Generative(Likelihood, Protocol):
 class LikelihoodTest:
     """Compares ln p(X' | lambda) with the values of sequences that belong to the model.
 
-    The p-value of X' is the fraction of (K + 1) values, its own among them, that are not above its own: if X' is like
-    the K others, a p-value of at most `a` has probability at most `a`, whatever the model. It is never below 1 / (K + 1).
+    The p-value of X' is the fraction of (K + 1) values, including its own, that are not above its own: if X' is like
+    the K others, a p-value of at most `a` has probability at most `a` for any model. It is never below 1 / (K + 1).
 
     The thesis draws the K sequences from the model (`of_samples`). Frames of drawn sequences are independent, those of
     people are not, so people's movements should be compared with people's movements: held out of
