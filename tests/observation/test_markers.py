@@ -102,7 +102,7 @@ def test_an_arm_is_found(options, drawn, tolerance):
 def test_the_joint_lies_below_the_marker():
     inset = BodyTrackerOptions(markers={"elbow": ArucoMarker(91, inset=0.04)})
     found = StereoBodyTracker(EYES, inset).located([with_markers(eye) for eye in EYES])
-    np.testing.assert_allclose(found["elbow"].place, np.array(ARM["elbow"]) - 0.04 * TOWARDS, rtol=0, atol=0.006)
+    np.testing.assert_allclose(found["elbow"].position, np.array(ARM["elbow"]) - 0.04 * TOWARDS, rtol=0, atol=0.006)
     assert 0.0001 < found["elbow"].deviation < 0.003
     assert found["elbow"].residual_px < 1.0
 
