@@ -1,4 +1,4 @@
-"""The pictures of the page on tracking: what the filter sees and believes at four moments of one clip.
+"""The pictures of the page on tracking: what the filter sees and estimates at four times in one clip.
 
 python -m sim.performances --kind pointing --clips 1
 python docs/images/tracking.py --out docs/images/tracking.jpg
@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from paramove.action_space import ActionTracker, Grammar, PersonPlacement, Vocabulary, believed, table_action
+from paramove.action_space import ActionTracker, Grammar, PersonPlacement, Vocabulary, table_action, track_frame
 from paramove.observation import ArmObserver
 from sim.persons.clips import clips_folder, read_clip
 
@@ -28,22 +28,22 @@ def draw(out: Path, view: int) -> None:
     columns, wanted = [], list(MOMENTS_S)
     for time_s, images in zip(clip.times_s, clip.frames((view,)), strict=True):
         observer.look([images[view]])
-        belief = believed(tracker, observer, float(time_s))
+        estimate = track_frame(tracker, observer, float(time_s))
         if wanted and time_s >= wanted[0]:
             wanted.pop(0)
-            columns.append(column(images[view], observer, tracker, belief))
+            columns.append(column(images[view], observer, tracker, estimate))
     cv2.imwrite(str(out), np.hstack(columns)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 82])
 
 
-def column(image, observer, tracker, belief):
-    """One moment: the hypotheses, those with weight, the believed arm with the ball; what has changed."""
+def column(image, observer, tracker, estimate):
+    """One moment: the hypotheses, those with weight, the estimated arm with the ball; what has changed."""
     particles, rng = tracker.filter.particles, np.random.default_rng(0)
     poses = tracker.placement.in_world(particles.poses)
     before = outlined(image, observer, poses[rng.choice(len(poses), SHOWN, replace=False)], (255, 210, 60), 1)
     after = outlined(image, observer, poses[rng.choice(len(poses), SHOWN, p=particles.weights)], (90, 230, 255), 1)
-    found = outlined(image, observer, belief.pose[None], (60, 255, 100), 2)
-    place = SCALE * (observer.cameras[0].project(belief.targets[belief.action]) + 0.5)
-    sure = max(0.0, 1.0 - belief.theta[belief.action].deviation / 0.2)
+    found = outlined(image, observer, estimate.pose[None], (60, 255, 100), 2)
+    place = SCALE * (observer.cameras[0].project(estimate.targets[estimate.action]) + 0.5)
+    sure = max(0.0, 1.0 - estimate.theta[estimate.action].deviation / 0.2)
     colour = (round(255 * min(1.0, 2 - 2 * sure)), round(255 * min(1.0, 2 * sure)), 30)
     cv2.circle(found, tuple(place.round().astype(int).tolist()), 7, colour, -1, cv2.LINE_AA)
     change = observer.change(0)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from paramove.action_space import ActionBelief, ActionTracker, DetectedTarget, PersonPlacement, believed
+from paramove.action_space import ActionTracker, DetectedTarget, PersonPlacement, TrackEstimate, track_frame
 from paramove.observation import HAND, ArmObserver, Likelihood, ObservationOptions
 from paramove.phmm import ParametricHMM
 from sim.persons.clips import TABLE, Clip, read_clip
@@ -25,7 +25,7 @@ def tracked_clip(
     folder: Path, views: Sequence[int], likelihood: Likelihood = "matched", seed: int = 0, data: Path | None = None,
     known: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Tracks the clip of a folder and returns beliefs and truth of all frames as plain JSON.
+    """Tracks the clip of a folder and returns estimates and truth of all frames as plain JSON.
 
     The tracker gets images, calibrated cameras, the measured sizes and the measured shoulder; truth is read after it
     has ended.
@@ -44,7 +44,7 @@ def tracked_clip(
 
 
 class Follower:
-    """Tracks one clip frame by frame and keeps what is believed."""
+    """Tracks one clip frame by frame and stores the estimates."""
 
     def __init__(
         self, clip: Clip, views: Sequence[int], knowledge: Knowledge, likelihood: Likelihood, seed: int
@@ -55,7 +55,7 @@ class Follower:
         options = ObservationOptions(likelihood=likelihood)
         self._observer = ArmObserver(clip.sizes, cameras, options, table=TABLE, threads=1)
         self._tracker = ActionTracker(knowledge.vocabulary, knowledge.grammar, self.placement, seed=seed)
-        self._beliefs: list[ActionBelief] = []
+        self._estimates: list[TrackEstimate] = []
         self._detected: list[dict[str, Any]] = []
         self._seconds: list[float] = []
 
@@ -63,11 +63,11 @@ class Follower:
         """One frame."""
         begin = perf_counter()
         self._observer.look(images)
-        belief = believed(self._tracker, self._observer, time_s)
+        estimate = track_frame(self._tracker, self._observer, time_s)
         self._seconds.append(perf_counter() - begin)
-        self._beliefs.append(belief)
-        if belief.target is not None:
-            self._detect(time_s, belief.target)
+        self._estimates.append(estimate)
+        if estimate.target is not None:
+            self._detect(time_s, estimate.target)
 
     def _detect(self, time_s: float, target: DetectedTarget) -> None:
         """The latest word on each target, when it was first said, and all actions that it was said of."""
@@ -80,21 +80,21 @@ class Follower:
         last |= {"time_s": round(target.time_s, 4), "place": _lengths(place), "deviation": round(target.deviation, 4)}
 
     def found(self) -> dict[str, Any]:
-        """All beliefs, one entry per frame; lengths in m."""
-        beliefs, names = self._beliefs, self._knowledge.vocabulary.names
-        pointed = [self._knowledge.pointed(one.targets[one.action], self.placement) for one in beliefs]
-        posterior = np.array([[one.actions[name] for name in names] for one in beliefs])
-        histograms = np.array([one.tau_histogram for one in beliefs])
+        """All estimates, one entry per frame; lengths in m."""
+        estimates, names = self._estimates, self._knowledge.vocabulary.names
+        pointed = [self._knowledge.pointed(one.targets[one.action], self.placement) for one in estimates]
+        posterior = np.array([[one.actions[name] for name in names] for one in estimates])
+        histograms = np.array([one.tau_histogram for one in estimates])
         return {
-            "times_s": [round(one.time_s, 4) for one in beliefs],
-            "poses": _lengths([one.pose[:9] for one in beliefs]),
-            "best_hands": _lengths([one.pose_best[HAND] for one in beliefs]),
-            "hand_deviations": _lengths([np.sqrt(np.diagonal(one.hand_covariance)) for one in beliefs]),
-            "effective": [round(one.effective_sample_size, 1) for one in beliefs],
-            "lost": [int(one.lost) for one in beliefs],
+            "times_s": [round(one.time_s, 4) for one in estimates],
+            "poses": _lengths([one.pose[:9] for one in estimates]),
+            "best_hands": _lengths([one.pose_best[HAND] for one in estimates]),
+            "hand_deviations": _lengths([np.sqrt(np.diagonal(one.hand_covariance)) for one in estimates]),
+            "effective": [round(one.effective_sample_size, 1) for one in estimates],
+            "lost": [int(one.lost) for one in estimates],
             "actions": {name: np.round(posterior[:, i], 4).tolist() for i, name in enumerate(names)},
             "tau": {name: np.round(histograms[:, i], 3).tolist() for i, name in enumerate(names)},
-            "theta_deviation": [round(one.theta[one.action].deviation, 4) for one in beliefs],
+            "theta_deviation": [round(one.theta[one.action].deviation, 4) for one in estimates],
             "pointed": _lengths(pointed),
             "detected": self._detected,
             "seconds": [round(one, 5) for one in self._seconds],

@@ -28,8 +28,8 @@ def crossing(first, second):
 def pointed(place, rng):
     """Poses out to a place, at it, and back."""
     poses = arm_poses(PERSON.demonstrate("pointing", table_place(place), rng))
-    moment = int(np.searchsorted(phase(poses), 1.5))
-    return poses[:moment], poses[moment], poses[moment:]
+    state = int(np.searchsorted(phase(poses), 1.5))
+    return poses[:state], poses[state], poses[state:]
 
 
 def named(shown, action, names, duration_s):
@@ -75,12 +75,12 @@ def test_simple_and_dual_pointing_are_told_apart(vocabulary, rate_hz, places):
     tracker = ActionTracker(vocabulary, parsed_grammar(COMPLEX), seed=2)
     targets, redirected = {}, 0.0
     for frame in np.arange(0.0, len(poses) - 1, SAMPLE_RATE_HZ / rate_hz):
-        belief = tracker.update(frame / SAMPLE_RATE_HZ, gaussian(poses[round(frame)], 0.05))
-        redirected = max(redirected, belief.tau_histogram[1, 10:].sum())  # p(B, tau in [0.5, 1])
-        if belief.target is not None:
-            targets[belief.target.number] = belief.target.place
+        estimate = tracker.update(frame / SAMPLE_RATE_HZ, gaussian(poses[round(frame)], 0.05))
+        redirected = max(redirected, estimate.tau_histogram[1, 10:].sum())  # p(B, tau in [0.5, 1])
+        if estimate.target is not None:
+            targets[estimate.target.number] = estimate.target.place
     assert (redirected > 0.5) == (len(places) == 2)
     assert sorted(targets) == list(range(1, len(places) + 1))
     for number, place in enumerate(places, start=1):
         assert np.linalg.norm(targets[number] - table_place(place)) < 0.05
-    assert belief.actions["withdraw"] + belief.actions["point"] > 0.95, "back in the base pose"
+    assert estimate.actions["withdraw"] + estimate.actions["point"] > 0.95, "back in the base pose"

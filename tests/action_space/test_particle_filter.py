@@ -115,11 +115,11 @@ def test_evidence_of_dependent_frames_counts_less(pointing):
     np.testing.assert_allclose(found, [4.0, 2.0], rtol=1e-9)
 
 
-def test_beginning_again_keeps_the_share_that_stays(pointing):
+def test_beginning_again_keeps_the_fraction_that_stays(pointing):
     vocabulary = Vocabulary([pointing])
     filter_ = ParticleFilter(Propagation(vocabulary, Grammar.loop("pointing")), FilterOptions(100), seed=0)
     filter_.particles.tau[:] = 0.7
-    filter_.begin_again(share=0.3)
+    filter_.begin_again(fraction=0.3)
     assert len(filter_.particles) == 100
     assert (filter_.particles.tau == 0.7).sum() == 70
     assert (filter_.particles.tau == 0.0).sum() == 30
@@ -134,7 +134,7 @@ def test_options_are_checked():
         FilterOptions(min_effective=1.0)
 
 
-def test_exploring_moves_a_share_anywhere_and_keeps_all_weights(pointing):
+def test_exploring_moves_a_fraction_anywhere_and_keeps_all_weights(pointing):
     """Particles in the base pose, so that those that were moved are told by their progress."""
     propagation = Propagation(Vocabulary([pointing]), Grammar.loop("pointing"))
     made = ParticleFilter(propagation, FilterOptions(n_particles=2000), seed=3)

@@ -168,7 +168,7 @@ def test_the_same_seed_gives_the_same_particles():
 def test_options_are_checked():
     with pytest.raises(InputError, match="pace"):
         PropagationOptions(pace=-1.0)
-    with pytest.raises(InputError, match="share of at most"):
+    with pytest.raises(InputError, match=r"at most 0\.5"):
         PropagationOptions(mirrored=0.7)
 
 

@@ -35,14 +35,14 @@ def test_persons_of_any_size_are_followed_to_their_targets(pointing, rate_hz, sc
     placement = PersonPlacement((0.1, 0.3, 0.5), scale)
     times, poses = performed(PLACES, np.random.default_rng(7), rate_hz)
     made = tracker(pointing, placement=placement)
-    beliefs = track(made, times, poses)
-    hands = np.stack([belief.pose[-3:] for belief in beliefs]) - placement.in_world(poses)[:, -3:]
+    estimates = track(made, times, poses)
+    hands = np.stack([estimate.pose[-3:] for estimate in estimates]) - placement.in_world(poses)[:, -3:]
     assert np.sqrt((hands**2).mean(axis=0)).max() < 0.025
-    targets = {belief.target.number: belief.target for belief in beliefs if belief.target is not None}
+    targets = {estimate.target.number: estimate.target for estimate in estimates if estimate.target is not None}
     assert sorted(targets) == [1, 2]
     for number, place in enumerate(PLACES, start=1):
         assert np.linalg.norm(targets[number].place - placement.in_world(table_place(place))) < 0.04
-    assert not any(belief.lost or belief.degraded or belief.sentence for belief in beliefs)
+    assert not any(estimate.lost or estimate.degraded or estimate.detail for estimate in estimates)
 
 
 @pytest.mark.parametrize("rate_hz", [8.0, 50.0])
@@ -54,20 +54,20 @@ def test_the_way_of_the_thesis_is_there(pointing, rate_hz):
 
 def test_estimates_are_complete_and_consistent(pointing):
     times, poses = performed(PLACES[:1], np.random.default_rng(7), 15.0)
-    belief = track(tracker(pointing), times, poses, until_s=0.5 + 0.5 * 3.2)[-1]
-    assert belief.actions == {"pointing": pytest.approx(1.0)}
-    assert belief.action == "pointing"
-    assert belief.tau_histogram.shape == (1, 20)
-    assert belief.tau_histogram.sum() == pytest.approx(1.0)
-    assert belief.contact > 0.9
-    assert 1.0 <= belief.effective_sample_size <= 400.0
-    assert belief.theta["pointing"].deviation < 0.1
-    assert np.linalg.eigvalsh(belief.hand_covariance).min() >= 0.0
-    assert np.isfinite(belief.log_likelihood)
-    np.testing.assert_allclose(belief.targets["pointing"], table_place(belief.theta["pointing"].mean))
+    estimate = track(tracker(pointing), times, poses, until_s=0.5 + 0.5 * 3.2)[-1]
+    assert estimate.actions == {"pointing": pytest.approx(1.0)}
+    assert estimate.action == "pointing"
+    assert estimate.tau_histogram.shape == (1, 20)
+    assert estimate.tau_histogram.sum() == pytest.approx(1.0)
+    assert estimate.contact > 0.9
+    assert 1.0 <= estimate.effective_sample_size <= 400.0
+    assert estimate.theta["pointing"].deviation < 0.1
+    assert np.linalg.eigvalsh(estimate.hand_covariance).min() >= 0.0
+    assert np.isfinite(estimate.log_likelihood)
+    np.testing.assert_allclose(estimate.targets["pointing"], table_place(estimate.theta["pointing"].mean))
 
 
-def test_the_same_seed_gives_the_same_beliefs(pointing):
+def test_the_same_seed_gives_the_same_estimates(pointing):
     times, poses = performed(PLACES[:1], np.random.default_rng(7), 8.0)
     first, again, other = (track(tracker(pointing, seed=seed), times, poses)[-1] for seed in (3, 3, 4))
     np.testing.assert_array_equal(first.pose, again.pose)
@@ -80,20 +80,20 @@ def test_the_action_is_recognised(pointing, reaching):
     times, poses = performed(PLACES[:1], np.random.default_rng(7), 15.0)
     vocabulary = Vocabulary([pointing, reaching])
     made = ActionTracker(vocabulary, Grammar.choice(["pointing", "reaching"]), seed=1)
-    beliefs = [made.update(float(t), gaussian(pose, 0.015)) for t, pose in zip(times, poses, strict=True)]
-    assert 0.2 < beliefs[3].actions["pointing"] < 0.8, "nothing is known in the base pose"
-    middle = beliefs[np.searchsorted(times, 0.5 + 0.5 * 3.2)]
+    estimates = [made.update(float(t), gaussian(pose, 0.015)) for t, pose in zip(times, poses, strict=True)]
+    assert 0.2 < estimates[3].actions["pointing"] < 0.8, "nothing is known in the base pose"
+    middle = estimates[np.searchsorted(times, 0.5 + 0.5 * 3.2)]
     assert middle.actions["pointing"] > 0.9
 
 
 def test_a_sharp_likelihood_is_flattened(pointing):
     times, poses = performed(PLACES[:1], np.random.default_rng(7), 8.0)
-    made, beliefs = tracker(pointing), []
+    made, estimates = tracker(pointing), []
     for time_s, pose in zip(times, poses, strict=True):
-        beliefs.append(made.update(float(time_s), gaussian(pose, 0.003)))
-    assert min(belief.temper for belief in beliefs) < 0.5
-    assert min(belief.effective_sample_size for belief in beliefs[1:]) > 35.0
-    assert np.linalg.norm(beliefs[-1].target.place - table_place(PLACES[0])) < 0.04
+        estimates.append(made.update(float(time_s), gaussian(pose, 0.003)))
+    assert min(estimate.temper for estimate in estimates) < 0.5
+    assert min(estimate.effective_sample_size for estimate in estimates[1:]) > 35.0
+    assert np.linalg.norm(estimates[-1].target.place - table_place(PLACES[0])) < 0.04
 
 
 def test_an_arm_that_jumps_is_lost_and_found_again(pointing):
@@ -101,15 +101,15 @@ def test_an_arm_that_jumps_is_lost_and_found_again(pointing):
     poses = poses.copy()
     gone = (times > 1.2) & (times < 3.4)
     poses[gone] += 0.4  # something else is taken for the arm
-    beliefs = track(tracker(pointing), times, poses)
-    lost = np.array([belief.lost for belief in beliefs])
+    estimates = track(tracker(pointing), times, poses)
+    lost = np.array([estimate.lost for estimate in estimates])
     assert lost[(times > 2.2) & (times < 3.3)].all()
     assert not lost[times < 1.2].any()
     assert not lost[times > 4.6].any()
-    sentence = beliefs[int(np.flatnonzero(lost)[3])].sentence
-    assert "lost" in sentence
-    assert "no target is detected" in sentence
-    last = beliefs[-1].target
+    detail = estimates[int(np.flatnonzero(lost)[3])].detail
+    assert "lost" in detail
+    assert "no target is detected" in detail
+    last = estimates[-1].target
     assert np.linalg.norm(last.place - table_place(PLACES[1])) < 0.04, "the second performance is followed again"
 
 
@@ -119,17 +119,17 @@ def test_without_a_view_the_pose_is_predicted_and_becomes_less_certain(pointing,
     made = tracker(pointing)
     before = track(made, times, poses, until_s=1.2)[-1]
     for frame in range(1, 8):
-        belief = made.update(before.time_s + frame / 15.0, blind)
-        assert belief.degraded
-        assert np.isfinite(belief.pose).all()
-    assert "no usable view for 0.4 s" in belief.sentence
-    assert np.trace(belief.hand_covariance) > 1.5 * np.trace(before.hand_covariance)
+        estimate = made.update(before.time_s + frame / 15.0, blind)
+        assert estimate.degraded
+        assert np.isfinite(estimate.pose).all()
+    assert "no usable view for 0.4 s" in estimate.detail
+    assert np.trace(estimate.hand_covariance) > 1.5 * np.trace(before.hand_covariance)
     # It moves on by itself: nearer to where the hand is by then than to where it was.
-    now = poses[np.searchsorted(times, belief.time_s) - 1, -3:]
-    assert np.linalg.norm(belief.pose[-3:] - now) < np.linalg.norm(before.pose[-3:] - now)
-    seen = made.update(belief.time_s + 1.0 / 15.0, gaussian(now_pose(poses, times, belief.time_s), 0.04))
+    now = poses[np.searchsorted(times, estimate.time_s) - 1, -3:]
+    assert np.linalg.norm(estimate.pose[-3:] - now) < np.linalg.norm(before.pose[-3:] - now)
+    seen = made.update(estimate.time_s + 1.0 / 15.0, gaussian(now_pose(poses, times, estimate.time_s), 0.04))
     assert not seen.degraded
-    assert seen.sentence == ""
+    assert seen.detail == ""
 
 
 def now_pose(poses, times, time_s):
@@ -145,8 +145,8 @@ def test_particles_that_cannot_be_measured_have_no_weight(pointing):
         values[::2] = np.nan
         return values
 
-    belief = made.update(0.0, measure)
-    assert not belief.degraded
+    estimate = made.update(0.0, measure)
+    assert not estimate.degraded
     assert (made.filter.particles.weights[::2] == 0.0).all()
     assert made.update(0.1, lambda poses: np.full(len(poses), np.nan)).degraded
     assert made.update(0.2, lambda poses: np.full(len(poses), -np.inf)).degraded
@@ -157,13 +157,13 @@ def test_late_and_missing_frames(pointing):
     made = tracker(pointing)
     last = track(made, times, poses, until_s=1.2)[-1]
     late = made.update(last.time_s - 0.1, gaussian(poses[0]))
-    assert "0.100 s older than the last was left out" in late.sentence
+    assert "0.100 s older" in late.detail
     np.testing.assert_array_equal(late.pose, last.pose)
     # After a long gap the arm may be anywhere, also where the action is half done.
     far = arm_poses(poses)[len(poses) // 2]
     for frame in range(8):
-        belief = made.update(last.time_s + 5.0 + frame / 15.0, gaussian(far))
-    assert np.linalg.norm(belief.pose[-3:] - far[-3:]) < 0.05
+        estimate = made.update(last.time_s + 5.0 + frame / 15.0, gaussian(far))
+    assert np.linalg.norm(estimate.pose[-3:] - far[-3:]) < 0.05
 
 
 def test_a_wrong_number_of_likelihoods_is_an_error(pointing):

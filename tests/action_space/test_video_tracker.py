@@ -29,63 +29,63 @@ def tracker(parameters) -> VideoTracker:
 
 
 def tracked(video, times, streams):
-    moments = []
+    states = []
     for time_s, *images in zip(times, *streams, strict=True):
         for number, image in enumerate(images, start=1):
-            moments += video.see(f"camera_{number}", round(time_s * 1e9), image)
-    return moments
+            states += video.see(f"camera_{number}", round(time_s * 1e9), image)
+    return states
 
 
 def test_pointing_is_followed_to_its_target_by_two_cameras(parameters):
     times, poses = pointing((0.4, 0.6))
-    moments = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
-    assert len(moments) == len(times)
-    errors = np.array([moment.belief.pose[-3:] for moment in moments]) - poses[:, -3:]
+    states = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
+    assert len(states) == len(times)
+    errors = np.array([state.estimate.pose[-3:] for state in states]) - poses[:, -3:]
     assert np.median(np.linalg.norm(errors, axis=1)) < 0.03
-    target = moments[-1].belief.target
+    target = states[-1].estimate.target
     assert target is not None
     assert np.linalg.norm(target.place[:2] - table_place((0.4, 0.6))[:2]) < 0.05
-    assert {moment.n_views for moment in moments} == {2}
-    assert all(moment.trouble == "" for moment in moments)
+    assert {state.n_views for state in states} == {2}
+    assert all(state.trouble == "" for state in states)
 
 
 def test_the_ball_is_where_the_target_is_seen_and_becomes_certain(parameters):
     times, poses = pointing((0.4, 0.6))
-    moments = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
+    states = tracked(tracker(parameters), times, [drawn(poses, camera(1)), drawn(poses, camera(2))])
     arrived = int(np.argmin(np.linalg.norm(poses[:, -3:] - table_place((0.4, 0.6)), axis=1)))
-    there = moments[arrived + 2]
+    there = states[arrived + 2]
     assert np.linalg.norm(there.ball - camera(1).project(table_place((0.4, 0.6)))) < 8.0
-    assert there.pointed_deviation.max() < 0.5 * moments[3].pointed_deviation.max()
+    assert there.pointed_deviation.max() < 0.5 * states[3].pointed_deviation.max()
 
 
 def test_a_camera_that_falls_silent_is_named_and_the_other_goes_on(parameters):
     times, poses = pointing()
     video, first, second = tracker(parameters), drawn(poses, camera(1)), drawn(poses, camera(2))
-    moments = []
+    states = []
     for number, time_s in enumerate(times):
-        moments += video.see("camera_1", round(time_s * 1e9), next(first))
+        states += video.see("camera_1", round(time_s * 1e9), next(first))
         if number < 5:
-            moments += video.see("camera_2", round(time_s * 1e9), next(second))
-    assert moments[-1].n_views == 1
-    assert moments[-1].trouble == "camera_2 is silent"
+            states += video.see("camera_2", round(time_s * 1e9), next(second))
+    assert states[-1].n_views == 1
+    assert states[-1].trouble == "camera_2 sends no images"
 
 
 def test_a_dark_camera_counts_as_none_and_is_told(parameters):
     times, poses = pointing()
     dark = [np.random.default_rng(1).integers(0, 4, (120, 160, 3), dtype=np.uint8) for _ in times[:6]]
-    moments = tracked(tracker(parameters), times[:6], [list(drawn(poses[:6], camera(1))), dark])
-    assert {moment.n_views for moment in moments} == {1}
-    assert "camera_2 shows nothing: take off the lens cap" in moments[-1].trouble
-    assert not moments[-1].belief.degraded
+    states = tracked(tracker(parameters), times[:6], [list(drawn(poses[:6], camera(1))), dark])
+    assert {state.n_views for state in states} == {1}
+    assert "camera_2 is dark: take off the lens cap" in states[-1].trouble
+    assert not states[-1].estimate.degraded
 
 
 def test_all_cameras_dark_is_degraded_and_no_target(parameters):
     times, _ = pointing()
     dark = [[np.zeros((120, 160, 3), np.uint8)] * 6] * 2
-    moments = tracked(tracker(parameters), times[:6], dark)
-    assert moments[-1].belief.degraded
-    assert moments[-1].belief.target is None
-    assert "no usable view" in moments[-1].belief.sentence
+    states = tracked(tracker(parameters), times[:6], dark)
+    assert states[-1].estimate.degraded
+    assert states[-1].estimate.target is None
+    assert "no usable view" in states[-1].estimate.detail
 
 
 def test_an_image_of_another_size_is_left_out_and_told(parameters):
@@ -96,13 +96,13 @@ def test_an_image_of_another_size_is_left_out_and_told(parameters):
     )
 
 
-def test_the_same_images_give_the_same_beliefs(parameters):
+def test_the_same_images_give_the_same_estimates(parameters):
     times, poses = pointing()
     runs = [
         tracked(tracker(parameters), times[:20], [list(drawn(poses[:20], camera(n))) for n in (1, 2)]) for _ in range(2)
     ]
     for one, other in zip(*runs, strict=True):
-        np.testing.assert_array_equal(one.belief.pose, other.belief.pose)
+        np.testing.assert_array_equal(one.estimate.pose, other.estimate.pose)
 
 
 def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
@@ -115,7 +115,7 @@ def test_files_of_the_run_come_before_those_of_the_workspace(folder, tmp_path):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("upper_arm: 28", "upper_arm: Input should be less than 0.6; expected as"),
+        ("upper_arm: 28", "upper_arm: Input should be less than 0.6; expected for example"),
         ("upper_am: 0.28", "upper_am: Extra inputs are not permitted"),
         ("shoulder: [1, 2]", "shoulder.2: Field required"),
         ("shoulder: [", "person.yaml:1:12"),

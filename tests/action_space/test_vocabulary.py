@@ -46,7 +46,7 @@ def test_poses_are_drawn_from_the_density_of_the_model(pointing):
 
 
 def test_fewer_components_carry_most_of_the_variance(pointing):
-    few = ActionModel("few", pointing.model, 3.0, kept_variance=0.8)
+    few = ActionModel("few", pointing.model, 3.0, explained_variance=0.8)
     assert 0 < few.n_deviations < pointing.n_deviations
     covariance = pointing.model.at(np.full(2, 0.5)).covariances_
     kept = np.einsum("ndr,ndr->", few.factors, few.factors) / np.trace(covariance, axis1=1, axis2=2).sum()
@@ -98,9 +98,9 @@ def test_targets_are_places_on_the_table(pointing):
 
 
 def test_what_is_no_action_is_refused(pointing):
-    with pytest.raises(InputError, match="duration is positive"):
+    with pytest.raises(InputError, match=r"positive duration.* 0\.0 s"):
         ActionModel("a", pointing.model, 0.0)
-    with pytest.raises(InputError, match="one or more places of 2 components"):
+    with pytest.raises(InputError, match="one or more targets of 2 parameters"):
         ActionModel("a", pointing.model, 3.0, ("u", "v", "w"))
     with pytest.raises(InputError, match="different names"):
         Vocabulary([pointing, pointing])
@@ -121,7 +121,9 @@ def test_poses_may_tell_where_the_wrist_is():
     poses = Vocabulary([bent]).poses(np.zeros(len(theta), np.int64), theta, tau, deviation)
     assert poses.shape == (len(theta), 12)
     np.testing.assert_allclose(poses, bent.poses(theta, tau, deviation), rtol=0.0, atol=0.0)
-    with pytest.raises(InputError, match=r"as many numbers, found {'bent': 12, 'straight': 9}: train all of them with"):
+    with pytest.raises(
+        InputError, match=r"same size for all actions, found {'bent': 12, 'straight': 9}: train all of them with"
+    ):
         Vocabulary([bent, straight])
 
 

@@ -27,7 +27,11 @@ class KalmanToy:
         loadings[[2, 7], [1, 0]] = 0.4
         # A toy that never progresses: its duration is practically endless.
         self.action = toy_action(
-            duration_s=1e9, covariance=loadings @ loadings.T, bounds=(-50.0, 50.0), kept_variance=0.999999, seed=seed
+            duration_s=1e9,
+            covariance=loadings @ loadings.T,
+            bounds=(-50.0, 50.0),
+            explained_variance=0.999999,
+            seed=seed,
         )
         model = self.action.model
         self.observation = np.concatenate([model.weights, self.action.factors[0]], axis=1)

@@ -90,7 +90,7 @@ def test_the_path_joins_the_ends_by_allowed_steps(seed: int, n_first: int, n_sec
 def test_what_cannot_be_aligned_is_refused_with_its_reason() -> None:
     with pytest.raises(ValueError, match=r"patterns are 'A' and 'B', found 'C'"):
         warp(np.zeros((3, 1)), np.zeros((3, 1)), "C")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="equally many dimensions, found 2 and 3"):
+    with pytest.raises(ValueError, match="number of dimensions, found 2 and 3"):
         warp(np.zeros((3, 2)), np.zeros((3, 3)))
     with pytest.raises(ValueError, match="not finite"):
         warp(np.array([[0.0], [np.nan]]), np.zeros((2, 1)))

@@ -106,4 +106,4 @@ def test_compare_refuses_what_cannot_be_compared(trained, tmp_path):
     other = tmp_path / "other.npz"
     quick = ("--states", 10, "--frames", 50, "--leave-out", "none", "--parameters", "target_y")
     assert call("train", trained.table, "--out", other, *quick).exit_code == 0
-    assert "other points or parameters" in refused(78, "compare", trained.model, other)
+    assert "differ in points or parameters" in refused(78, "compare", trained.model, other)

@@ -81,7 +81,7 @@ def test_models_of_different_kinds_do_not_compete(trained, tmp_path):
     more = ("--action", "pointing", "--residuals", "independent", "--leave-out", "none")
     good("train", trained.both, "--out", tmp_path / "pointing.npz", *more)
     said = refused(78, "recognize", trained.table, "--model", trained.model, "--model", tmp_path / "pointing.npz")
-    assert "models that compete are of one kind" in said
+    assert "all with correlated residuals, or all with the same states" in said
 
 
 def test_beginnings(trained, tmp_path):

@@ -32,8 +32,8 @@ def test_says_what_it_did(trained, tmp_path):
         "QuadraticPHMM, degree 2, correlated residuals",
         "27, 9 thetas,",
         "target_x, m: -0.07 to 0.23; target_y, m: -0.58 to 0.22",
-        "10 of 4 to 6 frames; every movement brought to 50 frames",
-        "9 trainings, 27 movements asked, 12 of them outside the other thetas",
+        "10 of 4 to 6 frames; every movement resampled to 50 frames",
+        "9 trainings, 27 movements tested, 12 of them outside the other thetas",
         "% of the 95 % regions hold the label",
         "after time warping",
     ):

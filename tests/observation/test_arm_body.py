@@ -122,5 +122,5 @@ def test_what_is_no_arm_is_refused():
         ArmSizes.from_posture(np.arange(9.0))
     with pytest.raises(InputError, match="upper_arm"):
         ArmSizes(upper_arm=0.0)
-    with pytest.raises(InputError, match=r"\(M, 9\) expected"):
+    with pytest.raises(InputError, match=r"expected poses \(M, 9\)"):
         fitted_poses(np.zeros((3, 8)), SIZES)

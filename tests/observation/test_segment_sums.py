@@ -7,12 +7,12 @@ import pytest
 from paramove.observation.segment_sums import (
     BASE,
     FIELDS,
+    FRACTION,
     LANES,
     NX,
     NY,
     PX,
     PY,
-    SHARE,
     trial_sums,
     trial_sums_gathered,
     trial_sums_loaded,
@@ -28,7 +28,7 @@ def lanes():
     turn = 2.0 * np.pi * rng.uniform(size=SLOTS * LANES)
     values[PX], values[PY] = 20.0 + 60.0 * values[PX], 20.0 + 40.0 * values[PY]
     values[NX], values[NY] = np.cos(turn), np.sin(turn)
-    values[SHARE] = np.tile(np.arange(LANES) / LANES, SLOTS)
+    values[FRACTION] = np.tile(np.arange(LANES) / LANES, SLOTS)
     values[BASE] = rng.integers(IMAGES, size=SLOTS * LANES) * STRIDE * HEIGHT
     return values
 
@@ -38,7 +38,7 @@ def expected(images, lanes, slot, left, here, right, move):
     first, second = (lanes[:, (slot + i) * LANES : (slot + i + 1) * LANES].astype(np.float64) for i in range(2))
     found = []
     for rows, earlier, later in ((first, left, here + move), (second, here + move, right)):
-        shift = (1.0 - rows[SHARE]) * earlier + rows[SHARE] * later
+        shift = (1.0 - rows[FRACTION]) * earlier + rows[FRACTION] * later
         sums = []
         for nudge_x, nudge_y in ((-1e-4, -1e-4), (-1e-4, 1e-4), (1e-4, -1e-4), (1e-4, 1e-4)):
             x = np.floor(rows[PX] + shift * rows[NX] + nudge_x).astype(int)

@@ -69,7 +69,7 @@ def test_a_folder_that_cannot_be_made_costs_the_file_only(train, tmp_path, caplo
     (tmp_path / "file").write_text("")
     model = cached_model(LinearPHMM, "waving", "one person", train, tmp_path / "file" / "actions")
     assert model.description.source == f"one person, {CODE}"
-    assert "the trained model is not kept" in caplog.text
+    assert "the trained model is not cached" in caplog.text
 
 
 def test_no_file_is_no_model(tmp_path):

@@ -30,7 +30,7 @@ def test_a_body_tracker_finds_the_joints_of_a_person_who_points(seed, tmp_path):
                     for name, point in moment.points.items():
                         true = truth.get("hand" if name == "index" else name)
                         if true is not None:
-                            missed[name].append(np.linalg.norm(point.place - true))
+                            missed[name].append(np.linalg.norm(point.position - true))
     finally:
         world.close()
     assert len(missed["elbow"]) > 8

@@ -68,17 +68,17 @@ def test_interpolation_needs_every_theta():
     assert (result.by, result.folds) == ("repetition", 2)
 
 
-def test_the_edge_of_a_raster_is_inside_but_not_beyond_it():
-    raster = np.array([[x, y] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0, 2.0)])
+def test_the_edge_of_a_grid_is_inside_but_not_beyond_it():
+    grid = np.array([[x, y] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0, 2.0)])
     corner = np.array([0.0, 0.0])
-    rest = raster[1:]
+    rest = grid[1:]
     assert is_outside(corner, rest)
     assert not is_outside(np.array([1.0, 1.0]), rest)
     assert not is_outside(np.array([1.0, 0.0]), rest)
-    assert is_outside(np.array([1.0, -0.1]), raster)
+    assert is_outside(np.array([1.0, -0.1]), grid)
     line = np.array([[0.0, 0.0], [1.0, 1.0]])  # no area: only bounds count
     assert not is_outside(np.array([0.5, 0.5]), line)
-    assert is_outside(np.array([2.5]), raster[:, :1])
+    assert is_outside(np.array([2.5]), grid[:, :1])
 
 
 @settings(deadline=None, max_examples=30, derandomize=True)

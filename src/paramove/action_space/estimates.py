@@ -1,4 +1,4 @@
-"""What weighted particles say about action, parameters, progress and pose (thesis 6.4.5)."""
+"""Estimates from weighted particles: action, parameters, progress and pose (thesis 6.4.5)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ThetaEstimate:
 
     @property
     def deviation(self) -> float:
-        """One number like the deviations of the last place (u, v): fourth root of its determinant (6.15)."""
+        """One number like the deviations of the last target (u, v): fourth root of its determinant (6.15)."""
         return float(max(np.linalg.det(self.covariance[-2:, -2:]), 0.0) ** 0.25)
 
 
@@ -47,10 +47,10 @@ def probability_within(action: Ints, tau: Floats, weights: Floats, which: int, l
 
 def theta_estimate(theta: Floats, weights: Floats) -> ThetaEstimate:
     """Of the particles of one action, theta (K, P), weights (K,) not normalised (6.10)-(6.12)."""
-    shares = weights / weights.sum()
-    mean = shares @ theta
+    normalised = weights / weights.sum()
+    mean = normalised @ theta
     centred = theta - mean
-    return ThetaEstimate(mean, (centred * shares[:, None]).T @ centred)
+    return ThetaEstimate(mean, (centred * normalised[:, None]).T @ centred)
 
 
 def tau_histogram(action: Ints, tau: Floats, weights: Floats, n_actions: int, n_bins: int) -> Floats:
@@ -78,13 +78,13 @@ def refined_pose(poses: Floats, weights: Floats, first: Floats, widths: tuple[fl
     pose = first
     for width in widths:
         squared = ((poses - pose) ** 2).sum(axis=1) / width**2
-        shares = weights * np.exp(-0.5 * (squared - squared.min()))
-        total = float(shares.sum())
+        kernel_weights = weights * np.exp(-0.5 * (squared - squared.min()))
+        total = float(kernel_weights.sum())
         if total > 0.0:
-            pose = shares @ poses / total
+            pose = kernel_weights @ poses / total
     return np.asarray(pose)
 
 
 def hand_covariance(poses: Floats, weights: Floats) -> Floats:
-    """Covariance of the hand's place, m^2. Shape (3, 3)."""
+    """Covariance of the hand's position, m^2. Shape (3, 3)."""
     return theta_estimate(poses[:, HAND], weights).covariance

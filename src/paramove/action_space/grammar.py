@@ -53,7 +53,7 @@ class Switching:
     """Particles at the very beginning of an action change to another one that might have begun (6.7.2).
 
     Attributes:
-        share: of the particles, in each frame at 8 fps.
+        share: fraction of the particles, in each frame at 8 fps.
         before: for progress up to this.
     """
 
@@ -61,7 +61,7 @@ class Switching:
     before: float = 0.1
 
     def __post_init__(self) -> None:
-        """Raises InputError for shares that are none."""
+        """Raises InputError for values outside [0, 1]."""
         if not (0.0 <= self.share < 1.0 and 0.0 <= self.before <= 1.0):
             raise InputError(f"share and before of switching lie between 0 and 1, found {self.share}, {self.before}")
 
@@ -86,7 +86,7 @@ class Grammar:
 
     @classmethod
     def choice(cls, actions: list[str], n_places: int = 1, switching: Switching | None = None) -> Grammar:
-        """After each performance any of the actions (6.7.2, figure 6.23)."""
+        """After each execution any of the actions (6.7.2, figure 6.23)."""
         places = tuple("abcdefgh"[:n_places])
         followers = tuple(Follower(number, 1.0, (NEW,) * n_places) for number in range(len(actions)))
         steps = tuple(Step(action, action, places, followers) for action in actions)
@@ -150,25 +150,25 @@ class Grammar:
 
     def _leave(self, number: int, rows: Ints, step: Ints, theta: Floats, rng: np.random.Generator) -> None:
         followers = self.steps[number].followers
-        shares = np.cumsum([follower.weight for follower in followers])
-        chosen = np.searchsorted(shares / shares[-1], rng.random(len(rows)), side="right")
+        cumulative = np.cumsum([follower.weight for follower in followers])
+        chosen = np.searchsorted(cumulative / cumulative[-1], rng.random(len(rows)), side="right")
         before, drawn = theta[rows], rng.random((len(rows), theta.shape[1]))
         for index, follower in enumerate(followers):
             own = chosen == index
             step[rows[own]] = follower.step
             for place, source in enumerate(follower.binding):
                 to = slice(PLACE_SIZE * place, PLACE_SIZE * (place + 1))
-                given = drawn[:, to] if source == NEW else before[:, PLACE_SIZE * source : PLACE_SIZE * (source + 1)]
-                theta[rows[own], to] = given[own]
+                values = drawn[:, to] if source == NEW else before[:, PLACE_SIZE * source : PLACE_SIZE * (source + 1)]
+                theta[rows[own], to] = values[own]
 
     def switch(
-        self, step: Ints, origin: Ints, theta: Floats, tau: Floats, share: float, rng: np.random.Generator
+        self, step: Ints, origin: Ints, theta: Floats, tau: Floats, fraction: float, rng: np.random.Generator
     ) -> Ints:
-        """Changes a share of the particles at the beginning of a step to one that might have come instead; their rows.
+        """Changes a fraction of the particles at the beginning of a step to an alternative step, in place; their rows.
 
-        In place. A place that both steps have from the step before, or that is new in both, stays; others are drawn.
+        A place that both steps have from the step before, or that is new in both, stays; others are drawn.
         """
-        early = np.flatnonzero((tau <= self.switching.before) & (rng.random(len(tau)) < share))
+        early = np.flatnonzero((tau <= self.switching.before) & (rng.random(len(tau)) < fraction))
         switched = []
         for number in np.unique(origin[early]):
             choices = self._beginnings if number == BASE else self.steps[number].followers
@@ -190,13 +190,13 @@ class Grammar:
         self, old: Follower, new: Follower, rows: Ints, step: Ints, theta: Floats, rng: np.random.Generator
     ) -> None:
         before, drawn = theta[rows], rng.random((len(rows), theta.shape[1]))
-        left = list(enumerate(old.binding))
+        unmatched = list(enumerate(old.binding))
         for place, source in enumerate(new.binding):
-            alike = next((one for one in left if one[1] == source), None)
+            match = next((one for one in unmatched if one[1] == source), None)
             to = slice(PLACE_SIZE * place, PLACE_SIZE * (place + 1))
-            if alike is None:
+            if match is None:
                 theta[rows, to] = drawn[:, to]
                 continue
-            left.remove(alike)
-            theta[rows, to] = before[:, PLACE_SIZE * alike[0] : PLACE_SIZE * (alike[0] + 1)]
+            unmatched.remove(match)
+            theta[rows, to] = before[:, PLACE_SIZE * match[0] : PLACE_SIZE * (match[0] + 1)]
         step[rows] = new.step

@@ -7,7 +7,7 @@ after:
     - withdraw(a): 2               # twice as likely
   redirect(a, b): withdraw(b)
   withdraw(b): point(a)
-actions: {redirect: point_further} # a step that is not named as its action
+actions: {redirect: point_further} # a step whose name is not that of its action
 switching: {share: 0.2, before: 0.1}
 """
 
@@ -35,7 +35,7 @@ _CALL = re.compile(r"\s*([A-Za-z_]\w*)\s*\(\s*([A-Za-z_]\w*(?:\s*,\s*[A-Za-z_]\w
 
 
 class GrammarError(InputError):
-    """A grammar that cannot be used; the message begins with file, line and column of each finding."""
+    """A grammar that cannot be used; the message begins with file, line and column of each error."""
 
 
 class _Call(NamedTuple):
@@ -51,7 +51,7 @@ def read_grammar(path: Path) -> Grammar:
 
 
 def parsed_grammar(text: str, source: str = "grammar") -> Grammar:
-    """The grammar in a YAML text. Raises GrammarError with position, what was found, and what would have worked."""
+    """The grammar in a YAML text. Raises GrammarError with the location, the value found and what would work."""
     try:
         return _Reading(read_mapping(text, source, example=EXAMPLE)).grammar()
     except DocumentError as error:
@@ -59,7 +59,7 @@ def parsed_grammar(text: str, source: str = "grammar") -> Grammar:
 
 
 class _Reading:
-    """One document being read; every error is raised as DocumentError with its position."""
+    """One document being read; every error is raised as DocumentError with its location."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -73,7 +73,7 @@ class _Reading:
         for key in after:
             call = self._call(key, ("after", key))
             if call.name in heads:
-                raise self._error(("after", key), f"step {call.name!r} stands on the left side twice")
+                raise self._error(("after", key), f"step {call.name!r} is defined twice")
             heads[call.name] = call
         numbers = {name: number for number, name in enumerate(heads)}
         actions = self._actions(numbers)
@@ -85,25 +85,25 @@ class _Reading:
         return Grammar(tuple(steps), begin, self._switching())
 
     def _begin(self, heads: dict[str, _Call]) -> list[_Call]:
-        found = self._document.data.get("begin")
-        if found is None:
+        begin = self._document.data.get("begin")
+        if begin is None:
             raise self._error((), f"begin is missing: it names the step that starts from the base pose, as '{EXAMPLE}'")
-        listed = found if isinstance(found, list) else [found]
+        listed = begin if isinstance(begin, list) else [begin]
         if not listed:
             raise self._error(("begin",), "begin names at least one step")
-        places = [("begin", str(index)) if isinstance(found, list) else ("begin",) for index in range(len(listed))]
-        return [self._known(one, where, heads) for one, where in zip(listed, places, strict=True)]
+        paths = [("begin", str(index)) if isinstance(begin, list) else ("begin",) for index in range(len(listed))]
+        return [self._known(one, path, heads) for one, path in zip(listed, paths, strict=True)]
 
     def _followers(
         self, key: str, head: _Call, heads: dict[str, _Call], numbers: dict[str, int]
     ) -> tuple[Follower, ...]:
-        found = self._document.data["after"][key]
-        listed = found if isinstance(found, list) else [found]
+        entries = self._document.data["after"][key]
+        listed = entries if isinstance(entries, list) else [entries]
         if not listed:
-            raise self._error(("after", key), f"nothing follows {key!r}; the last step of a performance leads to begin")
+            raise self._error(("after", key), f"nothing follows {key!r}; the last step of a movement leads to begin")
         followers = []
         for index, entry in enumerate(listed):
-            where = ("after", key, str(index)) if isinstance(found, list) else ("after", key)
+            where = ("after", key, str(index)) if isinstance(entries, list) else ("after", key)
             text, weight = self._weighted(entry, where)
             call = self._known(text, where, heads)
             binding = tuple(head.places.index(place) if place in head.places else NEW for place in call.places)
@@ -123,7 +123,7 @@ class _Reading:
     def _known(self, text: Any, where: KeyPath, heads: dict[str, _Call]) -> _Call:
         call = self._call(text, where)
         if call.name not in heads:
-            message = f"step {call.name!r} is nowhere under 'after', so nothing could follow it"
+            message = f"step {call.name!r} is not defined under 'after', so nothing could follow it"
             raise self._error(where, f"{message}; {nearest(call.name, heads)}")
         expected = heads[call.name].places
         if len(call.places) != len(expected):
@@ -133,13 +133,13 @@ class _Reading:
         return call
 
     def _call(self, text: Any, where: KeyPath) -> _Call:
-        found = _CALL.fullmatch(text) if isinstance(text, str) else None
-        if found is None:
+        match = _CALL.fullmatch(text) if isinstance(text, str) else None
+        if match is None:
             raise self._error(where, f"expected a step with its places, such as 'point(a)', found {text!r:.80}")
-        places = tuple(place.strip() for place in found[2].split(","))
+        places = tuple(place.strip() for place in match[2].split(","))
         if len(set(places)) < len(places):
-            raise self._error(where, f"two places of {text!r} have one name")
-        return _Call(found[1], places)
+            raise self._error(where, f"two places of {text!r} have the same name")
+        return _Call(match[1], places)
 
     def _actions(self, numbers: dict[str, int]) -> dict[str, str]:
         actions = self._mapping("actions", {})
@@ -164,11 +164,11 @@ class _Reading:
             raise self._error(("switching",), str(error)) from error
 
     def _mapping(self, key: str, default: dict[str, Any] | None = None) -> dict[str, Any]:
-        found = self._document.data.get(key, default)
-        if not isinstance(found, dict) or (default is None and not found):
-            message = f"expected {key} as a mapping, found {found!r:.80}" if found else f"{key} is missing"
-            raise self._error((key,), f"{message}; it tells of each step what may follow, as 'point(a): withdraw(a)'")
-        return found
+        value = self._document.data.get(key, default)
+        if not isinstance(value, dict) or (default is None and not value):
+            message = f"expected {key} as a mapping, found {value!r:.80}" if value else f"{key} is missing"
+            raise self._error((key,), f"{message}; it lists what may follow each step, such as 'point(a): withdraw(a)'")
+        return value
 
     def _error(self, path: KeyPath, message: str) -> DocumentError:
         return self._document.error(path, message)

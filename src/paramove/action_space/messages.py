@@ -1,4 +1,4 @@
-"""What a tracked moment is on the bus: estimate, arm pose, outline in the image, and a ball where the arm points."""
+"""Bus messages of a tracked arm: estimate, pose, outline in the image, and a ball where the arm points."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
-from paramove.action_space.video_tracker import TrackedMoment
+from paramove.action_space.video_tracker import TrackedState
 from paramove.cameras import WORLD_FRAME
 from paramove.documents import Floats
 from paramove.msgs.action_estimate_pb2 import ActionEstimate, ActionParameter, Location
@@ -23,14 +23,14 @@ NAMES_IN_MESSAGES = {"shoulder": "shoulder", "elbow": "elbow", "hand": "index", 
 
 
 UNCERTAIN_M = 0.10
-"""Deviation of a target from which on nothing is known of it: the ball that shows it is red (figure 6.10)."""
+"""Deviation of a target from which on its certainty is 0 and its ball is red (figure 6.10)."""
 
 BALL_M = 0.03
 """Diameter of that ball."""
 
 
 class TablePlace(BaseModel):
-    """Where the table frame, in which cameras and person were measured, is in another frame, such as a robot's.
+    """Pose of the table frame, in which cameras and person were measured, in another frame, such as a robot's.
 
     Attributes:
         frame: Name of the other frame.
@@ -48,14 +48,14 @@ class TablePlace(BaseModel):
 
     def frame_from_table(self, points: Floats) -> Floats:
         """Points (..., 3), m, of the table frame in this one."""
-        return np.asarray(points @ self._turn.T + np.array([self.x, self.y, self.z]))
+        return np.asarray(points @ self._rotation.T + np.array([self.x, self.y, self.z]))
 
     def deviations(self, along_table: Floats) -> Floats:
         """Deviations (3,), m, along the table's axes, along the axes of this frame."""
-        return np.asarray(np.sqrt(self._turn**2 @ along_table**2))
+        return np.asarray(np.sqrt(self._rotation**2 @ along_table**2))
 
     @property
-    def _turn(self) -> Floats:
+    def _rotation(self) -> Floats:
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
@@ -75,98 +75,98 @@ def ball_colour(certain: float) -> tuple[float, float, float]:
 
 
 def estimate_message(
-    moment: TrackedMoment,
+    state: TrackedState,
     parameter_names: Mapping[str, Sequence[str]],
     particles: int,
     table: TablePlace = AT_TABLE,
 ) -> ActionEstimate:
-    """Everything that is believed, with places in the frame of `table`. `parameter_names` of each action."""
-    belief = moment.belief
+    """The whole estimate, with positions in the frame of `table`. `parameter_names` of each action."""
+    estimate = state.estimate
     message = ActionEstimate(
         frame=table.frame,
-        progress=belief.tau_histogram.sum(axis=0),
-        effective_sample_size=belief.effective_sample_size,
+        progress=estimate.tau_histogram.sum(axis=0),
+        effective_sample_size=estimate.effective_sample_size,
         particles=particles,
-        views=moment.n_views,
-        lost=belief.lost,
-        degraded=belief.degraded,
-        sentence=belief.sentence,
-        hand=_location(belief.pose[HAND], np.sqrt(np.diagonal(belief.hand_covariance)), table),
-        pointed=_location(moment.pointed, moment.pointed_deviation, table),
+        views=state.n_views,
+        lost=estimate.lost,
+        degraded=estimate.degraded,
+        sentence=estimate.detail,
+        hand=_location(estimate.pose[HAND], np.sqrt(np.diagonal(estimate.hand_covariance)), table),
+        pointed=_location(state.pointed, state.pointed_deviation, table),
     )
-    message.captured.FromNanoseconds(moment.captured_ns)
-    for name, probability in belief.actions.items():
+    message.captured.FromNanoseconds(state.captured_ns)
+    for name, probability in estimate.actions.items():
         action = message.actions.add(action=name, probability=probability)
-        if name in belief.theta:
-            theta = belief.theta[name]
+        if name in estimate.theta:
+            theta = estimate.theta[name]
             action.parameters.extend(
                 ActionParameter(name=one, mean=mean, deviation=deviation, covariance=row)
                 for one, mean, deviation, row in zip(
                     parameter_names[name], theta.mean, theta.deviations, theta.covariance, strict=True
                 )
             )
-    if belief.target is not None:
-        found = belief.target
-        message.target.number, message.target.action = found.number, found.action
-        message.target.arrived.FromNanoseconds(moment.captured_ns - round((belief.time_s - found.time_s) * 1e9))
-        message.target.location.CopyFrom(_location(found.place, moment.target_deviation, table))
+    if estimate.target is not None:
+        target = estimate.target
+        message.target.number, message.target.action = target.number, target.action
+        message.target.arrived.FromNanoseconds(state.captured_ns - round((estimate.time_s - target.time_s) * 1e9))
+        message.target.location.CopyFrom(_location(target.place, state.target_deviation, table))
     return message
 
 
-def arm_pose_message(moment: TrackedMoment) -> ArmPose:
-    """The believed posture; the hand's is the tip of the index finger. With the wrist if its action knows it."""
+def arm_pose_message(state: TrackedState) -> ArmPose:
+    """The estimated arm; its hand is the tip of the index finger. With the wrist if its action models it."""
     message = ArmPose(frame=WORLD_FRAME)
-    message.captured.FromNanoseconds(moment.captured_ns)
-    points = moment.belief.pose.reshape(-1, 3)
+    message.captured.FromNanoseconds(state.captured_ns)
+    points = state.estimate.pose.reshape(-1, 3)
     for name, (x, y, z) in zip(BENT_POSE_POINTS[: len(points)], points, strict=True):
         message.points.add(name=NAMES_IN_MESSAGES[name], x=x, y=y, z=z)
     return message
 
 
-def outline_message(moment: TrackedMoment) -> ImageAnnotations:
-    """The outline of the believed arm and the ball where it points, in the first camera's image."""
+def outline_message(state: TrackedState) -> ImageAnnotations:
+    """The outline of the estimated arm and the ball where it points, in the first camera's image."""
     message = ImageAnnotations()
-    message.timestamp.FromNanoseconds(moment.captured_ns)
+    message.timestamp.FromNanoseconds(state.captured_ns)
     points = message.points.add(type=PointsAnnotation.LINE_LOOP, thickness=2.0)
     points.timestamp.CopyFrom(message.timestamp)
-    colour = (1.0, 0.3, 0.2) if moment.belief.lost else (0.2, 1.0, 0.4)
+    colour = (1.0, 0.3, 0.2) if state.estimate.lost else (0.2, 1.0, 0.4)
     points.outline_color.r, points.outline_color.g, points.outline_color.b = colour
     points.outline_color.a = 1.0
-    for x, y in moment.outline:
+    for x, y in state.outline:
         points.points.add(x=x, y=y)
-    if np.isfinite(moment.ball).all():
+    if np.isfinite(state.ball).all():
         circle = message.circles.add(diameter=9.0, thickness=1.0)
         circle.timestamp.CopyFrom(message.timestamp)
-        circle.position.x, circle.position.y = moment.ball
-        colour = ball_colour(certainty(moment.pointed_deviation))
+        circle.position.x, circle.position.y = state.ball
+        colour = ball_colour(certainty(state.pointed_deviation))
         for part in (circle.fill_color, circle.outline_color):
             part.r, part.g, part.b = colour
             part.a = 1.0
     return message
 
 
-def scene_message(moment: TrackedMoment, table: TablePlace = AT_TABLE) -> SceneUpdate:
-    """The believed arm as lines and the ball where it points, in the frame of `table`."""
+def scene_message(state: TrackedState, table: TablePlace = AT_TABLE) -> SceneUpdate:
+    """The estimated arm as lines and the ball where it points, in the frame of `table`."""
     message = SceneUpdate()
     entity = message.entities.add(id="target", frame_id=table.frame)
-    entity.timestamp.FromNanoseconds(moment.captured_ns)
+    entity.timestamp.FromNanoseconds(state.captured_ns)
     entity.lifetime.FromMilliseconds(1000)
     ball = entity.spheres.add()
-    place = ball.pose.position
-    place.x, place.y, place.z = table.frame_from_table(moment.pointed)
+    position = ball.pose.position
+    position.x, position.y, position.z = table.frame_from_table(state.pointed)
     ball.pose.orientation.w = 1.0
     ball.size.x = ball.size.y = ball.size.z = BALL_M
-    ball.color.r, ball.color.g, ball.color.b = ball_colour(certainty(moment.pointed_deviation))
+    ball.color.r, ball.color.g, ball.color.b = ball_colour(certainty(state.pointed_deviation))
     ball.color.a = 1.0
     arm = entity.lines.add(thickness=0.02)
     arm.color.g = arm.color.a = 1.0
     arm.pose.orientation.w = 1.0
-    for x, y, z in table.frame_from_table(moment.belief.pose[:9].reshape(3, 3)):
+    for x, y, z in table.frame_from_table(state.estimate.pose[:9].reshape(3, 3)):
         arm.points.add(x=x, y=y, z=z)
     return message
 
 
-def _location(place: Floats, deviation: Floats, table: TablePlace) -> Location:
-    x, y, z = map(float, table.frame_from_table(place))
+def _location(position: Floats, deviation: Floats, table: TablePlace) -> Location:
+    x, y, z = map(float, table.frame_from_table(position))
     along = map(float, table.deviations(deviation))
     return Location(x=x, y=y, z=z, **dict(zip(("x_deviation", "y_deviation", "z_deviation"), along, strict=True)))

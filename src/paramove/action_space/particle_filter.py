@@ -13,7 +13,7 @@ from paramove.action_space.propagation import Particles, Propagation
 from paramove.documents import Floats, InputError, Ints
 
 ARRAYS = ("step", "origin", "theta", "tau", "deviation", "poses")
-"""Of particles, beside their weights."""
+"""Arrays of particles other than their weights."""
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,12 @@ class FilterOptions:
 
     Attributes:
         n_particles: 400 in the thesis.
-        resample_below: particles are resampled when their effective number is below this share of them; otherwise they
-            keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
-        min_effective: if a likelihood leaves fewer effective particles than this share, it is flattened until it
-            leaves so many: with several views it is sharper than 400 particles are dense. 0 never flattens.
+        resample_below: particles are resampled when their effective number is below this fraction of them; otherwise
+            they keep their weights, which loses less. 1.0 selects in every frame, as the thesis does.
+        min_effective: if a likelihood leaves fewer effective particles than this fraction, it is flattened until it
+            leaves that many: with several views it is sharper than 400 particles are dense. 0 never flattens.
         evidence_rate_hz: frames that follow each other faster are not independent (the same shadow misleads all of
-            them): together they count as so many a second. inf takes each frame for all, as the thesis does.
+            them): together they count as that many a second. inf counts each frame fully, as the thesis does.
     """
 
     n_particles: int = 400
@@ -36,7 +36,7 @@ class FilterOptions:
     evidence_rate_hz: float = 20.0
 
     def __post_init__(self) -> None:
-        """Raises InputError for numbers that are none of these."""
+        """Raises InputError for numbers out of range."""
         if self.n_particles < 2:
             raise InputError(f"n_particles is at least 2, found {self.n_particles}")
         if not (0.0 <= self.resample_below <= 1.0 and 0.0 <= self.min_effective < 1.0):
@@ -53,13 +53,13 @@ class FilterOptions:
         return cls(resample_below=1.0, min_effective=0.0, evidence_rate_hz=float("inf"))
 
     def independence(self, elapsed_s: float) -> float:
-        """Exponent of the likelihood of a frame that comes so long after the one before; 1 for the first."""
+        """Exponent of the likelihood of a frame that comes `elapsed_s` after the one before; 1 for the first."""
         return min(1.0, elapsed_s * self.evidence_rate_hz) if elapsed_s > 0.0 else 1.0
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What measuring did.
+    """Result of measuring one frame.
 
     Attributes:
         best: largest log-likelihood of a particle, nats.
@@ -84,7 +84,7 @@ class ParticleFilter:
         self.particles = propagation.at_base(self.options.n_particles, self.rng)
 
     def resample(self) -> None:
-        """Draws particles by their weights, where few of them carry the weight."""
+        """Draws particles by their weights, if few of them carry the weight."""
         weights = self.particles.weights
         if effective_number(weights) < self.options.resample_below * len(weights) * (1.0 + 1e-9):
             self.particles = self.particles.taken(systematic_resampling(weights, self.rng))
@@ -96,9 +96,9 @@ class ParticleFilter:
     def measure(self, log_likelihoods: Floats, independence: float = 1.0) -> Measurement:
         """Weights the particles by the likelihood of the pose of each (6.7), to the power `independence`."""
         particles = self.particles
-        wanted = self.options.min_effective * len(particles)
+        n_effective = self.options.min_effective * len(particles)
         flattened = independence * log_likelihoods
-        temper = tempering(particles.weights, flattened, wanted)
+        temper = tempering(particles.weights, flattened, n_effective)
         with np.errstate(divide="ignore"):
             joint = np.log(particles.weights) + temper * flattened
         evidence = log_sum(np.log(np.maximum(particles.weights, 1e-300)) + log_likelihoods)
@@ -106,9 +106,9 @@ class ParticleFilter:
         self.particles = replace(particles, weights=weights / weights.sum())
         return Measurement(float(log_likelihoods.max()), evidence, temper, effective_number(self.particles.weights))
 
-    def explore(self, share: float) -> None:
-        """Moves about that share of the particles anywhere, each with the weight it had."""
-        rows = np.flatnonzero(self.rng.random(len(self.particles)) < share)
+    def explore(self, fraction: float) -> None:
+        """Moves about this fraction of the particles anywhere; their weights stay."""
+        rows = np.flatnonzero(self.rng.random(len(self.particles)) < fraction)
         if len(rows):
             drawn = self.propagation.anywhere(len(rows), self.rng)
             arrays = {name: getattr(self.particles, name).copy() for name in ARRAYS}
@@ -116,14 +116,14 @@ class ParticleFilter:
                 arrays[name][rows] = getattr(drawn, name)
             self.particles = replace(self.particles, **arrays)
 
-    def begin_again(self, share_anywhere: float = 0.0, share: float = 1.0) -> None:
-        """Replaces a share of the particles by new ones in the base pose, of these a share by ones anywhere."""
-        n_new = round(share * len(self.particles))
-        n_anywhere = round(share_anywhere * n_new)
+    def begin_again(self, fraction_anywhere: float = 0.0, fraction: float = 1.0) -> None:
+        """Replaces a fraction of the particles by new ones in the base pose, `fraction_anywhere` of them anywhere."""
+        n_new = round(fraction * len(self.particles))
+        n_anywhere = round(fraction_anywhere * n_new)
         new = [self.propagation.at_base(n_new - n_anywhere, self.rng)] if n_new > n_anywhere else []
         new += [self.propagation.anywhere(n_anywhere, self.rng)] if n_anywhere else []
-        kept = len(self.particles) - n_new
-        old = [self.particles.taken(systematic_resampling(self.particles.weights, self.rng, kept))] if kept else []
+        n_old = len(self.particles) - n_new
+        old = [self.particles.taken(systematic_resampling(self.particles.weights, self.rng, n_old))] if n_old else []
         self.particles = joined([*old, *new])
 
 
@@ -147,7 +147,7 @@ def systematic_resampling(weights: Floats, rng: np.random.Generator, n_drawn: in
 
 
 def effective_number(weights: Floats) -> float:
-    """1 / sum of squared normalised weights: M for equal ones, 1 if one has all."""
+    """1 / sum of squared normalised weights: M for equal ones, 1 if a single particle has all the weight."""
     return float(weights.sum() ** 2 / np.maximum((weights**2).sum(), 1e-300))
 
 
@@ -157,8 +157,8 @@ def log_sum(values: Floats) -> float:
     return maximum + float(np.log(np.exp(values - maximum).sum()))
 
 
-def tempering(weights: Floats, log_likelihoods: Floats, wanted: float) -> float:
-    """Greatest exponent in (0, 1] with which weights times likelihoods have `wanted` effective particles, or 1e-6."""
+def tempering(weights: Floats, log_likelihoods: Floats, n_effective: float) -> float:
+    """Largest exponent in (0, 1] that leaves `n_effective` effective particles, or 1e-6."""
     with np.errstate(divide="ignore"):
         logs = np.log(weights)
 
@@ -166,10 +166,10 @@ def tempering(weights: Floats, log_likelihoods: Floats, wanted: float) -> float:
         joint = logs + exponent * log_likelihoods
         return effective_number(np.exp(joint - joint.max()))
 
-    if effective(1.0) >= wanted:
+    if effective(1.0) >= n_effective:
         return 1.0
     low, high = 1e-6, 1.0
     for _ in range(20):
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if effective(middle) >= wanted else (low, middle)
+        low, high = (middle, high) if effective(middle) >= n_effective else (low, middle)
     return low

@@ -11,28 +11,28 @@ from paramove.demonstrations import RESTING_SHOULDER, ArmLengths
 from paramove.documents import Floats, InputError
 
 SCALES = (0.3, 2.0)
-"""Arm lengths over the demonstrator's: a figure of a small robot's size to more than any person. Millimetres lie far
-outside."""
+"""Arm lengths relative to the demonstrator's: from a small humanoid robot to more than any person. Lengths in mm are
+far outside."""
 
 
 @dataclass(frozen=True)
 class PersonPlacement:
-    """A similarity about the resting shoulder (thesis 6.4.1, where persons and models differ in place only).
+    """A similarity about the resting shoulder (thesis 6.4.1, where persons and models differ in position only).
 
     World and model have the same directions: x forward, y left, z up, m.
 
     Attributes:
         shoulder: the person's resting shoulder in the world, m.
-        scale: arm length of the person over that of the demonstrator.
+        scale: arm length of the person divided by that of the demonstrator.
     """
 
     shoulder: tuple[float, float, float] = tuple(map(float, RESTING_SHOULDER))  # type: ignore[assignment]
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        """Raises InputError for a place or a size that is none."""
+        """Raises InputError for a position that is not finite or a scale out of range."""
         if len(self.shoulder) != 3 or not np.isfinite(self.shoulder).all():
-            raise InputError(f"a shoulder is at three finite coordinates in m, found {self.shoulder}")
+            raise InputError(f"expected three finite coordinates of the shoulder in m, found {self.shoulder}")
         if not SCALES[0] <= self.scale <= SCALES[1]:
             raise InputError(
                 f"an arm is {SCALES[0]} to {SCALES[1]} times as long as the demonstrator's, found {self.scale:.3g}; "

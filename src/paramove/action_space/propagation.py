@@ -1,4 +1,4 @@
-"""How particles move from one frame to the next (thesis 6.4.4, corrected), alike at any frame rate."""
+"""How particles move from one frame to the next (thesis 6.4.4, corrected), the same at any frame rate."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from paramove.action_space.vocabulary import PLACE_SIZE, Vocabulary
 from paramove.documents import Floats, InputError, Ints
 
 THESIS_RATE_HZ = 8.0
-"""The diffusions of 6.4.4 are told per frame at this rate. Here their variances grow with time, so that they are the
+"""The diffusions of 6.4.4 are given per frame at this rate. Here their variances grow with time, so that they are the
 same per second at any rate, and at 8 Hz exactly the thesis's."""
 LONGEST_STEP_S = 0.25
 AT_TARGET = 0.8
-"""Where the hand depends on its place by more than this share of the most, the arm is at its target."""
+"""The arm is at its target where the hand depends on it by more than this fraction of the maximum."""
 
 
 @dataclass(frozen=True)
 class PropagationOptions:
-    """Diffusions as standard deviations per frame at 8 Hz, and what the thesis does not have.
+    """Diffusions as standard deviations per frame at 8 Hz, and additions to the thesis.
 
     `PropagationOptions.thesis()` gives 6.4.4 alone.
 
@@ -28,19 +28,19 @@ class PropagationOptions:
         pace: relative deviation of the progress, x ~ N(0, pace^2).
         theta: deviation of theta at tau = 0; sigma(tau) = theta exp(-theta_decay tau).
         theta_decay: 2 ln 4 in the thesis (the printed sign grows).
-        theta_share: if positive, no diffusion of theta is larger than this share of its deviation in the posterior, so
-            that a target that is known stays known. 0 leaves this out.
-        theta_floor: but no smaller than this share of sigma(tau): a posterior may be narrow at a wrong place.
-        theta_min: deviation of components that the grammar hands over, and the least of all others.
-        deviation_memory_s: time in which the deviation of a performance from its mean changes; 0 draws it anew in every
+        theta_share: if positive, no diffusion of theta is larger than this fraction of its deviation in the posterior,
+            so that a target that is known stays known. 0 leaves this out.
+        theta_floor: but no smaller than this fraction of sigma(tau): a posterior may be narrow around a wrong target.
+        theta_min: deviation of components that the grammar hands over, and the minimum of all others.
+        deviation_memory_s: time in which the deviation of an execution from the mean changes; 0 draws it anew in every
             frame, as the thesis does.
-        deviation_renewed: share of particles whose deviation is drawn anew all the same.
-        mirrored: share of particles that change to the progress at which the way back looks like the way out.
-        from_base: share of particles that begin again from the base pose.
-        from_prior: share of particles whose theta is drawn anew while theta is not known yet.
+        deviation_renewed: fraction of particles whose deviation is drawn anew in addition.
+        mirrored: fraction of particles that change to the progress of a similar pose in the opposite direction.
+        from_base: fraction of particles that begin again from the base pose.
+        from_prior: fraction of particles whose theta is drawn anew while theta is not known yet.
         known_theta: deviation (6.15) below which theta is known.
-        retargeted: share of the particles at their target whose last place moves by a larger step while the progress
-            stays, for a stretched arm that slides on to another target; 0 leaves this out.
+        retargeted: fraction of the particles at their target whose last target moves by a larger step while the
+            progress stays, for a stretched arm that slides on to another target; 0 leaves this out.
         retarget: deviation of such a step of theta.
     """
 
@@ -60,13 +60,13 @@ class PropagationOptions:
     retarget: float = 0.15
 
     def __post_init__(self) -> None:
-        """Raises InputError for what is no deviation, share or time."""
+        """Raises InputError for values out of range."""
         for name, value in vars(self).items():
             if not 0.0 <= value < np.inf:
                 raise InputError(f"{name} is finite and not negative, found {value}")
         for name in ("deviation_renewed", "mirrored", "from_base", "from_prior", "retargeted"):
             if getattr(self, name) > 0.5:
-                raise InputError(f"{name} is a share of at most 0.5, found {getattr(self, name)}")
+                raise InputError(f"{name} is a fraction of at most 0.5, found {getattr(self, name)}")
 
     @classmethod
     def thesis(cls) -> PropagationOptions:
@@ -91,7 +91,7 @@ class Particles:
         origin: number of the step before, BASE for those that began from the base pose, shape (M,).
         theta: parameters, padded behind to the longest, shape (M, P).
         tau: progress in [0, 1], shape (M,).
-        deviation: standardised deviation of this performance from the mean, shape (M, R).
+        deviation: standardised deviation of this execution from the mean, shape (M, R).
         poses: drawn poses x^n, m, in the frame of the models, shape (M, 9).
         weights: pi^n, sum 1, shape (M,).
     """
@@ -134,7 +134,7 @@ class Propagation:
         return self._posed(step, theta, np.zeros(n_particles), rng)
 
     def anywhere(self, n_particles: int, rng: np.random.Generator) -> Particles:
-        """Particles in any step at any progress with theta from the prior: for an arm of which nothing is known."""
+        """Particles in any step at any progress, theta from the prior: for an arm in an unknown pose."""
         step = rng.integers(len(self.actions), size=n_particles)
         theta = rng.random((n_particles, self.vocabulary.n_parameters))
         return self._posed(step, theta, rng.random(n_particles), rng)
@@ -181,11 +181,11 @@ class Propagation:
         theta[:] = reflected(theta, low[:, None], high[:, None])
 
     def _retarget(self, step: Ints, theta: Floats, tau: Floats, frames: float, rng: np.random.Generator) -> None:
-        """Some of the performances at their target go on to another: the place makes a step, the progress stays."""
-        share = per_step(self.options.retargeted, frames)
-        if share == 0.0:
+        """Moves the target of some particles that have reached it; the progress stays."""
+        fraction = per_step(self.options.retargeted, frames)
+        if fraction == 0.0:
             return
-        chosen = rng.random(len(tau)) < share
+        chosen = rng.random(len(tau)) < fraction
         steps = self.options.retarget * rng.standard_normal((len(tau), PLACE_SIZE))
         for number in np.unique(step[chosen]):
             action = self.vocabulary.actions[self.actions[number]]
@@ -205,14 +205,14 @@ class Propagation:
         known: Floats,
         rng: np.random.Generator,
     ) -> None:
-        """Keeps hypotheses that images hardly tell apart alive."""
+        """Keeps alternative hypotheses alive that images hardly distinguish."""
         options, draws = self.options, rng.random(len(tau))
         mirrored, base = per_step(options.mirrored, frames), per_step(options.from_base, frames)
         for number in np.unique(step) if options.mirrored > 0.0 else ():
             table = self.vocabulary.actions[self.actions[number]].mirrored
             rows = np.flatnonzero((step == number) & (draws < mirrored))
-            there = table[np.rint(np.clip(tau[rows], 0.0, 1.0) * (len(table) - 1)).astype(np.int64)]
-            tau[rows] = np.where(there >= 0.0, there, tau[rows])
+            mirror_tau = table[np.rint(np.clip(tau[rows], 0.0, 1.0) * (len(table) - 1)).astype(np.int64)]
+            tau[rows] = np.where(mirror_tau >= 0.0, mirror_tau, tau[rows])
         rows = np.flatnonzero((draws >= mirrored) & (draws < mirrored + base))
         if len(rows):
             step[rows], theta[rows] = self.grammar.beginning(len(rows), theta.shape[1], rng)
@@ -222,12 +222,12 @@ class Propagation:
         theta[:] = np.where(chosen[:, None] & self._free[step], rng.random(theta.shape), theta)
 
     def _remembered(self, deviation: Floats, elapsed_s: float, rng: np.random.Generator) -> Floats:
-        """First-order autoregression that keeps a standard normal distribution."""
+        """First-order autoregression whose stationary distribution is the standard normal."""
         memory = self.options.deviation_memory_s
-        kept = np.exp(-elapsed_s / memory) if memory > 0.0 else 0.0
+        retained = np.exp(-elapsed_s / memory) if memory > 0.0 else 0.0
         renewed = per_step(self.options.deviation_renewed, elapsed_s * THESIS_RATE_HZ)
-        share = np.where(rng.random(len(deviation)) < renewed, 0.0, kept)[:, None]
-        return np.asarray(share * deviation + np.sqrt(1.0 - share**2) * rng.standard_normal(deviation.shape))
+        factor = np.where(rng.random(len(deviation)) < renewed, 0.0, retained)[:, None]
+        return np.asarray(factor * deviation + np.sqrt(1.0 - factor**2) * rng.standard_normal(deviation.shape))
 
     def _theta_deviations(self, particles: Particles) -> Floats:
         """Standard deviation of each component of theta for each action, shape (A, P)."""
@@ -248,13 +248,13 @@ class Propagation:
         return Particles(step, origin, theta, tau, deviation, poses, np.full(len(step), 1.0 / len(step)))
 
 
-def per_step(share: float, frames: float) -> float:
-    """Share in a step of so many frames (of 8 Hz) that amounts to `share` in each frame."""
-    return float(1.0 - (1.0 - share) ** frames)
+def per_step(fraction: float, frames: float) -> float:
+    """Fraction in a step of `frames` frames (of 8 Hz) that corresponds to `fraction` in each frame."""
+    return float(1.0 - (1.0 - fraction) ** frames)
 
 
 def reflected(values: Floats, low: Floats, high: Floats) -> Floats:
-    """Values folded into [low, high]: what goes beyond a bound comes back by as much."""
+    """Values folded into [low, high]: values beyond a bound are reflected at it."""
     width = high - low
     folded = np.mod(values - low, 2.0 * width)
     return np.asarray(low + np.where(folded > width, 2.0 * width - folded, folded))

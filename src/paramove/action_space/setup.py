@@ -1,4 +1,4 @@
-"""What a tracker is made of, as parameters of its process: cameras, person, actions, grammar."""
+"""Parameters of a tracker's process: cameras, person, actions, grammar."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from paramove.observation import ArmObserver, ArmSizes
 from paramove.phmm import ParametricHMM, PolynomialPHMM
 
 MIN_GROWN = 0.8
-"""Arm length of grown people over the demonstrator's, at least."""
+"""Minimum arm length of adults, relative to the demonstrator's."""
 SYNTHETIC = ("pointing", "reaching")
 
 
@@ -59,14 +59,14 @@ class Person(BaseModel):
 
 
 def read_person(path: Path) -> Person:
-    """The person of a YAML file. Raises InputError if there is none or it holds something else."""
+    """The person of a YAML file. Raises InputError if it is missing or invalid."""
     example = "shoulder: [-0.27, -0.18, 0.35], upper_arm: 0.28, forearm: 0.24, hand: 0.17, all in m"
     try:
-        remedy = f"it tells a person's measures, as {example}"
+        remedy = f"it holds a person's measures, such as {example}"
         return Person.model_validate(read_document(path, "file of a person", remedy=remedy).data)
     except ValidationError as error:
-        found = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
-        raise InputError(f"{path}: {found}; expected as {example}") from error
+        errors = "; ".join(f"{'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors())
+        raise InputError(f"{path}: {errors}; expected for example {example}") from error
 
 
 def measured_person(run_folder: Path, path: Path | None) -> Person:
@@ -81,13 +81,13 @@ class TrackingSetup(BaseModel):
         cameras: Calibration file; its cameras are camera_1, camera_2, … in their order.
         person: File of the person's measures; without one, the synthetic demonstrator's.
         table: Corners of the table's top in order, (x, y) in m in its frame; it hides an arm that hangs below.
-        table_place: Where the table frame is in the frame in which estimates shall be, such as a robot's.
-        actions: "pointing" or "reaching" on the table as the synthetic demonstrator shows them, or files of models of
-            arm poses over (u, v).
+        table_place: Pose of the table frame in the frame of the estimates, such as a robot's.
+        actions: "pointing" or "reaching" on the table as the synthetic demonstrator performs them, or files of models
+            of arm poses over (u, v).
         grammar: File; without one, any of the actions follows any.
         particles: Hypotheses.
-        min_log_likelihood: Of the best hypothesis, nats; below it for half a second the arm is lost, however used the
-            track is to it. For cameras that see the arm now and then only; None: lost only where it was better before.
+        min_log_likelihood: Of the best hypothesis, nats; below it for half a second the arm is lost, whatever is
+            usual for the track. For cameras that see the arm only at times; None: lost only by comparison with earlier.
         rate_hz: Of the cameras.
         seed: Of the filter.
     """
@@ -106,7 +106,7 @@ class TrackingSetup(BaseModel):
     seed: int = Field(default=0, ge=0)
 
     def video_tracker(self, run_folder: Path = Path()) -> VideoTracker:
-        """Reads the files, trains and compiles what is not there yet. Raises InputError."""
+        """Reads the files, trains and compiles what is not cached yet. Raises InputError."""
         cameras = measured_cameras(run_folder, self.cameras)
         person = measured_person(run_folder, self.person)
         vocabulary = Vocabulary([_action(name) for name in self.actions])
@@ -124,7 +124,7 @@ class TrackingSetup(BaseModel):
 
 
 def _detection(scale: float) -> DetectionOptions:
-    """How far and fast a hand goes between targets, of an arm so long; grown people's are all measured alike."""
+    """Options for the size of a person: adults all use the defaults."""
     return DetectionOptions() if scale > MIN_GROWN else DetectionOptions().scaled(scale)
 
 
@@ -135,12 +135,13 @@ def _action(name: str) -> ActionModel:
     path = Path(name)
     if not path.is_file():
         raise InputError(
-            f"action {name!r}: {', '.join(SYNTHETIC)} or the file of a model expected, and there is no such file",
+            f"action {name!r}: {', '.join(SYNTHETIC)} or the file of a model expected; this file does not exist",
             missing=True,
         )
     model = ParametricHMM.load(path)
     if not isinstance(model, PolynomialPHMM):
         raise InputError(
-            f"{path}: a {type(model).__name__} found, a polynomial model expected: paramove train --model quadratic"
+            f"{path}: expected a polynomial model, found a {type(model).__name__}: train one with "
+            "paramove train --model quadratic"
         )
     return ActionModel.from_file_model(model)

@@ -1,4 +1,4 @@
-"""When the hand has reached a target, and which (thesis 6.7.1.2, corrected: a signed speed along the approach)."""
+"""Detects when the hand has reached which target (thesis 6.7.1.2, corrected: a signed speed along the approach)."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ class DetectionOptions:
 
     Attributes:
         max_deviation: of theta, (6.15); 0.2 in the thesis.
-        min_contact: posterior probability that the progress is one at which the hand is where theta says.
+        min_contact: posterior probability that the progress is one at which the hand is at the target theta.
         window_s: over which the hand's velocity is measured; at least three frames.
-        approach_speed: m/s, the hand goes somewhere. A slower one does so once it has gone `min_travel_m`.
-        still_speed: m/s, that of a hand that rests, as it is measured.
-        stop_share: the hand has arrived when its speed along the approach is below this share of the largest: 0 in the
-            thesis, but the measured speed of a hand that rests need not cross 0.
+        approach_speed: m/s; a hand this fast approaches a target. A slower one does once it has moved `min_travel_m`.
+        still_speed: m/s, measured speed of a hand at rest.
+        stop_share: the hand has arrived when its speed along the approach is below this fraction of the peak: 0 in the
+            thesis, but the measured speed of a hand at rest need not cross 0.
         turning_s: time over which the direction of the approach follows a curved path.
-        min_travel_m: a hand that did not go as far since it arrived is still at the same target, and targets are so
-            far apart unless it went `returned_m` between them.
-        returned_m: as far a hand goes that points at one place twice.
+        min_travel_m: a hand that has moved less since it arrived is still at the same target. Two targets are at least
+            this far apart unless the hand moved `returned_m` between them.
+        returned_m: distance that a hand moves that points at the same target twice.
     """
 
     max_deviation: float = 0.2
@@ -48,7 +48,7 @@ class DetectionOptions:
             raise InputError(f"still_speed < approach_speed, found {self.still_speed} and {self.approach_speed}")
 
     def scaled(self, factor: float) -> DetectionOptions:
-        """The same for movements that are so much larger and take as long."""
+        """The same for movements that are `factor` times as large and take as long."""
         lengths = ("approach_speed", "still_speed", "min_travel_m", "returned_m")
         return replace(self, **{name: factor * getattr(self, name) for name in lengths})
 
@@ -59,9 +59,9 @@ class DetectedTarget:
 
     Attributes:
         number: counts the targets of a track from 1; the same target keeps its number while it becomes more certain.
-        time_s: when the hand arrived; for the first time, where it left the place a little and came back.
+        time_s: when the hand arrived, for the first time if it left the target a little and returned.
         action: name.
-        theta: coordinates (u, v) of the place, shape (2,). covariance: of them, (2, 2).
+        theta: coordinates (u, v) of the target, shape (2,). covariance: of them, (2, 2).
         place: in the world, m, (3,).
         deviation: of theta (6.15), mean over the frames of the rest.
     """
@@ -80,44 +80,44 @@ class HandMotion:
 
     def __init__(self, options: DetectionOptions) -> None:
         self._options = options
-        self._seen: deque[tuple[float, Floats]] = deque()
+        self._samples: deque[tuple[float, Floats]] = deque()
         self._approach = np.zeros(3)
         self.peak = 0.0
         self.speed = 0.0
         self.along = 0.0
 
     def update(self, time_s: float, hand: Floats) -> None:
-        """Takes a place of the hand, (3,), m."""
-        elapsed_s = time_s - self._seen[-1][0] if self._seen else 0.0
-        self._seen.append((time_s, hand))
-        while len(self._seen) > 3 and self._seen[1][0] < time_s - self._options.window_s:
-            self._seen.popleft()
+        """Takes a position of the hand, (3,), m."""
+        elapsed_s = time_s - self._samples[-1][0] if self._samples else 0.0
+        self._samples.append((time_s, hand))
+        while len(self._samples) > 3 and self._samples[1][0] < time_s - self._options.window_s:
+            self._samples.popleft()
         velocity = self._velocity()
         self.speed = float(np.linalg.norm(velocity))
         self.along = float(velocity @ self._approach) / max(float(np.linalg.norm(self._approach)), 1e-9)
         self.peak = max(self.peak, self.speed)
-        kept = float(np.exp(-elapsed_s / self._options.turning_s))
-        self._approach = kept * self._approach + (1.0 - kept) * velocity
+        retained = float(np.exp(-elapsed_s / self._options.turning_s))
+        self._approach = retained * self._approach + (1.0 - retained) * velocity
 
     @property
     def stopped(self) -> bool:
-        """Whether the speed along the approach is nearly 0, or has crossed it; not where a swift path only bends."""
+        """Whether the speed along the approach is nearly 0, or has crossed 0; not where a fast path only bends."""
         still = max(self._options.still_speed, self._options.stop_share * self.peak)
         return self.along < 0.0 or (self.along < still and self.speed < 2.0 * still)
 
     def begin_approach(self) -> None:
-        """The approach that begins now has a largest speed and a direction of its own."""
+        """Resets peak speed and direction for a new approach."""
         self.peak = self.along = self.speed
         self._approach = self._velocity()
 
     def _velocity(self) -> Floats:
-        """Slope of the places over time by least squares, (3,), m/s."""
-        if len(self._seen) < 2:
+        """Slope of the positions over time by least squares, (3,), m/s."""
+        if len(self._samples) < 2:
             return np.zeros(3)
-        times = np.array([time for time, _ in self._seen])
-        places = np.stack([place for _, place in self._seen])
+        times = np.array([time for time, _ in self._samples])
+        positions = np.stack([position for _, position in self._samples])
         centred = times - times.mean()
-        return np.asarray(centred @ (places - places.mean(axis=0)) / max(float(centred @ centred), 1e-12))
+        return np.asarray(centred @ (positions - positions.mean(axis=0)) / max(float(centred @ centred), 1e-12))
 
 
 class TargetDetector:
@@ -132,27 +132,28 @@ class TargetDetector:
         self._weight = 0.0
         self._rested_at: Floats | None = None
         self._travelled_m = 0.0
-        self._came_m = np.inf
+        self._distance_m = np.inf
 
     def update(
-        self, time_s: float, hand: Floats, contact: float, action: str, theta: ThetaEstimate, place: Floats
+        self, time_s: float, hand: Floats, contact: float, action: str, theta: ThetaEstimate, position: Floats
     ) -> DetectedTarget | None:
         """The latest target, which this frame may add or make more certain.
 
         Args:
-            hand: estimated place of the hand, m, (3,), world. contact: posterior probability of a progress at which
-                the hand is where theta says.
-            action: the most probable one, with the estimate `theta` (u, v) and its `place` in the world, m.
+            hand: estimated position of the hand, m, (3,), world. contact: posterior probability of a progress at which
+                the hand is at the target theta.
+            action: the most probable one, with the estimate `theta` (u, v) of its target. position: of the target in
+                the world, m.
         """
         self.passed(time_s, hand)
         options = self.options
         certain = contact >= options.min_contact and theta.deviation < options.max_deviation
         if self._arrived_s is not None and certain:
-            self._take(self._arrived_s, action, theta, place)
+            self._take(self._arrived_s, action, theta, position)
         return self.latest
 
     def passed(self, time_s: float, hand: Floats) -> DetectedTarget | None:
-        """A frame in which the hand, (3,), m, is at no place."""
+        """A frame in which the hand, (3,), m, is at no target."""
         motion = self.motion
         motion.update(time_s, hand)
         if self._rested_at is not None:
@@ -166,23 +167,23 @@ class TargetDetector:
         return self.latest
 
     def forget(self) -> None:
-        """The track was lost: no approach is under way."""
+        """Ends the approach under way: the track was lost."""
         self.motion = HandMotion(self.options)
         self._approaching, self._arrived_s, self._rested_at = False, None, None
 
     def _arrive(self, time_s: float, hand: Floats) -> None:
         self._approaching, self._arrived_s = False, time_s
         if self._rested_at is None or self._travelled_m >= self.options.min_travel_m:
-            self._came_m = np.inf if self._rested_at is None else self._travelled_m
+            self._distance_m = np.inf if self._rested_at is None else self._travelled_m
             self._rested_at, self._weight = hand, 0.0
         elif self._weight > 0.0 and self.latest is not None:
             self._arrived_s = self.latest.time_s
         self._travelled_m = 0.0
 
-    def _take(self, arrived_s: float, action: str, theta: ThetaEstimate, place: Floats) -> None:
+    def _take(self, arrived_s: float, action: str, theta: ThetaEstimate, position: Floats) -> None:
         """Means over the frames of one rest, weighted by their certainty."""
         weight = 1.0 / max(theta.deviation, 1e-3) ** 2
-        again = self.latest is not None and self._same(place)
+        again = self.latest is not None and self._same(position)
         number = 1 if self.latest is None else self.latest.number + (0 if again else 1)
         if self.latest is not None and again:
             arrived_s = self.latest.time_s
@@ -190,16 +191,16 @@ class TargetDetector:
         if self._weight > 0.0 and self.latest is not None:
             number = self.latest.number
             if self.latest.action == action:
-                share = weight / (self._weight + weight)
-                mean = self.latest.theta + share * (mean - self.latest.theta)
-                covariance = self.latest.covariance + share * (covariance - self.latest.covariance)
-                place = self.latest.place + share * (place - self.latest.place)
-                deviation = self.latest.deviation + share * (deviation - self.latest.deviation)
+                gain = weight / (self._weight + weight)
+                mean = self.latest.theta + gain * (mean - self.latest.theta)
+                covariance = self.latest.covariance + gain * (covariance - self.latest.covariance)
+                position = self.latest.place + gain * (position - self.latest.place)
+                deviation = self.latest.deviation + gain * (deviation - self.latest.deviation)
         self._weight += weight
-        self.latest = DetectedTarget(number, arrived_s, action, mean, covariance, place, deviation)
+        self.latest = DetectedTarget(number, arrived_s, action, mean, covariance, position, deviation)
 
-    def _same(self, place: Floats) -> bool:
-        """Whether a place at which the hand just arrived is the latest target, which it left only a little."""
-        if self.latest is None or self._came_m >= self.options.returned_m:
+    def _same(self, position: Floats) -> bool:
+        """Whether the position at which the hand just arrived is the latest target, which it left only a little."""
+        if self.latest is None or self._distance_m >= self.options.returned_m:
             return False
-        return float(np.linalg.norm(place - self.latest.place)) < self.options.min_travel_m
+        return float(np.linalg.norm(position - self.latest.place)) < self.options.min_travel_m

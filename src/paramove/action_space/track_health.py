@@ -1,4 +1,4 @@
-"""Whether a track still follows its arm: the best likelihood beside what is usual for this track."""
+"""Whether a track still follows its arm: the best likelihood compared with what is usual for this track."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from paramove.documents import InputError
 from paramove.observation import Presence
 
-KEPT_SHARE = 0.9
-"""Of the largest change: while the arm is lost it must fall below that."""
+HYSTERESIS = 0.9
+"""While the arm is lost, the change of the images must fall below this fraction of the maximum."""
 
 
 @dataclass(frozen=True)
@@ -18,20 +18,20 @@ class HealthOptions:
     """When a track counts as lost, and as found again; times in seconds, so that the frame rate does not matter.
 
     Attributes:
-        settle_s: as long a track learns what is usual before it can be lost.
+        settle_s: time for which a track learns what is usual before it can be lost.
         memory_s: over which the usual is learned.
-        rise: share of `memory_s` in which it becomes better: a while before a contrasting background raises no demands
-            on what follows, and an arm that is gone must not hide in how much better a swift one was.
-        drop_deviations: the best log-likelihood is far below the usual beyond so many usual deviations downwards.
-        min_drop, max_drop: nats, of the likelihood flattened as it usually is; but not within the one, and in any
-            case beyond the other.
-        min_log_likelihood: nats; far below in any case. None: not known.
-        lost_after_s: lost when it is far below for so long.
-        found_after_s: found when it is not for so long.
-        found_share: of what is allowed; while the arm is lost it must come back so near.
-        min_there: of -1 to 1, see `Presence`; less means that but the background is seen where the arm should be.
-        max_changed: times the arm's area; more means that somebody left or came, or that a camera was moved.
-        absent_after_s: lost when one of both is so for so long.
+        rise: fraction of `memory_s` in which it becomes better: a short time before a contrasting background must not
+            raise the demands on what follows, nor a fast, well matched arm hide that it is gone later.
+        drop_deviations: a drop by more than this many usual downward deviations is far below the usual.
+        min_drop, max_drop: nats, of the likelihood flattened as it usually is; a smaller drop than the one is never,
+            a larger than the other always far below.
+        min_log_likelihood: nats; a lower one is always far below. None: no limit.
+        lost_after_s: lost when the likelihood is far below for this long.
+        found_after_s: found again when it is not for this long.
+        found_fraction: of the allowed drop; while the arm is lost, the drop must be smaller than this fraction of it.
+        min_there: of -1 to 1, see `Presence`; less means that only the background is visible where the arm should be.
+        max_changed: changed area, times the arm's; more means that somebody left or came, or that a camera was moved.
+        absent_after_s: lost when either limit is exceeded for this long.
     """
 
     settle_s: float = 0.6
@@ -43,7 +43,7 @@ class HealthOptions:
     min_log_likelihood: float | None = None
     lost_after_s: float = 0.5
     found_after_s: float = 0.3
-    found_share: float = 0.5
+    found_fraction: float = 0.5
     min_there: float = -0.3
     max_changed: float = 2.5
     absent_after_s: float = 0.1
@@ -64,7 +64,7 @@ class TrackHealth:
         lost_since_s: when the track was lost; None while it is not.
         shortfall: nats below the usual, in the latest frame; of the likelihood flattened as it usually is.
         n_lost: how often it was lost.
-        absence: why there can be no arm as believed, in the latest frame; "" if there can.
+        absence: why no arm can be at the estimated pose, in the latest frame; "" if one can.
     """
 
     def __init__(self, options: HealthOptions | None = None) -> None:
@@ -92,7 +92,7 @@ class TrackHealth:
         settled = self._learned_s >= self.options.settle_s
         self.shortfall = self._temper * (self._usual - best) if settled else 0.0
         minimum = self.options.min_log_likelihood
-        allowed = self._allowed() * (self.options.found_share if self.lost else 1.0)
+        allowed = self._allowed() * (self.options.found_fraction if self.lost else 1.0)
         bad = bool(self.absence) or (settled and self.shortfall > allowed) or (minimum is not None and best < minimum)
         self._bad_s = self._bad_s + elapsed_s if bad else 0.0
         self._good_s = 0.0 if bad else self._good_s + elapsed_s
@@ -106,29 +106,29 @@ class TrackHealth:
             self.lost_since_s = None
 
     def _absence(self, presence: Presence) -> str:
-        maximum = self.options.max_changed * (KEPT_SHARE if self.lost else 1.0)
+        maximum = self.options.max_changed * (HYSTERESIS if self.lost else 1.0)
         if presence.changed > maximum:
             return (
-                f"the images have changed in {presence.changed:.1f} times the arm's area: somebody came or left, or a "
+                f"the images changed in {presence.changed:.1f} times the arm's area: somebody came or left, or a "
                 "camera was moved"
             )
-        return "there is but the background where it should be" if presence.there < self.options.min_there else ""
+        return "only the background is visible where it should be" if presence.there < self.options.min_there else ""
 
     def _allowed(self) -> float:
         usual = self.options.drop_deviations * self._temper * float(np.sqrt(self._variance))
         return min(max(self.options.min_drop, usual), self.options.max_drop)
 
     def _learn(self, elapsed_s: float, best: float, temper: float) -> None:
-        """Mean and spread downwards over the latest `memory_s`, all of the track while it is shorter."""
+        """Updates mean and downward deviation over the latest `memory_s`, or the whole track while it is shorter."""
         settling = self._learned_s < self.options.settle_s
         self._learned_s += elapsed_s
-        share = min(1.0, max(elapsed_s, 1e-3) / min(max(self._learned_s, 1e-3), self.options.memory_s))
+        gain = min(1.0, max(elapsed_s, 1e-3) / min(max(self._learned_s, 1e-3), self.options.memory_s))
         difference = best - self._usual
-        self._temper += share * (temper - self._temper)
+        self._temper += gain * (temper - self._temper)
         if difference > 0.0 and not settling:
-            self._usual += self.options.rise * share * difference
-            self._variance *= 1.0 - share
+            self._usual += self.options.rise * gain * difference
+            self._variance *= 1.0 - gain
             return
-        self._usual += share * difference
-        # Twice the mean square of what is below is the variance of what scatters alike on both sides.
-        self._variance = (1.0 - share) * (self._variance + (1.0 if settling else 2.0) * share * difference**2)
+        self._usual += gain * difference
+        # Twice the mean square of what is below is the variance of a symmetric distribution.
+        self._variance = (1.0 - gain) * (self._variance + (1.0 if settling else 2.0) * gain * difference**2)

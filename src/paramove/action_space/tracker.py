@@ -22,7 +22,7 @@ from paramove.action_space.grammar import Grammar
 from paramove.action_space.particle_filter import FilterOptions, Measurement, ParticleFilter, effective_number
 from paramove.action_space.placement import PersonPlacement
 from paramove.action_space.propagation import THESIS_RATE_HZ, Propagation, PropagationOptions, per_step
-from paramove.action_space.reached_place import ReachedPlace, reached_place
+from paramove.action_space.reached_target import ReachedTarget, reached_target
 from paramove.action_space.target_detection import DetectedTarget, DetectionOptions, TargetDetector
 from paramove.action_space.track_health import HealthOptions, TrackHealth
 from paramove.action_space.vocabulary import Vocabulary
@@ -30,7 +30,7 @@ from paramove.documents import Floats, InputError, Ints
 from paramove.observation import HAND, Presence
 
 MIN_CONCENTRATION = 0.8
-"""Length of the mean of the progress as a direction, 0 (spread over all of the action) to 1."""
+"""Length of the mean of the progress as a direction, 0 (scattered over all of the action) to 1."""
 JUMP = 0.25
 """Of the progress, beyond what the time between two frames explains."""
 Measure = Callable[[Floats], Floats | None]
@@ -44,10 +44,10 @@ class TrackerOptions:
         filter, propagation, detection, health: of these parts.
         histogram_bins: of the histogram over progress.
         longest_gap_s: after a longer time without a frame the arm may be anywhere.
-        lost_kept: share of the particles that go on when the arm is lost, should the loss be an error.
-        lost_renewed: share of the particles that begin again in each frame (at 8 Hz) while the arm is lost.
-        lost_anywhere: share of these that begin anywhere, the others in the base pose.
-        explored: share of the particles that is moved anywhere in each frame (at 8 Hz): a grammar may have led all of
+        lost_retained: fraction of the particles that continue when the arm is lost, in case the loss is an error.
+        lost_renewed: fraction of the particles that begin again in each frame (at 8 Hz) while the arm is lost.
+        lost_anywhere: fraction of these that begin anywhere; the others begin in the base pose.
+        explored: fraction of the particles that moves anywhere in each frame (at 8 Hz): a grammar may have led all of
             them to an action that is not performed.
     """
 
@@ -57,30 +57,30 @@ class TrackerOptions:
     health: HealthOptions = field(default_factory=HealthOptions)
     histogram_bins: int = 20
     longest_gap_s: float = 1.5
-    lost_kept: float = 0.25
+    lost_retained: float = 0.25
     lost_renewed: float = 0.3
     lost_anywhere: float = 0.5
     explored: float = 0.05
 
 
 @dataclass(frozen=True)
-class ActionBelief:
-    """What is known after a frame; places in the world, m.
+class TrackEstimate:
+    """Estimates after a frame; positions in the world, m.
 
     Attributes:
         time_s: of the frame.
         actions: posterior probability of each action (6.8).
         theta: parameters of each action that has particles (6.10), (6.11).
-        targets: place of the mean parameters of each action that has particles, (3,).
+        targets: target of the mean parameters of each action that has particles, (3,).
         tau_histogram: posterior over progress, all bins sum to 1; one row an action, in the order of `actions`.
         pose: refined (6.18), (D,). pose_best: (6.16), (D,).
-        hand_covariance: of the hand's place, m^2, (3, 3).
+        hand_covariance: of the hand's position, m^2, (3, 3).
         effective_sample_size: effective number of particles.
         temper: exponent of the likelihood; below 1 it was flattened.
         log_likelihood: of the best particle, nats; NaN without a usable view.
-        contact: posterior probability that the hand is at a place of its action.
+        contact: posterior probability that the hand is at a target of its action.
         lost: whether the arm is lost. degraded: whether there was no usable view.
-        sentence: what is wrong and what it costs; "" if nothing is.
+        detail: what is wrong and what it costs; "" if nothing is.
         target: the latest target that the hand reached.
     """
 
@@ -98,7 +98,7 @@ class ActionBelief:
     contact: float
     lost: bool = False
     degraded: bool = False
-    sentence: str = ""
+    detail: str = ""
     target: DetectedTarget | None = field(default=None)
 
     @property
@@ -108,11 +108,11 @@ class ActionBelief:
 
 
 class ActionTracker:
-    """Follows one arm. The same seed and the same measurements give the same beliefs.
+    """Follows one arm. The same seed and the same measurements give the same estimates.
 
     Attributes:
         filter: the particles. health: how often the arm was lost. detector: of targets. progress_jumps: how often the
-            believed progress jumped.
+            estimated progress jumped.
     """
 
     def __init__(
@@ -127,29 +127,29 @@ class ActionTracker:
         self.health = TrackHealth(self.options.health)
         self.detector = TargetDetector(self.options.detection)
         self.progress_jumps = ProgressJumps()
-        self._belief: ActionBelief | None = None
+        self._estimate: TrackEstimate | None = None
         self._blind_since_s: float | None = None
         self._just_lost = False
 
     @property
-    def belief(self) -> ActionBelief | None:
-        """What was believed after the latest frame; None before the first."""
-        return self._belief
+    def estimate(self) -> TrackEstimate | None:
+        """The estimate after the latest frame; None before the first."""
+        return self._estimate
 
     def update(
         self, time_s: float, measure: Measure, presence: Callable[[Floats], Presence] | None = None
-    ) -> ActionBelief:
+    ) -> TrackEstimate:
         """One frame.
 
         Args:
-            time_s: of its capture. A frame that is not later than the one before is left out.
+            time_s: of its capture. A frame that is not later than the one before is ignored.
             measure: log-likelihoods (M,), nats, of poses (M, D) in the world; None, values that are all equal or not
-                finite say that nothing could be seen.
-            presence: what speaks for an arm in a pose (D,) in the world being seen at all.
+                finite: there was no usable view.
+            presence: evidence that the images show an arm in a pose (D,) in the world.
         """
-        last = self._belief
+        last = self._estimate
         if last is not None and not time_s > last.time_s:
-            return replace(last, sentence=f"a frame {last.time_s - time_s:.3f} s older than the last was left out")
+            return replace(last, detail=f"ignored a frame {last.time_s - time_s:.3f} s older than the latest")
         elapsed_s = 0.0 if last is None else time_s - last.time_s
         self._renew(elapsed_s)
         self.filter.resample()
@@ -166,28 +166,28 @@ class ActionTracker:
         average = mean_pose(self.filter.particles.poses, self.filter.particles.weights)
         present = None if presence is None or measured is None else presence(self.placement.in_world(average))
         self._judge(time_s, elapsed_s, measured, present)
-        self._belief = self._estimates(time_s, measured, average)
+        self._estimate = self._estimated(time_s, measured, average)
         self._count_jumps(elapsed_s)
-        return self._belief
+        return self._estimate
 
     def _renew(self, elapsed_s: float) -> None:
-        """Particles where the arm could be, if it is not known."""
+        """Moves particles to where the arm could be, if its pose is not known."""
         options = self.options
         if elapsed_s > options.longest_gap_s:
             self.filter.begin_again(options.lost_anywhere)
             self.detector.forget()
         elif self._just_lost:
-            self.filter.begin_again(options.lost_anywhere, 1.0 - options.lost_kept)
+            self.filter.begin_again(options.lost_anywhere, 1.0 - options.lost_retained)
         elif self.health.lost and self._blind_since_s is None:
             frames = min(8.0 * elapsed_s, 1.0)
             self.filter.begin_again(options.lost_anywhere, 1.0 - (1.0 - options.lost_renewed) ** frames)
         self._just_lost = False
 
-    def _usable(self, found: Floats | None) -> Floats | None:
-        """Log-likelihoods that say something, else None. Raises InputError for a wrong number of them."""
-        if found is None:
+    def _usable(self, log_likelihoods: Floats | None) -> Floats | None:
+        """Log-likelihoods that differ between poses, else None. Raises InputError for a wrong number of them."""
+        if log_likelihoods is None:
             return None
-        values = np.asarray(found, dtype=np.float64)
+        values = np.asarray(log_likelihoods, dtype=np.float64)
         n_particles = len(self.filter.particles)
         if values.shape != (n_particles,):
             raise InputError(f"expected one log-likelihood for each of {n_particles} poses, found shape {values.shape}")
@@ -206,15 +206,15 @@ class ActionTracker:
             self._just_lost = True
             self.detector.forget()
 
-    def _estimates(self, time_s: float, measured: Measurement | None, average: Floats) -> ActionBelief:
+    def _estimated(self, time_s: float, measured: Measurement | None, average: Floats) -> TrackEstimate:
         particles, placement = self.filter.particles, self.placement
         action = self.filter.propagation.actions[particles.step]
         probabilities = action_probabilities(action, particles.weights, len(self.vocabulary))
         theta, targets = self._theta(action)
         best = average if measured is None else best_pose(particles.poses, particles.weights)
-        reached = reached_place(self.vocabulary, action, particles)
+        reached = reached_target(self.vocabulary, action, particles)
         widths = tuple(width / placement.scale for width in KERNEL_WIDTHS)
-        belief = ActionBelief(
+        estimate = TrackEstimate(
             time_s=time_s,
             actions=dict(zip(self.vocabulary.names, map(float, probabilities), strict=True)),
             theta=theta,
@@ -231,14 +231,14 @@ class ActionTracker:
             contact=0.0 if reached is None else reached.contact,
             lost=self.health.lost,
             degraded=measured is None,
-            sentence=self._sentence(time_s),
+            detail=self._detail(time_s),
         )
-        return replace(belief, target=self._target(belief, reached))
+        return replace(estimate, target=self._target(estimate, reached))
 
     def _count_jumps(self, elapsed_s: float) -> None:
-        if self._belief is None or self._belief.lost or self._belief.degraded:
+        if self._estimate is None or self._estimate.lost or self._estimate.degraded:
             return
-        particles, name = self.filter.particles, self._belief.action
+        particles, name = self.filter.particles, self._estimate.action
         number = self.vocabulary.index(name)
         rows = self.filter.propagation.actions[particles.step] == number
         advance = elapsed_s / self.vocabulary.actions[number].duration_s
@@ -250,42 +250,42 @@ class ActionTracker:
         for number, model in enumerate(self.vocabulary.actions):
             rows = (action == number) & (particles.weights > 0.0)
             if rows.any():
-                found = theta_estimate(particles.theta[rows, : model.n_parameters], particles.weights[rows])
-                theta[model.name] = found
-                targets[model.name] = self.placement.in_world(model.target(found.mean))
+                estimate = theta_estimate(particles.theta[rows, : model.n_parameters], particles.weights[rows])
+                theta[model.name] = estimate
+                targets[model.name] = self.placement.in_world(model.target(estimate.mean))
         return theta, targets
 
-    def _target(self, belief: ActionBelief, reached: ReachedPlace | None) -> DetectedTarget | None:
-        if belief.lost or belief.degraded or self.health.absence:
+    def _target(self, estimate: TrackEstimate, reached: ReachedTarget | None) -> DetectedTarget | None:
+        if estimate.lost or estimate.degraded or self.health.absence:
             return self.detector.latest
-        hand = belief.pose[HAND]
+        hand = estimate.pose[HAND]
         if reached is None:
-            return self.detector.passed(belief.time_s, hand)
-        place = self.placement.in_world(reached.place)
-        return self.detector.update(belief.time_s, hand, reached.contact, reached.action, reached.theta, place)
+            return self.detector.passed(estimate.time_s, hand)
+        position = self.placement.in_world(reached.position)
+        return self.detector.update(estimate.time_s, hand, reached.contact, reached.action, reached.theta, position)
 
-    def _sentence(self, time_s: float) -> str:
+    def _detail(self, time_s: float) -> str:
         if self._blind_since_s is not None:
             blind_s = time_s - self._blind_since_s
             return (
-                f"no usable view for {blind_s:.1f} s: pose and progress are predicted only and become less certain, "
+                f"no usable view for {blind_s:.1f} s: pose and progress are only predicted, their uncertainty grows, "
                 "and no target is detected"
             )
         if self.health.lost_since_s is not None:
             shortfall, count = self.health.shortfall, len(self.filter.particles)
             cause = self.health.absence or f"the best of {count} hypotheses is {shortfall:.1f} nats below the usual"
             return (
-                f"the arm is lost since {time_s - self.health.lost_since_s:.1f} s, {cause}: pose and target are "
-                "guesses and no target is detected until the arm is found in its base pose or elsewhere"
+                f"the arm has been lost for {time_s - self.health.lost_since_s:.1f} s, {cause}: pose and target are "
+                "guesses, and no target is detected until the arm is found in its base pose or elsewhere"
             )
         return ""
 
 
 class ProgressJumps:
-    """Counts how often the estimated progress jumps: the way out and the way back of an arm look alike.
+    """Counts how often the estimated progress jumps: an arm that moves out looks like one that moves back.
 
     Attributes:
-        count: jumps so far, between frames with one action and a progress of which the filter was sure.
+        count: jumps so far, between frames with the same action and a progress of which the filter was certain.
     """
 
     def __init__(self) -> None:
@@ -295,8 +295,8 @@ class ProgressJumps:
     def update(self, action: str, tau: Floats, weights: Floats, advance: float) -> None:
         """Takes progress (K,) and weights (K,) of the particles of the most probable action.
 
-        `advance`: what the progress gains on average in the time since the frame before. The end of an action is next
-        to its beginning.
+        `advance`: mean gain of the progress in the time since the frame before. Progress is cyclic: the end of an
+        action is next to its beginning.
         """
         mean = weights @ np.exp(2j * np.pi * tau) / max(float(weights.sum()), 1e-300)
         if abs(mean) < MIN_CONCENTRATION:

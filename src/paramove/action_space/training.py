@@ -46,18 +46,20 @@ def arm_poses(sequence: ArrayLike, point_names: Sequence[str] = POINT_NAMES) -> 
 
 
 def train_action(
-    shown: Demonstrations, *, n_states: int = STATES, kind: type[PolynomialPHMM] = QuadraticPHMM
+    demonstrated: Demonstrations, *, n_states: int = STATES, kind: type[PolynomialPHMM] = QuadraticPHMM
 ) -> PolynomialPHMM:
-    """A polynomial PHMM of arm poses, its states 2 or 3 frames long after resampling, its theta that of `shown`.
+    """A polynomial PHMM of arm poses, its states 2 or 3 frames long after resampling, its theta that of `demonstrated`.
 
     The residuals are "independent": a tracker needs how a frame deviates from its state, not how to estimate theta
     from whole movements.
     """
-    sequences = [arm_poses(sequence, shown.description.point_names or POINT_NAMES) for sequence in shown.sequences]
+    sequences = [
+        arm_poses(sequence, demonstrated.description.point_names or POINT_NAMES) for sequence in demonstrated.sequences
+    ]
     model = kind(n_states, 2, 3, resampled_frames=round(2.5 * n_states), residuals="independent")
     model.options = TrainingOptions(floor_deviation=0.002)
-    model.description = replace(shown.description, point_names=BENT_POSE_POINTS[: sequences[0].shape[1] // 3])
-    return model.fit(sequences, shown.theta)
+    model.description = replace(demonstrated.description, point_names=BENT_POSE_POINTS[: sequences[0].shape[1] // 3])
+    return model.fit(sequences, demonstrated.theta)
 
 
 def cached_action(
@@ -65,10 +67,10 @@ def cached_action(
     kind: type[PolynomialPHMM] = QuadraticPHMM, folder: Path | None = None,
     target: Callable[[Floats], Floats] = table_target,
 ) -> ActionModel:  # fmt: skip
-    """The action of a model that is kept in a folder, by default the user's cache, once it is trained.
+    """The action of a model that is trained once and stored in a folder, by default the user's cache.
 
     Args:
-        name: of the action. source: where the demonstrations come from; another source is another file.
+        name: of the action. source: where the demonstrations come from; each source has its own file.
         show: makes the demonstrations; called only if there is no model of that source.
         target: see `ActionModel`.
     """
@@ -79,24 +81,24 @@ def cached_action(
         model.description = replace(model.description, action=name)
         return model
 
-    told = f"{source}, {kind.__name__}, {n_states} states"
-    shown_by = show.func if isinstance(show, partial) else show
-    model = cached_model(PolynomialPHMM, name, told, train, folder, [shown_by.__module__])
+    settings = f"{source}, {kind.__name__}, {n_states} states"
+    function = show.func if isinstance(show, partial) else show
+    model = cached_model(PolynomialPHMM, name, settings, train, folder, [function.__module__])
     return ActionModel.from_file_model(model, target)
 
 
 def table_action_demonstrations(
     action: Action, seed: int = 0, *, columns: int = 5, rows: int = 3, repetitions: int = 4
 ) -> Demonstrations:
-    """The synthetic demonstrator reaches for or points at a raster of the table, labelled with (u, v)."""
+    """The synthetic demonstrator reaches for or points at a grid on the table, labelled with (u, v)."""
     targets, places = table_targets(columns, rows)
-    shown = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
-    duration = float(np.mean([len(sequence) - 1 for sequence in shown.sequences]) / SAMPLE_RATE_HZ)
-    told = MovementDescription(action, POINT_NAMES, "m", FRAME, ("u", "v"), duration, rate_hz=SAMPLE_RATE_HZ)
-    return Demonstrations(shown.sequences, np.repeat(places, repetitions, axis=0), told)
+    demonstrated = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
+    duration = float(np.mean([len(sequence) - 1 for sequence in demonstrated.sequences]) / SAMPLE_RATE_HZ)
+    description = MovementDescription(action, POINT_NAMES, "m", FRAME, ("u", "v"), duration, rate_hz=SAMPLE_RATE_HZ)
+    return Demonstrations(demonstrated.sequences, np.repeat(places, repetitions, axis=0), description)
 
 
 def table_action(action: Action = "pointing", seed: int = 0, folder: Path | None = None) -> ActionModel:
-    """Pointing or reaching on the table, trained with the synthetic demonstrator and kept in the user's cache."""
+    """Pointing or reaching on the table, trained with the synthetic demonstrator and stored in the user's cache."""
     source = f"synthetic demonstrator, seed {seed}, 5 x 3 places, 4 repetitions"
     return cached_action(action, source, lambda: table_action_demonstrations(action, seed), folder=folder)

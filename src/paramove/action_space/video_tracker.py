@@ -1,4 +1,4 @@
-"""A person's arm tracked in the images of calibrated cameras: images in, what is believed of the arm out."""
+"""A person's arm tracked in the images of calibrated cameras: images in, estimates of the arm out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramove.action_space.tracker import ActionBelief, ActionTracker
+from paramove.action_space.tracker import ActionTracker, TrackEstimate
 from paramove.cameras import AlignedViews, CalibratedCamera, CameraWatch, Views
 from paramove.documents import Floats, Image
 from paramove.observation import ArmObserver
@@ -18,23 +18,23 @@ MIN_SHARPNESS = 3.0
 
 
 @dataclass(frozen=True)
-class TrackedMoment:
-    """What is believed of one moment.
+class TrackedState:
+    """The estimate at one time, and what is drawn of it.
 
     Attributes:
         captured_ns: Of the images.
-        belief: What the filter believes.
-        outline: Of the believed arm in the first camera's image as captured, (N, 2) px.
-        ball: Where the believed target is seen in that image, (2,) px; NaN if it is not in front of the camera.
-        pointed: The believed target, (3,), m, in the world.
+        estimate: Of the filter.
+        outline: Of the estimated arm in the first camera's image as captured, (N, 2) px.
+        ball: The estimated target in that image, (2,) px; NaN if it is not in front of the camera.
+        pointed: The estimated target, (3,), m, in the world.
         pointed_deviation, target_deviation: Along each axis, (3,), m, of `pointed` and of the detected target; the
             latter zeros if none is detected.
-        n_views: How many cameras told of this moment.
-        trouble: A sentence about cameras that told nothing of use; "" if all did.
+        n_views: How many cameras had a usable image at this time.
+        trouble: Which cameras had none, and why; "" if all had one.
     """
 
     captured_ns: int
-    belief: ActionBelief
+    estimate: TrackEstimate
     outline: Floats
     ball: Floats
     pointed: Floats
@@ -44,21 +44,21 @@ class TrackedMoment:
     trouble: str
 
 
-def believed(tracker: ActionTracker, observer: ArmObserver, time_s: float) -> ActionBelief:
-    """The belief after the images that the observer looks at; the observer learns the background beside that arm."""
+def track_frame(tracker: ActionTracker, observer: ArmObserver, time_s: float) -> TrackEstimate:
+    """The estimate from the images of the observer, which then learns the background around the estimated arm."""
     elapsed_s = _since_last(tracker, time_s)
-    belief = tracker.update(time_s, observer.log_likelihoods, observer.presence)
-    _learn(tracker, observer, belief, elapsed_s)
-    return belief
+    estimate = tracker.update(time_s, observer.log_likelihoods, observer.presence)
+    _learn(tracker, observer, estimate, elapsed_s)
+    return estimate
 
 
 def _since_last(tracker: ActionTracker, time_s: float) -> float:
-    return 0.0 if tracker.belief is None else time_s - tracker.belief.time_s
+    return 0.0 if tracker.estimate is None else time_s - tracker.estimate.time_s
 
 
-def _learn(tracker: ActionTracker, observer: ArmObserver, belief: ActionBelief, elapsed_s: float) -> None:
-    if tracker.health.absence or not (belief.lost or belief.degraded):  # what has come to stay is learned slowly
-        observer.learn(belief.pose, elapsed_s)
+def _learn(tracker: ActionTracker, observer: ArmObserver, estimate: TrackEstimate, elapsed_s: float) -> None:
+    if tracker.health.absence or not (estimate.lost or estimate.degraded):  # what has come to stay is learned slowly
+        observer.learn(estimate.pose, elapsed_s)
 
 
 def try_out(trial: ArmObserver, camera: CalibratedCamera, poses: Floats) -> None:
@@ -72,7 +72,7 @@ def try_out(trial: ArmObserver, camera: CalibratedCamera, poses: Floats) -> None
 
 
 class VideoTracker:
-    """Brings the images of one moment together and lets the filter judge them.
+    """Aligns the images of the cameras in time and updates the filter with them.
 
     Args:
         tracker: The filter.
@@ -91,10 +91,10 @@ class VideoTracker:
         self._started_ns: int | None = None
         self._watch = CameraWatch(cameras)
         self._dark: list[str] = []
-        self._unsure = ""
+        self._uncertainty = ""
 
     def warm_up(self) -> None:
-        """Does everything that is compiled once, so that the first image does not wait for a compiler."""
+        """Compiles everything in advance, so that the first image does not wait for the compiler."""
         tracked = self._tracker.filter
         moved = tracked.propagation.predicted(tracked.particles, 0.1, np.random.default_rng(0))
         first = next(iter(self._cameras.values()))
@@ -111,71 +111,73 @@ class VideoTracker:
         """Of each action."""
         return {action.name: action.parameter_names for action in self._tracker.vocabulary.actions}
 
-    def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[TrackedMoment]:
-        """The moments that this image completes. An image of another size than calibrated counts as none.
+    def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[TrackedState]:
+        """The states that this image completes. An image of another size than calibrated is ignored.
 
-        The background is learned when the next moment is asked for: what is believed need not wait for that.
+        The background is learned when the next state is requested: an estimate does not wait for that.
         """
         if self._watch.accepts(camera, captured_ns, image):
             for views in self._views.add(camera, captured_ns, image):
                 yield from self._tracked(views)
 
     def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
-        """An image that could not even be read."""
+        """Reports an image that could not be decoded."""
         self._watch.refuse(camera, captured_ns, why)
 
     def tick(self, now_ns: int) -> None:
-        """Time has passed, with images or without."""
+        """Advances the time, with images or without."""
         self._watch.tick(now_ns)
 
     def trouble(self) -> str:
-        """What keeps images from being used, and what is not known of the arm; "" if all is well."""
-        return "; ".join(part for part in (*self._watch.troubles(), *self._dark, self._unsure) if part)
+        """Why images are not used, and what is uncertain about the arm; "" if nothing is wrong."""
+        return "; ".join(part for part in (*self._watch.troubles(), *self._dark, self._uncertainty) if part)
 
     @property
     def kind_of_trouble(self) -> tuple[str, ...]:
-        """Changes when `trouble` is another one, not while its numbers change."""
-        belief = self._tracker.belief
-        lost = belief is not None and belief.lost
-        return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._unsure else ()))
+        """Changes with the causes of `trouble`, not with the numbers in it."""
+        estimate = self._tracker.estimate
+        lost = estimate is not None and estimate.lost
+        return (*self._watch.troubles(), *self._dark, *(("lost" if lost else "unsure",) if self._uncertainty else ()))
 
-    def _tracked(self, views: Views) -> Iterator[TrackedMoment]:
+    def _tracked(self, views: Views) -> Iterator[TrackedState]:
         self._started_ns = views.captured_ns if self._started_ns is None else self._started_ns
         self._dark = self._look(views.images)
         time_s = (views.captured_ns - self._started_ns) * 1e-9
         elapsed_s = _since_last(self._tracker, time_s)
-        belief = self._tracker.update(time_s, self._observer.log_likelihoods, self._observer.presence)
-        self._unsure = belief.sentence
+        estimate = self._tracker.update(time_s, self._observer.log_likelihoods, self._observer.presence)
+        self._uncertainty = estimate.detail
         first = next(iter(self._cameras.values()))
-        theta, found = belief.theta[belief.action], belief.target
-        pointed = belief.targets[belief.action]
-        yield TrackedMoment(
+        theta, target = estimate.theta[estimate.action], estimate.target
+        pointed = estimate.targets[estimate.action]
+        yield TrackedState(
             captured_ns=views.captured_ns,
-            belief=belief,
-            outline=self._observer.outline(belief.pose, 0),
+            estimate=estimate,
+            outline=self._observer.outline(estimate.pose, 0),
             ball=first.project(pointed),
             pointed=pointed,
-            pointed_deviation=self._deviation(belief.action, theta.mean, theta.covariance),
+            pointed_deviation=self._deviation(estimate.action, theta.mean, theta.covariance),
             target_deviation=np.zeros(3)
-            if found is None
-            else self._deviation(found.action, found.theta, found.covariance),
-            n_views=sum(self._observer.seen),
-            trouble="; ".join([*(f"{name} is silent" for name in views.silent), *self._dark, *self._watch.refused()]),
+            if target is None
+            else self._deviation(target.action, target.theta, target.covariance),
+            n_views=sum(self._observer.has_image),
+            trouble="; ".join(
+                [*(f"{name} sends no images" for name in views.silent), *self._dark, *self._watch.refused()]
+            ),
         )
-        _learn(self._tracker, self._observer, belief, elapsed_s)
+        _learn(self._tracker, self._observer, estimate, elapsed_s)
 
     def _look(self, images: Sequence[Image | None]) -> list[str]:
-        """Gives the observer the images in which there are edges; sentences about the others."""
+        """Gives the observer the images that contain edges; messages about the others."""
         self._observer.look(images)
         dark = self._observer.sharpness < MIN_SHARPNESS  # NaN, for a missing view, is not below
         if not dark.any():
             return []
         self._observer.look([None if bad else image for bad, image in zip(dark, images, strict=True)])
         names = [name for bad, name in zip(dark, self._cameras, strict=True) if bad]
-        return [f"{name} shows nothing: take off the lens cap or switch on the light" for name in names]
+        return [f"{name} is dark: take off the lens cap or switch on the light" for name in names]
 
     def _deviation(self, action: str, theta: Floats, covariance: Floats) -> Floats:
-        """Of the place where the action leads, along each axis, (3,), m, by its slope in theta."""
+        """Of the target of the action, along each axis, (3,), m, by its slope in theta."""
         vocabulary, step = self._tracker.vocabulary, 1e-3
         target = vocabulary.actions[vocabulary.index(action)].target
         slopes = (target(theta + step * np.eye(len(theta))) - target(theta)) / step * self._tracker.placement.scale

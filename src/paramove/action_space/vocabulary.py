@@ -20,15 +20,15 @@ from paramove.phmm import ParametricHMM, PolynomialPHMM
 POSE_SIZES = (3 * len(POSE_POINTS), 3 * len(BENT_POSE_POINTS))
 THETA_BOUNDS = (-0.2, 1.2)
 PLACE_SIZE = 2
-"""Components of one place (u, v); theta is one or more places, the last of which is where the hand goes."""
+"""Components of one target (u, v); theta is one or more targets, the last of which is where the hand goes."""
 MIN_APART = 0.15
-"""Of the progress: nearer moments are alike because they are near, not because one mirrors the other."""
+"""Of the progress: nearer poses are similar because they are near, not because one mirrors the other."""
 ALIKE = 0.10
-"""m, root mean square over the three points of a pose: poses as near as that may be taken for each other."""
+"""m, root mean square over the three points of a pose: poses nearer than this may be confused."""
 
 
 class PoseModel(Protocol):
-    """What is needed of a parametric HMM."""
+    """The part of a parametric HMM that is needed here."""
 
     def state_means(self, theta: ArrayLike) -> Floats:
         """Means of all states for theta (M, P). Shape (M, N, D)."""
@@ -40,7 +40,7 @@ class PoseModel(Protocol):
 
 
 def table_target(theta: Floats) -> Floats:
-    """Place on the table (..., 3), m, in the model's frame, of the last two components (u, v) of theta (..., P)."""
+    """Position on the table (..., 3), m, in the model's frame, of the last two components (u, v) of theta (..., P)."""
     return table_place(theta[..., -PLACE_SIZE:])
 
 
@@ -53,11 +53,11 @@ class ActionModel:
         model: of poses (shoulder, elbow, hand, or also the wrist; m, frame of the default demonstrator's table); D = 9
             or 12.
         duration_s: mean duration T_a.
-        parameter_names: one for each of the P components of theta, two components a place.
+        parameter_names: one for each of the P components of theta, two components a target.
         bounds: theta stays within, (minimum, maximum) for every component.
         target: where the hand goes for theta (..., P), (..., 3), m, in the frame of the model.
-        kept_variance: share of the variance of a pose that its deviation carries; the fewer components, the better
-            few particles cover them. 1.0 keeps all, as (6.3).
+        explained_variance: fraction of the variance of a pose that its deviation covers; few particles cover few
+            components better. 1.0 retains all, as (6.3).
     """
 
     name: str
@@ -66,40 +66,42 @@ class ActionModel:
     parameter_names: tuple[str, ...] = ("u", "v")
     bounds: tuple[float, float] = THETA_BOUNDS
     target: Callable[[Floats], Floats] = field(default=table_target, repr=False)
-    kept_variance: float = 0.995
+    explained_variance: float = 0.995
 
     def __post_init__(self) -> None:
-        """Raises InputError for a duration, bounds or a model that cannot be those of an action."""
+        """Raises InputError for a duration, parameters or a model that no action can have."""
         if not (np.isfinite(self.duration_s) and self.duration_s > 0.0):
-            raise InputError(f"action {self.name!r}: a duration is positive, found {self.duration_s} s")
+            raise InputError(f"action {self.name!r}: expected a positive duration, found {self.duration_s} s")
         if not self.parameter_names or len(self.parameter_names) % PLACE_SIZE:
             raise InputError(
-                f"action {self.name!r}: theta is one or more places of {PLACE_SIZE} components, found the parameters "
+                f"action {self.name!r}: expected one or more targets of {PLACE_SIZE} parameters, found the parameters "
                 f"{list(self.parameter_names)}"
             )
-        found = self.state_means(self.centre[None]).shape[1:]
-        if len(found) != 2 or found[1] not in POSE_SIZES:
+        shape = self.state_means(self.centre[None]).shape[1:]
+        if len(shape) != 2 or shape[1] not in POSE_SIZES:
             raise InputError(
                 f"action {self.name!r}: expected a model of {POSE_SIZES[0]} numbers a frame (x, y, z of "
-                f"{', '.join(POSE_POINTS)}), or {POSE_SIZES[1]} (and of the wrist), found {found[-1]}; "
+                f"{', '.join(POSE_POINTS)}), or {POSE_SIZES[1]} (and of the wrist), found {shape[-1]}; "
                 "paramove.action_space.training makes one"
             )
 
     @classmethod
     def from_file_model(cls, model: ParametricHMM, target: Callable[[Floats], Floats] = table_target) -> Self:
-        """From a trained model whose description names action, parameters and duration. Raises InputError without."""
-        told = model.description
-        if told is None or told.duration <= 0.0:
-            raise InputError("expected a model whose description tells action and duration, found none")
+        """From a trained model whose description names action, parameters and duration. Raises InputError otherwise."""
+        description = model.description
+        if description is None or description.duration <= 0.0:
+            raise InputError("expected a model whose description names action and duration, found none")
         bounds = model.parameter_bounds_
         size = PLACE_SIZE if bounds is None else bounds.shape[1]
-        names = told.parameter_names or ("u", "v")
-        points = told.point_names
+        names = description.parameter_names or ("u", "v")
+        points = description.point_names
         if len(points) == len(BENT_POSE_POINTS) and points[-1] != BENT_POSE_POINTS[-1]:
-            raise InputError(f"action {told.action!r}: expected the points {BENT_POSE_POINTS}, found {tuple(points)}")
+            raise InputError(
+                f"action {description.action!r}: expected the points {BENT_POSE_POINTS}, found {tuple(points)}"
+            )
         if len(names) != size:
-            raise InputError(f"action {told.action!r}: expected {size} names of parameters, found {list(names)}")
-        return cls(told.action, model, told.duration, names, target=target)
+            raise InputError(f"action {description.action!r}: expected {size} names of parameters, found {list(names)}")
+        return cls(description.action, model, description.duration, names, target=target)
 
     @property
     def n_parameters(self) -> int:
@@ -136,9 +138,9 @@ class ActionModel:
         values, vectors = np.linalg.eigh(covariances)
         roots = (vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]) @ np.swapaxes(vectors, 1, 2)
         pooled, directions = np.linalg.eigh(covariances.mean(axis=0))
-        shares = np.cumsum(pooled[::-1]) / max(float(pooled.sum()), 1e-300)
-        n_kept = min(int(np.searchsorted(shares, self.kept_variance - 1e-12)) + 1, len(pooled))
-        return np.ascontiguousarray(roots @ directions[:, ::-1][:, :n_kept])
+        explained = np.cumsum(pooled[::-1]) / max(float(pooled.sum()), 1e-300)
+        n_directions = min(int(np.searchsorted(explained, self.explained_variance - 1e-12)) + 1, len(pooled))
+        return np.ascontiguousarray(roots @ directions[:, ::-1][:, :n_directions])
 
     @cached_property
     def middle_means(self) -> Floats:
@@ -147,19 +149,19 @@ class ActionModel:
 
     @cached_property
     def mirrored(self) -> Floats:
-        """For each state the progress at which the way back looks like the way out, or the reverse; -1: none. (N,)."""
+        """For each state the progress of a similar pose in the opposite direction; -1: none. (N,)."""
         n_states = len(self.middle_means)
-        apart = np.linalg.norm(self.middle_means[:, None] - self.middle_means[None], axis=2) / np.sqrt(
+        distances = np.linalg.norm(self.middle_means[:, None] - self.middle_means[None], axis=2) / np.sqrt(
             self.pose_size / 3
         )
         number = np.arange(n_states)
-        apart[np.abs(number[:, None] - number) < MIN_APART * n_states] = np.inf
-        nearest = apart.argmin(axis=1)
-        return np.asarray(np.where(apart.min(axis=1) <= ALIKE, nearest / max(n_states - 1, 1), -1.0))
+        distances[np.abs(number[:, None] - number) < MIN_APART * n_states] = np.inf
+        nearest = distances.argmin(axis=1)
+        return np.asarray(np.where(distances.min(axis=1) <= ALIKE, nearest / max(n_states - 1, 1), -1.0))
 
     @cached_property
     def place_dependence(self) -> Floats:
-        """How much the hand of each state depends on each place of theta, 0 (not at all) to 1 (most). (P / 2, N)."""
+        """How much the hand of each state depends on each target of theta, 0 (not at all) to 1 (most). (P / 2, N)."""
         sizes = np.zeros((self.n_parameters // PLACE_SIZE, len(self.middle_means)))
         for component in range(self.n_parameters):
             step = np.zeros(self.n_parameters)
@@ -198,17 +200,17 @@ class ActionModel:
 class Vocabulary:
     """The actions, numbered in the order given.
 
-    Raises InputError for no action, two of one name, or poses of which only some tell where the wrist is.
+    Raises InputError for no action, two of one name, or poses only some of which have a wrist.
     """
 
     def __init__(self, actions: Sequence[ActionModel]) -> None:
         names = [action.name for action in actions]
         if not names or len(set(names)) < len(names):
-            raise InputError(f"a vocabulary has one or more actions of different names, found {names}")
+            raise InputError(f"expected one or more actions of different names, found {names}")
         sizes = {action.name: action.pose_size for action in actions}
         if len(set(sizes.values())) > 1:
             raise InputError(
-                f"the actions of a vocabulary have poses of as many numbers, found {sizes}: train all of them with the "
+                f"expected poses of the same size for all actions, found {sizes}: train all of them with the "
                 "wrist, or none"
             )
         self.actions = tuple(actions)
@@ -221,12 +223,12 @@ class Vocabulary:
 
     @cached_property
     def n_parameters(self) -> int:
-        """Greatest P: theta of actions with fewer components is padded behind."""
+        """Largest P: theta of actions with fewer components is padded behind."""
         return max(action.n_parameters for action in self.actions)
 
     @cached_property
     def n_deviations(self) -> int:
-        """Greatest R."""
+        """Largest R."""
         return max(action.n_deviations for action in self.actions)
 
     def __len__(self) -> int:

@@ -39,16 +39,16 @@ def accumulated_a(p: Floats, columns: Floats) -> Floats:
     """d_ij of step pattern (A), Equation (B.7), for p (T_1, D) and the other sequence's columns (D, T_2). (T_1, T_2).
 
     Corrected: the first row and column accumulate. Two rows are filled at a time, the second one column behind: each
-    entry of a row waits for the one before it, and the processor has work meanwhile.
+    entry of a row depends on the one before it, and the processor works on the other row meanwhile.
     """
     length = columns.shape[1]
     total = np.empty((len(p), length))
     upper, lower = np.empty(length), np.empty(length)
     distances_to(p[0], columns, upper)
-    so_far = 0.0
+    cumulated = 0.0
     for j in range(length):
-        so_far += upper[j]
-        total[0, j] = so_far
+        cumulated += upper[j]
+        total[0, j] = cumulated
     for i in range(1, len(p) - 1, 2):
         distances_to(p[i], columns, upper)
         distances_to(p[i + 1], columns, lower)

@@ -26,7 +26,7 @@ class Alignment(NamedTuple):
 
 
 def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Alignment:
-    """Align two sequences (T_1, D) and (T_2, D) so that the summed Euclidean distance d(p_i, q_j) is least.
+    """Align two sequences (T_1, D) and (T_2, D) so that the summed Euclidean distance d(p_i, q_j) is minimal.
 
     Pattern (A) may stay in either sequence; (B) moves on in both at every step, by at most two.
     Raises ValueError where dimensions differ, or where no path exists: (B) needs a length ratio within [1/2, 2]
@@ -37,7 +37,7 @@ def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Ali
     p = checked_sequence(first)
     q = checked_sequence(second)
     if p.shape[1] != q.shape[1]:
-        raise ValueError(f"sequences to align have equally many dimensions, found {p.shape[1]} and {q.shape[1]}")
+        raise ValueError(f"sequences to align need the same number of dimensions, found {p.shape[1]} and {q.shape[1]}")
     columns = np.ascontiguousarray(q.T)
     total = kernels.accumulated_a(p, columns) if pattern == "A" else kernels.accumulated_b(p, columns)
     if not np.isfinite(total[-1, -1]):
@@ -52,14 +52,14 @@ def warp(first: ArrayLike, second: ArrayLike, pattern: StepPattern = "A") -> Ali
 def movement_distance(
     first: ArrayLike, second: ArrayLike, *, n_points: int = 7, cut: float = 0.15, pattern: StepPattern = "A"
 ) -> float:
-    """Root mean square distance of body points after warping, without the share `cut` at both ends (4.3), in m.
+    """Root mean square distance of body points after warping, without the fraction `cut` at both ends (4.3), in m.
 
     Corrected: divided by the actual number of terms.
     """
     p, q = checked_sequence(first), checked_sequence(second)
     alignment = warp(p, q, pattern)
     length = len(alignment.first)
-    kept = slice(int(np.floor(cut * length)), int(np.ceil((1.0 - cut) * length)))
-    difference = p[alignment.first[kept]] - q[alignment.second[kept]]
+    middle = slice(int(np.floor(cut * length)), int(np.ceil((1.0 - cut) * length)))
+    difference = p[alignment.first[middle]] - q[alignment.second[middle]]
     squared = (difference.reshape(len(difference), n_points, -1) ** 2).sum(axis=2)
     return float(np.sqrt(squared.mean()))

@@ -26,7 +26,7 @@ class Topology:
     Attributes:
         name: "ergodic" goes anywhere; "left_right" to the same and the next state (figure 2.2); "left_right_skips" also
             over up to `max_skip` states. Left-right paths start in the first state.
-        max_skip: most states that one step leaves out.
+        max_skip: maximum number of states that one step skips.
         self_transitions: without them a path leaves its state with each frame (figure 2.3).
         finish_state: a path ends in state N + 1 (2.2.3.1), which is entered from the last state of a left-right chain.
     """
@@ -46,7 +46,7 @@ class Topology:
 
     @property
     def step(self) -> int:
-        """Most states that a left-right path goes forward in one frame; 0 if it may go anywhere."""
+        """Maximum number of states that a left-right path goes forward in one frame; 0 if it may go anywhere."""
         return {"ergodic": 0, "left_right": 1, "left_right_skips": 1 + self.max_skip}[self.name]
 
     def transitions(self, n_states: int) -> Flags:
@@ -69,7 +69,7 @@ class Topology:
         return result
 
     def lengths(self, n_states: int) -> tuple[int, int | None]:
-        """Fewest and most frames of a path; None if there is no most."""
+        """Minimum and maximum number of frames of a path; None if there is no maximum."""
         fewest = 1 + -(-(n_states - 1) // self.step) if self.finish_state and self.step else 1
         return fewest, None if self.self_transitions else n_states
 
@@ -116,7 +116,7 @@ def check_parameters(parameters: ChainParameters, topology: Topology) -> None:
 
 @dataclass(frozen=True)
 class ChainEvaluator:
-    """Whitening matrices and logarithms ready for the kernels; made once per set of parameters."""
+    """Whitening matrices and logarithms for the kernels; computed once per set of parameters."""
 
     parameters: ChainParameters
     topology: Topology
@@ -144,7 +144,7 @@ class ChainEvaluator:
         )
 
     def log_outputs(self, stack: Stack) -> Floats:
-        """ln b_i of the frames in the windows; other entries have no meaning. Shape (N, frames)."""
+        """ln b_i of the frames in the windows; other entries are undefined. Shape (N, frames)."""
         means = self.parameters.means[None]
         return stacked_log_outputs(
             stack.columns, self.windows(stack), means, self.whitening, self.log_norm, self.diagonal
@@ -207,7 +207,7 @@ class ChainStatistics(Moments):
         counts = Counts(np.zeros(n_states), np.zeros((n_states, n_states)), np.zeros(n_states))
         log_likelihood, before = 0.0, 0
         for stack in stacks:
-            values, gamma, found = evaluator.expectation(stack)
+            values, gamma, expected = evaluator.expectation(stack)
             if not np.isfinite(values).all():
                 index = before + int(np.argmin(np.isfinite(values)))
                 raise ValueError(
@@ -220,7 +220,9 @@ class ChainStatistics(Moments):
                 )
             )
             counts = Counts(
-                counts.starts + found.starts, counts.transitions + found.transitions, counts.exits + found.exits
+                counts.starts + expected.starts,
+                counts.transitions + expected.transitions,
+                counts.exits + expected.exits,
             )
             log_likelihood += float(values.sum())
             before += len(values)
@@ -228,20 +230,24 @@ class ChainStatistics(Moments):
 
 
 def maximised(
-    old: ChainParameters, found: ChainStatistics, regularisation: Regularisation, topology: Topology, kind: Covariance
+    old: ChainParameters,
+    statistics: ChainStatistics,
+    regularisation: Regularisation,
+    topology: Topology,
+    kind: Covariance,
 ) -> ChainParameters:
-    """M-step. What no frame speaks of (a state that no path visits) keeps its old value."""
+    """M-step. A state that no path visits keeps its old values."""
     n_states = len(old.means)
-    means = found.means()
-    scatter = found.scatter(means)
-    covariances = covariances_of(scatter, np.maximum(found.weight, 1e-300), regularisation, kind)
+    means = statistics.means()
+    scatter = statistics.scatter(means)
+    covariances = covariances_of(scatter, np.maximum(statistics.weight, 1e-300), regularisation, kind)
     if kind != "tied" and regularisation.target_frames == 0:
-        unseen = found.unseen()
+        unseen = statistics.unseen()
         covariances[unseen] = old.covariances[unseen]
     pseudocount = regularisation.duration_pseudocount
-    start = found.counts.starts + pseudocount * topology.starts(n_states)
-    transitions = found.counts.transitions + pseudocount * topology.transitions(n_states)
-    exits = found.counts.exits * topology.finish_state + pseudocount * topology.exits(n_states)
+    start = statistics.counts.starts + pseudocount * topology.starts(n_states)
+    transitions = statistics.counts.transitions + pseudocount * topology.transitions(n_states)
+    exits = statistics.counts.exits * topology.finish_state + pseudocount * topology.exits(n_states)
     total = transitions.sum(axis=1) + exits
     known = total > 1e-300
     total = np.where(known, total, 1.0)
@@ -255,7 +261,7 @@ def maximised(
 
 
 def chain_penalty(parameters: ChainParameters, regularisation: Regularisation, topology: Topology) -> float:
-    """What makes the log-likelihood the objective that the M-step maximises (inverse Wishart, Dirichlet terms)."""
+    """Term that, added to the log-likelihood, gives the objective of the M-step (inverse Wishart, Dirichlet priors)."""
     total = log_prior(parameters.covariances, regularisation)
     pseudocount, n_states = regularisation.duration_pseudocount, len(parameters.means)
     if pseudocount > 0:

@@ -1,7 +1,7 @@
 """Compiled recursions of plain chains (first-order transitions, with or without a finish state), in the log domain.
 
 A banded chain goes from state i to i .. i + width - 1 only; a dense one anywhere. Both find responsibilities from the
-last frame backwards: p(q_t = j | X) times the share that each predecessor has in alpha_j(t). That equals
+last frame backwards: p(q_t = j | X) times the fraction of each predecessor in alpha_j(t). That equals
 alpha beta / p(X) (2.14), for what follows t does not depend on what was before, and takes no exponential function.
 """
 
@@ -54,9 +54,9 @@ def _active(windows: Ints, offset: int, n_frames: int, low: Ints, high: Ints) ->
 @compiled_arithmetic
 def _banded_forward(
     log_output: Floats, offset: int, n_frames: int, log_start: Floats, log_band: Floats, low: Ints, high: Ints,
-    alpha: Floats, shares: Floats,
+    alpha: Floats, fractions: Floats,
 ) -> None:  # fmt: skip
-    """ln alpha_j(t) (2.7) and, in `shares[t, j, k]`, p(q_{t-1} = j - k | q_t = j, x_1..x_t)."""
+    """ln alpha_j(t) (2.7) and, in `fractions[t, j, k]`, p(q_{t-1} = j - k | q_t = j, x_1..x_t)."""
     width = log_band.shape[1]
     for j in range(low[0], high[0] + 1):
         alpha[0, j] = log_start[j] + log_output[j, offset]
@@ -66,31 +66,31 @@ def _banded_forward(
             largest, likeliest = -np.inf, -1
             for k in range(first, last + 1):
                 term = alpha[t - 1, j - k] + log_band[j, k]
-                shares[t, j, k] = term
+                fractions[t, j, k] = term
                 if term > largest:
                     largest, likeliest = term, k
             if likeliest < 0:
                 alpha[t, j] = -np.inf
-                shares[t, j, :] = 0.0
+                fractions[t, j, :] = 0.0
                 continue
             total = 1.0
             for k in range(first, last + 1):
                 if k != likeliest:
-                    difference = shares[t, j, k] - largest
-                    shares[t, j, k] = np.exp(difference) if difference > UNDERFLOW else 0.0
-                    total += shares[t, j, k]
-            shares[t, j, likeliest] = 1.0
+                    difference = fractions[t, j, k] - largest
+                    fractions[t, j, k] = np.exp(difference) if difference > UNDERFLOW else 0.0
+                    total += fractions[t, j, k]
+            fractions[t, j, likeliest] = 1.0
             alpha[t, j] = largest + log_output[j, offset + t]
             if total > 1.0:
                 alpha[t, j] += np.log(total)
                 for k in range(first, last + 1):
-                    shares[t, j, k] /= total
+                    fractions[t, j, k] /= total
 
 
 @compiled_arithmetic
 def _next_state_forward(
     log_output: Floats, offset: int, n_frames: int, log_start: Floats, log_band: Floats, low: Ints, high: Ints,
-    alpha: Floats, shares: Floats,
+    alpha: Floats, fractions: Floats,
 ) -> None:  # fmt: skip
     """`_banded_forward` for steps to the same and the next state alone, for all states of a frame at once."""
     n_states = len(log_start)
@@ -110,18 +110,18 @@ def _next_state_forward(
             there = before[i - 1] + step[i] if i > 0 else -np.inf
             top = max(here, there)
             largest[j] = top
-            # Of two impossible ones neither has a share.
+            # Of two impossible predecessors each has the fraction 0.
             difference[j] = min(here, there) - top if top > -np.inf else -np.inf
-            shares[t, i, 0] = 1.0 if here >= there else 0.0
+            fractions[t, i, 0] = 1.0 if here >= there else 0.0
         exp_of_negative(difference, n, bits, small)
         log_of_one_plus(small, n, logarithm)
         for j in range(n):
             i = first + j
             greater = 1.0 / (1.0 + small[j])
             less = small[j] * greater
-            stays = shares[t, i, 0] > 0.0
-            shares[t, i, 0] = greater if stays else less
-            shares[t, i, 1] = less if stays else greater
+            stays = fractions[t, i, 0] > 0.0
+            fractions[t, i, 0] = greater if stays else less
+            fractions[t, i, 1] = less if stays else greater
             now[i] = largest[j] + logarithm[j] + log_output[i, offset + t]
 
 
@@ -159,7 +159,7 @@ def stacked_banded(
     """
     n_states, width = log_band.shape
     longest = np.diff(offsets).max()
-    alpha, shares = np.empty((longest, n_states)), np.empty((longest, n_states, width))
+    alpha, fractions = np.empty((longest, n_states)), np.empty((longest, n_states, width))
     low, high = np.empty(longest, np.int64), np.empty(longest, np.int64)
     log_likelihood = np.empty(len(offsets) - 1)
     for s in range(len(offsets) - 1):
@@ -169,9 +169,9 @@ def stacked_banded(
             log_likelihood[s] = -np.inf
             continue
         if width == 2:
-            _next_state_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, shares)
+            _next_state_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, fractions)
         else:
-            _banded_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, shares)
+            _banded_forward(log_output, offset, n_frames, log_start, log_band, low, high, alpha, fractions)
         last = n_frames - 1
         value = _last_frame(alpha[last], log_exit, low[last], high[last], gamma, offset + last)
         log_likelihood[s] = value
@@ -187,9 +187,9 @@ def stacked_banded(
                 if posterior < MIN_POSTERIOR:
                     continue
                 for k in range(max(0, j - high[t - 1]), min(width - 1, j - low[t - 1]) + 1):
-                    share = posterior * shares[t, j, k]
-                    gamma[j - k, offset + t - 1] += share
-                    counts[j, k] += share
+                    joint = posterior * fractions[t, j, k]
+                    gamma[j - k, offset + t - 1] += joint
+                    counts[j, k] += joint
         for j in range(low[0], high[0] + 1):
             starts[j] += gamma[j, offset]
     return log_likelihood
@@ -210,7 +210,7 @@ def _dense_forward(
 ) -> None:  # fmt: skip
     """ln alpha_j(t) (2.7); `scaled[t]` is alpha(t) over its largest entry, `sums[t + 1]` its product with A.
 
-    Where that product is so small that underflow could matter, it is made again from logarithms and `sums` is 0.
+    Where that product is so small that underflow could matter, it is computed again from logarithms and `sums` is 0.
     """
     n_states = len(log_start)
     for j in range(n_states):
@@ -265,9 +265,9 @@ def stacked_dense(
                 # What precedes j has underflowed in `scaled`.
                 log_sum = alpha[t, j] - log_output[j, offset + t]
                 for i in range(n_states):
-                    share = posterior[j] * np.exp(alpha[t - 1, i] + log_transitions[i, j] - log_sum)
-                    previous[i] += share
-                    counts[i, j] += share
+                    joint = posterior[j] * np.exp(alpha[t - 1, i] + log_transitions[i, j] - log_sum)
+                    previous[i] += joint
+                    counts[i, j] += joint
             for i in range(n_states):
                 if scaled[t - 1, i] > 0.0:
                     previous[i] += scaled[t - 1, i] * dot(transitions[i], ratios)

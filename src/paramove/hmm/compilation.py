@@ -1,4 +1,4 @@
-"""The one way in which numerical kernels are compiled: with numba, which is imported when the first of them is called.
+"""Compilation of all numerical kernels with numba, which is imported when the first of them is called.
 
 A process that has kernels but calls none, such as one that only synthesises, does without a second of imports.
 """

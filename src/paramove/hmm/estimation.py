@@ -1,7 +1,7 @@
 """E-step statistics and M-step of Baum-Welch over many sequences (thesis 2.1.6, 2.2.3.2, corrected).
 
 Corrected (2.21)-(2.24): responsibilities are already normalised per sequence, so no factor 1/p_k.
-Corrected 2.2.3.2: the statistics of tied sub-states are pooled; with explicit durations they are never apart.
+Corrected 2.2.3.2: the statistics of tied sub-states are pooled; with explicit durations they are never separate.
 """
 
 from collections.abc import Sequence
@@ -69,7 +69,7 @@ def whitened(covariances: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Whitening matrices and log densities ready for the kernels; made once per set of parameters."""
+    """Whitening matrices and log densities for the kernels; computed once per set of parameters."""
 
     means: Floats
     whitening: Floats
@@ -91,7 +91,7 @@ class Evaluator:
         return kernels.feasible_ends(len(self.means), self.d_min, self.log_duration.shape[1], n_frames)
 
     def log_outputs(self, sequence: Floats) -> Floats:
-        """ln b_i(x_t) of the feasible pairs; other entries have no meaning. Shape (N, T)."""
+        """ln b_i(x_t) of the feasible pairs; other entries are undefined. Shape (N, T)."""
         stack = Stack.of([sequence])
         windows = self.windows(stack)
         return kernels.stacked_log_outputs(
@@ -235,7 +235,7 @@ def durations_of(counts: Floats, d_min: int, pseudocount: float) -> Floats:
 
 
 def penalty(parameters: Parameters, regularisation: Regularisation) -> float:
-    """What makes the log-likelihood the objective that the M-step maximises (inverse Wishart, Dirichlet terms)."""
+    """Term that, added to the log-likelihood, gives the objective of the M-step (inverse Wishart, Dirichlet priors)."""
     total = log_prior(parameters.covariances, regularisation)
     if regularisation.duration_pseudocount > 0:
         allowed = parameters.durations[:, parameters.d_min - 1 :]

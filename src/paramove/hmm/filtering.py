@@ -1,6 +1,6 @@
-"""State probabilities frame by frame, without looking ahead: for use while a movement is seen (thesis 2.1.4.2).
+"""State probabilities frame by frame, without looking ahead: for use while a movement is observed (thesis 2.1.4.2).
 
-The forward variables of (2.7), kept as logarithms and divided by their sum after each frame.
+The forward variables of (2.7), as logarithms and divided by their sum after each frame.
 """
 
 from abc import ABC, abstractmethod
@@ -13,10 +13,10 @@ from paramove.hmm.sequences import checked_sequence
 
 
 class OnlineFilter(ABC):
-    """What is known of the state of a movement after each frame.
+    """Estimates the state of a movement after each frame.
 
     Attributes:
-        log_likelihood: ln p(x_1..x_t | lambda), of the beginning alone: nothing is said about its end.
+        log_likelihood: ln p(x_1..x_t | lambda), of the beginning only, whatever its end.
         n_frames: t.
     """
 
@@ -28,8 +28,8 @@ class OnlineFilter(ABC):
     def update(self, frame: ArrayLike) -> Floats:
         """p(q_t = i | x_1..x_t) after one more frame of shape (D,). Shape (N,).
 
-        Raises ValueError for a bad frame, and where the model excludes what was seen: a movement that is too long for
-        its durations. The filter stays as it was.
+        Raises ValueError for a bad frame, and where the model excludes the frames so far: a movement that is too long
+        for its durations. The filter is then unchanged.
         """
         checked = checked_sequence(np.atleast_2d(np.asarray(frame, dtype=np.float64)), self._means.shape[1])[0]
         white = np.einsum("ijk,ik->ij", self._whitening, checked - self._means)
@@ -43,7 +43,7 @@ class OnlineFilter(ABC):
                 f"the model has no path for frame {self.n_frames + 1} of this movement: it allows fewer frames; "
                 "begin a new filter where a new movement begins"
             )
-        self._keep(joint - gain)
+        self._store(joint - gain)
         self.log_likelihood += gain
         self.n_frames += 1
         return self.posterior()
@@ -58,14 +58,14 @@ class OnlineFilter(ABC):
 
     @abstractmethod
     def _predicted(self) -> Floats:
-        """Log probabilities of what the next frame's state may be."""
+        """Log probabilities of the state of the next frame."""
 
     @abstractmethod
-    def _keep(self, log_probabilities: Floats) -> None: ...
+    def _store(self, log_probabilities: Floats) -> None: ...
 
 
 class ChainFilter(OnlineFilter):
-    """For a plain chain; with a finish state the movement has not ended as long as frames come."""
+    """For a plain chain; with a finish state the movement has not ended while frames arrive."""
 
     def __init__(
         self, start: Floats, transitions: Floats, exits: Floats, means: Floats, whitening: Floats, log_norm: Floats
@@ -91,7 +91,7 @@ class ChainFilter(OnlineFilter):
         result: Floats = np.logaddexp.reduce(self._log_state[:, None] + self._log_transitions, axis=0)
         return result
 
-    def _keep(self, log_probabilities: Floats) -> None:
+    def _store(self, log_probabilities: Floats) -> None:
         self._log_state = log_probabilities
 
 
@@ -125,5 +125,5 @@ class DurationFilter(OnlineFilter):
             result[:, 1:] = self._log_state[:, :-1] + self._log_stay
         return result
 
-    def _keep(self, log_probabilities: Floats) -> None:
+    def _store(self, log_probabilities: Floats) -> None:
         self._log_state = log_probabilities

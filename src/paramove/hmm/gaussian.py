@@ -39,13 +39,13 @@ class GaussianHMM:
     Args:
         n_states: N.
         topology: "left_right" (figure 2.2), "left_right_skips" or "ergodic".
-        max_skip: most states left out by one step of "left_right_skips".
+        max_skip: maximum number of states that one step of "left_right_skips" skips.
         self_transitions: False for left-right paths that leave a state with each frame (figure 2.3).
         finish_state: whether each path ends in the finish state N + 1 (2.2.3.1).
         covariance: "full", "diagonal" or "tied" (one for all states).
         initialisation: "segments" cuts each sequence into N equal parts; "random" draws the cuts with `seed`.
         seed: of "random".
-        options: how it is trained.
+        options: of the training.
 
     Attributes:
         start_: pi, shape (N,).
@@ -53,7 +53,7 @@ class GaussianHMM:
         exits_: a_{i, N+1}, shape (N,); zero without finish state.
         means_: shape (N, D), in the unit of the sequences.
         covariances_: shape (N, D, D) for each kind of covariance.
-        training_: what training did; None if the parameters were given.
+        training_: summary of the training; None if the parameters were given.
 
     Raises:
         ValueError: for a count below 1 or an unknown name.
@@ -83,7 +83,7 @@ class GaussianHMM:
         self._evaluator: ChainEvaluator | None = None
 
     def with_parameters(self, parameters: ChainParameters) -> Self:
-        """Give it parameters, trained elsewhere. Raises ValueError if they do not fit the topology."""
+        """Set parameters that were trained elsewhere. Raises ValueError if they do not fit the topology."""
         check_parameters(parameters, self.topology)
         if len(parameters.means) != self.n_states:
             raise ValueError(f"the model has {self.n_states} states, the parameters {len(parameters.means)}")
@@ -147,8 +147,10 @@ class GaussianHMM:
         def expect(parameters: ChainParameters) -> ChainStatistics:
             return ChainStatistics.of(parameters, stacks, self.topology, self.covariance)
 
-        def maximise(old: ChainParameters, found: ChainStatistics, regularisation: Regularisation) -> ChainParameters:
-            return maximised(old, found, regularisation, self.topology, self.covariance)
+        def maximise(
+            old: ChainParameters, statistics: ChainStatistics, regularisation: Regularisation
+        ) -> ChainParameters:
+            return maximised(old, statistics, regularisation, self.topology, self.covariance)
 
         def penalise(parameters: ChainParameters, regularisation: Regularisation) -> float:
             return chain_penalty(parameters, regularisation, self.topology)
@@ -247,11 +249,11 @@ class GaussianHMM:
         self._check_length(len(checked), "")
         return Stack.of([checked])
 
-    def _check_length(self, n_frames: int, place: str) -> None:
-        fewest, maximum = self.topology.lengths(self.n_states)
-        if n_frames < fewest or (maximum is not None and n_frames > maximum):
-            allowed = f"at least {fewest}" if maximum is None else f"{fewest} to {maximum}"
+    def _check_length(self, n_frames: int, prefix: str) -> None:
+        minimum, maximum = self.topology.lengths(self.n_states)
+        if n_frames < minimum or (maximum is not None and n_frames > maximum):
+            allowed = f"at least {minimum}" if maximum is None else f"{minimum} to {maximum}"
             raise SequenceLengthError(
-                f"{place}a sequence of {n_frames} frames has no path through {self.n_states} states of this topology: "
+                f"{prefix}a sequence of {n_frames} frames has no path through {self.n_states} states of this topology: "
                 f"allowed are {allowed} frames; resample it, or change n_states"
             )

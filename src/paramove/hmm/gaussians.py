@@ -114,7 +114,7 @@ def _add_products(difference: Floats, scaled: Floats, n: int, diagonal: bool, to
 def stacked_log_outputs(
     columns: Floats, windows: Ints, means: Floats, whitening: Floats, log_norm: Floats, diagonal: bool
 ) -> Floats:
-    """ln b_i of the frames in the windows of state i; other entries have no meaning. Shape (N, frames).
+    """ln b_i of the frames in the windows of state i; other entries are undefined. Shape (N, frames).
 
     Args:
         columns: all frames of all sequences, one column each, shape (D, frames).
@@ -125,7 +125,7 @@ def stacked_log_outputs(
     dim, n_states = columns.shape[0], means.shape[1]
     out = np.empty((n_states, columns.shape[1]))
     difference = np.zeros(((dim + TILE - 1) // TILE * TILE, BLOCK))
-    products, squared, place = np.empty((TILE, BLOCK)), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    products, squared, column_index = np.empty((TILE, BLOCK)), np.empty(BLOCK), np.empty(BLOCK, np.int64)
     for i in range(n_states):
         matrix = whitening[i] if dim % TILE == 0 else _padded(whitening[i])
         filled = 0
@@ -143,28 +143,28 @@ def stacked_log_outputs(
                     for f in range(n):
                         target[f] = source[f] - mean
                 for f in range(n):
-                    place[filled + f] = begin + f
+                    column_index[filled + f] = begin + f
                 begin += n
                 filled += n
                 if filled == BLOCK:
                     _squares(difference, matrix, filled, diagonal, products, squared)
                     for f in range(filled):
-                        out[i, place[f]] = log_norm[i] - 0.5 * squared[f]
+                        out[i, column_index[f]] = log_norm[i] - 0.5 * squared[f]
                     filled = 0
         _squares(difference, matrix, filled, diagonal, products, squared)
         for f in range(filled):
-            out[i, place[f]] = log_norm[i] - 0.5 * squared[f]
+            out[i, column_index[f]] = log_norm[i] - 0.5 * squared[f]
     return out
 
 
 @compiled_sums
 def _add_block(
-    difference: Floats, scaled: Floats, shares: Floats, n: int, diagonal: bool, first: Floats, total: Floats
+    difference: Floats, scaled: Floats, frame_weights: Floats, n: int, diagonal: bool, first: Floats, total: Floats
 ) -> None:
     for k in range(first.shape[0]):
         source, target, total_k = difference[k], scaled[k], 0.0
         for f in range(n):
-            product = shares[f] * source[f]
+            product = frame_weights[f] * source[f]
             target[f] = product
             total_k += product
         first[k] += total_k
@@ -184,7 +184,7 @@ def stacked_moments(
     dim, n_states = columns.shape[0], reference.shape[1]
     size = (dim + TILE - 1) // TILE * TILE
     weight, first, second = np.zeros(n_states), np.zeros((n_states, dim)), np.zeros((n_states, dim, dim))
-    difference, scaled, shares = np.zeros((size, BLOCK)), np.zeros((size, BLOCK)), np.empty(BLOCK)
+    difference, scaled, frame_weights = np.zeros((size, BLOCK)), np.zeros((size, BLOCK)), np.empty(BLOCK)
     total = np.empty((size, size))
     for i in range(n_states):
         total[:] = 0.0
@@ -200,7 +200,7 @@ def stacked_moments(
                 while t + run < end and filled + run < BLOCK and gamma[i, t + run] >= NEGLIGIBLE:
                     run += 1
                 for f in range(run):
-                    shares[filled + f] = gamma[i, t + f]
+                    frame_weights[filled + f] = gamma[i, t + f]
                     weight[i] += gamma[i, t + f]
                 for k in range(dim):
                     source, target, mean = (
@@ -213,9 +213,9 @@ def stacked_moments(
                 t += run
                 filled += run
                 if filled == BLOCK:
-                    _add_block(difference, scaled, shares, filled, diagonal, first[i], total)
+                    _add_block(difference, scaled, frame_weights, filled, diagonal, first[i], total)
                     filled = 0
-        _add_block(difference, scaled, shares, filled, diagonal, first[i], total)
+        _add_block(difference, scaled, frame_weights, filled, diagonal, first[i], total)
         for row in range(dim):
             for k in range(row if diagonal else 0, row + 1):
                 second[i, row, k] = total[row, k]
@@ -227,30 +227,30 @@ def stacked_moments(
 def add_moments(
     sequence: Floats, gamma: Floats, ends: Ints, reference: Floats, weight: Floats, first: Floats, second: Floats
 ) -> None:
-    """Add sum gamma, sum gamma (x - ref) and sum gamma (x - ref)(x - ref)^T of one sequence, in place.
+    """Add sum gamma, sum gamma (x - ref) and sum gamma (x - ref)(x - ref)^T of one sequence, in column_index.
 
     Only the lower triangle of `second` is touched.
     """
     dim = sequence.shape[1]
     size = (dim + TILE - 1) // TILE * TILE
-    difference, scaled, shares = np.zeros((size, BLOCK)), np.zeros((size, BLOCK)), np.empty(BLOCK)
+    difference, scaled, frame_weights = np.zeros((size, BLOCK)), np.zeros((size, BLOCK)), np.empty(BLOCK)
     total = np.empty((size, size))
     for i in range(reference.shape[0]):
         total[:] = 0.0
         filled = 0
         for t in range(ends[i, 0], ends[i + 1, 1]):
-            share = gamma[t, i]
-            if share < NEGLIGIBLE:
+            weight_t = gamma[t, i]
+            if weight_t < NEGLIGIBLE:
                 continue
-            weight[i] += share
-            shares[filled] = share
+            weight[i] += weight_t
+            frame_weights[filled] = weight_t
             for k in range(dim):
                 difference[k, filled] = sequence[t, k] - reference[i, k]
             filled += 1
             if filled == BLOCK:
-                _add_block(difference, scaled, shares, filled, False, first[i], total)
+                _add_block(difference, scaled, frame_weights, filled, False, first[i], total)
                 filled = 0
-        _add_block(difference, scaled, shares, filled, False, first[i], total)
+        _add_block(difference, scaled, frame_weights, filled, False, first[i], total)
         for row in range(dim):
             for k in range(row + 1):
                 second[i, row, k] += total[row, k]

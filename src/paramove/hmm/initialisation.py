@@ -1,4 +1,4 @@
-"""Where Baum-Welch begins for plain chains: equal parts of each sequence, or drawn ones (thesis 2.2.2)."""
+"""Initial parameters of plain chains for Baum-Welch: equal parts of each sequence, or drawn ones (thesis 2.2.2)."""
 
 from collections.abc import Sequence
 from typing import Literal, get_args

@@ -29,7 +29,7 @@ __all__ = [
 
 
 LANES = 8
-"""Numbers in a vector register: rows are filled up to a multiple, so that nothing is left over."""
+"""Numbers in a vector register: rows are padded to a multiple of it."""
 
 
 @compiled
@@ -73,7 +73,7 @@ def best_segmentation(log_output: Floats, log_duration: Floats, d_min: int, ends
 
 
 @compiled
-def _places(begins: Ints, d: int, low: int, n: int) -> tuple[int, int]:
+def _feasible_range(begins: Ints, d: int, low: int, n: int) -> tuple[int, int]:
     """Of n ends from `low` on, the first whose segment of d frames has a feasible begin, and the one after the last."""
     begin = min(n, max(0, begins[0] + d - low))
     return begin, max(begin, min(n, begins[1] + d - low + 1))
@@ -108,18 +108,18 @@ def _scale(factors: Floats, target: Floats) -> None:
 
 
 @compiled_arithmetic
-def _forward_shares(
-    log_output: Floats, offset: int, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, shares: Floats
+def _forward(
+    log_output: Floats, offset: int, log_duration: Floats, d_min: int, ends: Ints, ending: Floats, fractions: Floats
 ) -> float:
-    """Log probability of the frames, and what the way back needs. Everything of a state is done for all ends at once.
+    """Log probability of the frames, and the terms for smoothing. Each step is done for all ends of a state at once.
 
     ending[i, t]: log probability of the first t frames with i states complete (2.7, segment form); (N + 1, T + 1).
-    shares[i, (d - d_min) whole + t - ends[i + 1, 0]]: probability that state i, which ends there, has d frames, where
-    `whole` is `filled` of the number of ends.
+    fractions[i, (d - d_min) whole + t - ends[i + 1, 0]]: probability that state i, which ends there, has d frames,
+    where `whole` is `filled` of the number of ends.
     Entries outside the feasible ends are neither read nor written.
     """
     n_states, d_max = log_duration.shape
-    room = shares.shape[1]
+    room = fractions.shape[1]
     largest, total, logarithm, sums = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
     differences, bits = np.empty(room), np.empty(room, np.int64)
     ending[0, 0] = 0.0
@@ -131,10 +131,10 @@ def _forward_shares(
         for t in range(ends[i + 1, 1] - early):
             sums[t + 1] = sums[t] + log_output[i, offset + early + t]
         largest[:whole], total[:whole] = -np.inf, 0.0
-        terms = shares[i]
+        terms = fractions[i]
         terms[:count] = -np.inf
         for d in range(d_min, d_max + 1):
-            begin, end = _places(ends[i], d, low, n)
+            begin, end = _feasible_range(ends[i], d, low, n)
             k, first = (d - d_min) * whole, low + begin
             _compared(
                 ending[i, first - d :], log_duration[i, d - 1], sums[first - early :], sums[first - early - d :],
@@ -164,23 +164,23 @@ def filled(n: int) -> int:
 
 
 @compiled_sums
-def _shared_back(posterior: Floats, shares: Floats, complete: Floats, running: Floats) -> float:
+def _distributed(posterior: Floats, fractions: Floats, complete: Floats, running: Floats) -> float:
     """Posteriors of the segments of one duration, added to those of their begins, and their sum."""
     total = 0.0
-    for j in range(len(shares)):
-        share = posterior[j] * shares[j]
-        complete[j] += share
-        running[j] += share
-        total += share
+    for j in range(len(fractions)):
+        joint = posterior[j] * fractions[j]
+        complete[j] += joint
+        running[j] += joint
+        total += joint
     return total
 
 
 @compiled
 def _smooth(
-    offset: int, d_min: int, ends: Ints, shares: Floats, complete: Floats, running: Floats, gamma: Floats,
+    offset: int, d_min: int, ends: Ints, fractions: Floats, complete: Floats, running: Floats, gamma: Floats,
     counts: Floats,
 ) -> None:  # fmt: skip
-    """Posterior of all segments from the last frame backwards: p(i ends at t | X) times the shares of its durations.
+    """Posterior of all segments from the last frame backwards: p(i ends at t | X) times the fractions of its durations.
 
     The same as alpha beta / p(X) (2.14), for what follows t does not depend on what was before, and without any
     exponential function.
@@ -194,12 +194,15 @@ def _smooth(
         whole = filled(n)
         running[:n] = 0.0
         for d in range(d_max, 0, -1):
-            begin, end = _places(ends[i], d, low, n)
+            begin, end = _feasible_range(ends[i], d, low, n)
             first = low + begin
             if d >= d_min:
                 k = (d - d_min) * whole
-                counts[i, d - 1] += _shared_back(
-                    complete[i + 1, first:], shares[i, k + begin : k + end], complete[i, first - d :], running[begin:]
+                counts[i, d - 1] += _distributed(
+                    complete[i + 1, first:],
+                    fractions[i, k + begin : k + end],
+                    complete[i, first - d :],
+                    running[begin:],
                 )
             # Frame t - d is of this state wherever a segment of d frames or more ends at t.
             _add(running[begin:], gamma[i, offset + first - d : offset + low + n - d])
@@ -220,16 +223,16 @@ def stacked_segments(
     n_states, d_max = log_duration.shape
     room = np.diff(offsets).max() + 1
     ending, complete = np.empty((n_states + 1, room)), np.empty((n_states + 1, room))
-    shares, running = np.empty((n_states, (d_max - d_min + 1) * filled(room))), np.empty(room)
+    fractions, running = np.empty((n_states, (d_max - d_min + 1) * filled(room))), np.empty(room)
     log_likelihood = np.empty(len(offsets) - 1)
     for s in range(len(offsets) - 1):
         log_likelihood[s] = -np.inf
         ends = feasible_ends(n_states, d_min, d_max, offsets[s + 1] - offsets[s])
         if ends[n_states, 0] > ends[n_states, 1]:
             continue
-        log_likelihood[s] = _forward_shares(log_output, offsets[s], log_duration, d_min, ends, ending, shares)
+        log_likelihood[s] = _forward(log_output, offsets[s], log_duration, d_min, ends, ending, fractions)
         if log_likelihood[s] > -np.inf:
-            _smooth(offsets[s], d_min, ends, shares, complete, running, gamma, counts)
+            _smooth(offsets[s], d_min, ends, fractions, complete, running, gamma, counts)
     return log_likelihood
 
 
@@ -241,8 +244,8 @@ def segments_log_likelihood(log_output: Floats, log_duration: Floats, d_min: int
     if ends[n_states, 0] > ends[n_states, 1]:
         return -np.inf
     ending = np.empty((n_states + 1, n_frames + 1))
-    shares = np.empty((n_states, (d_max - d_min + 1) * filled(n_frames + 1)))
-    return _forward_shares(log_output, 0, log_duration, d_min, ends, ending, shares)
+    fractions = np.empty((n_states, (d_max - d_min + 1) * filled(n_frames + 1)))
+    return _forward(log_output, 0, log_duration, d_min, ends, ending, fractions)
 
 
 @compiled

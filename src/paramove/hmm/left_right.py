@@ -31,14 +31,14 @@ class LeftRightHMM:
     Args:
         n_states: N.
         d_min, d_max: minimum and maximum frames of each state.
-        covariance: "full"; "diagonal", which takes dimensions as independent; "tied", one for all states.
-        options: how it is trained.
+        covariance: "full"; "diagonal", with independent dimensions; "tied", one for all states.
+        options: of the training.
 
     Attributes:
         means_: shape (N, D), in the unit of the sequences.
         covariances_: shape (N, D, D).
         durations_: p_i(d) in column d - 1, shape (N, d_max).
-        training_: what training did; None if the parameters were given.
+        training_: summary of the training; None if the parameters were given.
 
     Raises:
         ValueError: for counts below 1, d_min > d_max or an unknown covariance.
@@ -76,7 +76,7 @@ class LeftRightHMM:
     def parameters(self) -> Parameters:
         """Means, covariances and durations together. Raises RuntimeError before training."""
         if self._parameters is None:
-            raise RuntimeError("this HMM has no parameters yet: call fit, or make it with from_parameters")
+            raise RuntimeError("this HMM has no parameters yet: call fit, or use from_parameters")
         return self._parameters
 
     @property

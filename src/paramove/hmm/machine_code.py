@@ -1,8 +1,9 @@
 """Machine code of the kernels on disk.
 
-It is stored beside the source, or in the user's cache folder where that cannot be written. numba looks only
+Machine code is stored next to the source, or in the user's cache folder where that cannot be written. numba looks only
 at the file of a kernel to see whether its machine code is stale, not at kernels of others that were compiled into it,
-and its index loses entries when several processes write it. So each file here is named by all that it is made from.
+and its index loses entries when several processes write it. So a digest of all inputs is in the name
+of each file here.
 """
 
 import hashlib
@@ -40,12 +41,12 @@ class KernelFiles(IndexDataCacheFile):
         """The machine code for a key of signature, processor and bytecode; None if there is none."""
         try:
             return self._load_data(self._file_for(key))
-        except Exception:  # there is none, or it is damaged: those bytes can raise anything
+        except Exception:  # missing or damaged: damaged bytes can raise anything
             _announce()
             return None
 
     def save(self, key: object, data: Any) -> None:
-        """Writes machine code; removes what is there of the same module from other code."""
+        """Writes machine code; removes files of the same module that are stale."""
         module = self._data_name_pattern.partition(".")[0]
         try:
             self._save_data(self._file_for(key), data)
@@ -56,12 +57,12 @@ class KernelFiles(IndexDataCacheFile):
             logger.warning("the compiled kernel is not stored: %s", error)
 
     def _file_for(self, key: object) -> str:
-        made_for = hashlib.sha256(f"{key}, {LIBRARIES}".encode()).hexdigest()[:16]
-        return str(self._data_name_pattern.format(number=0)).replace(".0.nbc", f".{self._source_stamp}.{made_for}.nbc")
+        digest = hashlib.sha256(f"{key}, {LIBRARIES}".encode()).hexdigest()[:16]
+        return str(self._data_name_pattern.format(number=0)).replace(".0.nbc", f".{self._source_stamp}.{digest}.nbc")
 
 
 @cache
 def _announce() -> None:
-    """Once, and not in every process of a pool; without other settings of logging it goes to the terminal."""
+    """Logs once, and not in every process of a pool; with the default settings of logging, to the terminal."""
     if parent_process() is None:
         logger.warning("compiling numerical kernels: seconds to two minutes, once ('paramove warm' does it ahead)")

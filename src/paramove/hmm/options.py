@@ -1,4 +1,4 @@
-"""How an HMM is trained: iterations, covariance prior, floor, shrinkage."""
+"""Options of training an HMM: iterations, covariance prior, floor, shrinkage."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,16 @@ from paramove.documents import Floats
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Options of Baum-Welch training (thesis 2.2.2, corrected by a lasting floor and shrinkage).
+    """Options of Baum-Welch training (thesis 2.2.2, corrected by a permanent floor and shrinkage).
 
     Deviations are fractions of the data's root mean variance per dimension, so they need no unit.
 
     Attributes:
-        max_iterations: most EM iterations.
+        max_iterations: maximum number of EM iterations.
         tolerance: stop when the objective gains less than this per frame.
         annealing_iterations: iterations over which the prior falls linearly to zero.
         prior_fraction: initial deviation sigma; sigma^2 I is added after each M-step while it lasts.
-        floor_fraction: smallest standard deviation of an output distribution in any direction, for ever.
+        floor_fraction: smallest standard deviation of an output distribution in any direction, in all iterations.
         shrinkage_frames: weight, in frames, of the pooled covariance in each covariance.
         duration_pseudocount: added to the count of each duration, so that no allowed duration becomes impossible; for a
             plain chain, to the count of each allowed transition, start and exit.
@@ -69,7 +69,7 @@ class Regularisation:
 
 @dataclass(frozen=True)
 class TrainingSummary:
-    """What training did: objective and log-likelihood per iteration, frames, sequences, whether it converged."""
+    """Summary of a training: objective and log-likelihood per iteration, frames, sequences, whether it converged."""
 
     log_likelihoods: tuple[float, ...]
     objectives: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""Rejection of movements that a model was not made for: the log-likelihood distribution test (thesis 2.2.5)."""
+"""Rejection of movements that do not belong to a model: the log-likelihood distribution test (thesis 2.2.5)."""
 
 import copy
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from paramove.hmm.sequences import SequenceLengthError
 
 
 class Likelihood(Protocol):
-    """Any model that says how likely a sequence is."""
+    """Any model with a likelihood of sequences."""
 
     def log_likelihood(self, sequence: ArrayLike) -> float: ...
 
@@ -34,12 +34,12 @@ class Generative(Likelihood, Protocol):
 class LikelihoodTest:
     """Compares ln p(X' | lambda) with the values of sequences that belong to the model.
 
-    The p-value of X' is the share of (K + 1) values, its own among them, that are not above its own: if X' is like the
-    K others, a p-value of at most `a` has probability at most `a`, whatever the model. It is never below 1 / (K + 1).
+    The p-value of X' is the fraction of (K + 1) values, including its own, that are not above its own: if X' is like
+    the K others, a p-value of at most `a` has probability at most `a` for any model. It is never below 1 / (K + 1).
 
-    The thesis draws the K sequences from the model (`of_samples`). Frames of people are not independent as those drawn
-    are, so people's movements should be compared with people's movements: held out of training (`of_sequences`), or all
-    of them by training without each in turn (`cross_validated`).
+    The thesis draws the K sequences from the model (`of_samples`). Frames of drawn sequences are independent, those of
+    people are not, so people's movements should be compared with people's movements: held out of
+    training (`of_sequences`), or all of them by training without each in turn (`cross_validated`).
 
     Attributes:
         model: lambda.
@@ -53,7 +53,7 @@ class LikelihoodTest:
     def of_sequences(cls, model: Likelihood, sequences: Sequence[ArrayLike]) -> Self:
         """Compare with sequences that the model was not trained on. Raises ValueError if there are none."""
         if len(sequences) == 0:
-            raise ValueError("no sequences were given to compare with; at least one is needed, 19 for a level of 5 %")
+            raise ValueError("no sequences to compare with: give at least one, 19 for a level of 5 %")
         return cls(model, np.sort([_value(model, sequence) for sequence in sequences]))
 
     @classmethod
@@ -66,9 +66,9 @@ class LikelihoodTest:
         """Compare with the training sequences, each judged by a copy of the model trained without it.
 
         Args:
-            model: trained on all sequences; it stays as it is.
+            model: trained on all sequences; it is not changed.
             sequences: its training sequences.
-            n_parts: leave out one of so many parts at a time; None leaves out single sequences.
+            n_parts: leave out one of this many parts at a time; None leaves out single sequences.
 
         Raises:
             ValueError: fewer than 2 sequences or parts.
@@ -84,12 +84,12 @@ class LikelihoodTest:
         return cls(model, np.sort(values))
 
     def p_value(self, sequence: ArrayLike) -> float:
-        """p(L <= L') of a new sequence, its own value counted in. A sequence of impossible length has the least."""
+        """p(L <= L') of a new sequence, including its own value. A sequence of impossible length has the minimum."""
         not_above = int(np.searchsorted(self.values, _value(self.model, sequence), side="right"))
         return (1 + not_above) / (1 + len(self.values))
 
     def accepts(self, sequence: ArrayLike, level: float = 0.05) -> bool:
-        """Whether the p-value is above `level`, the share of right movements that may be rejected.
+        """Whether the p-value is above `level`, the fraction of genuine movements that may be rejected.
 
         Raises ValueError if there are too few values to reject anything at this level.
         """

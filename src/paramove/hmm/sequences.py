@@ -10,7 +10,7 @@ from paramove.documents import Floats, Ints
 
 CACHED_VALUES = 1 << 16
 LARGEST = 1e100
-MIN_SPREAD = 1e-100
+MIN_RANGE = 1e-100
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Stack:
 
     @classmethod
     def parts(cls, sequences: Sequence[Floats], n_states: int) -> "list[Stack]":
-        """Several stacks, so small that what N states make of one stays in the processor's cache."""
+        """Several stacks, so small that the results for N states fit into the processor's cache."""
         maximum = max(1, CACHED_VALUES // n_states)
         parts: list[list[Floats]] = [[]]
         filled = 0
@@ -72,8 +72,8 @@ def checked_sequence(sequence: ArrayLike, dim: int | None = None) -> Floats:
         array = np.ascontiguousarray(sequence, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError(
-            "a sequence is an array of numbers of shape (frames, dimensions), each frame with as many; "
-            f"this one cannot be read as such: {error}"
+            "a sequence is an array of numbers of shape (frames, dimensions), the same number in each frame; "
+            f"cannot convert this one: {error}"
         ) from error
     if array.ndim != 2 or array.shape[0] == 0 or array.shape[1] == 0:
         raise ValueError(f"a sequence has shape (frames, dimensions) with at least one frame, found {array.shape}")
@@ -92,7 +92,7 @@ def checked_sequence(sequence: ArrayLike, dim: int | None = None) -> Floats:
 
 
 def checked_sequences(sequences: Sequence[ArrayLike]) -> list[Floats]:
-    """All sequences checked and of one dimension. Raises ValueError and names the sequence that is wrong."""
+    """All sequences checked and of one dimension. Raises ValueError naming the bad sequence."""
     if len(sequences) == 0:
         raise ValueError("no sequences were given; at least one is needed")
     checked: list[Floats] = []
@@ -114,26 +114,26 @@ def check_demonstrations(sequences: Sequence[Floats], floor_deviation: float) ->
     """Raise ValueError for sequences that no model can learn from, with the sequence or dimension and the remedy.
 
     These are sequences of one frame, copies of another one, and dimensions that never change, unless a floor in the
-    data's unit says how exactly they are known.
+    data's unit gives their accuracy.
     """
-    seen: dict[tuple[int, bytes, bytes], list[int]] = {}
+    by_ends: dict[tuple[int, bytes, bytes], list[int]] = {}
     for index, sequence in enumerate(sequences):
         if len(sequence) < 2:
             raise ValueError(f"sequence {index}: it has one frame, which is no movement; give at least 2 frames")
-        alike = seen.setdefault((len(sequence), sequence[0].tobytes(), sequence[-1].tobytes()), [])
-        for other in alike:
+        candidates = by_ends.setdefault((len(sequence), sequence[0].tobytes(), sequence[-1].tobytes()), [])
+        for other in candidates:
             if np.array_equal(sequences[other], sequence):
                 raise ValueError(
-                    f"sequence {index}: it is a copy of sequence {other}, which would make the variation look smaller "
-                    "than it is; leave it out"
+                    f"sequence {index}: it is a copy of sequence {other}, which makes the variation look too "
+                    "small; leave it out"
                 )
-        alike.append(index)
+        candidates.append(index)
     if floor_deviation > 0:
         return
     frames = np.concatenate(list(sequences))
     low, high = frames.min(axis=0), frames.max(axis=0)
-    spread, size = high - low, np.maximum(np.abs(low), np.abs(high))
-    constant = (spread <= 1e-12 * size) | (spread < MIN_SPREAD)
+    ranges, size = high - low, np.maximum(np.abs(low), np.abs(high))
+    constant = (ranges <= 1e-12 * size) | (ranges < MIN_RANGE)
     if constant.any():
         dimension = int(constant.argmax())
         raise ValueError(
@@ -153,7 +153,7 @@ def check_length(n_frames: int, n_states: int, d_min: int, d_max: int) -> None:
 
 
 def resample(sequence: ArrayLike, n_frames: int) -> Floats:
-    """The sequence at `n_frames` equally spaced times, linearly interpolated, ends kept. Shape (n_frames, D)."""
+    """The sequence at `n_frames` equally spaced times, linearly interpolated; the ends stay. Shape (n_frames, D)."""
     array = checked_sequence(sequence)
     if n_frames < 2:
         raise ValueError(f"resampling needs at least 2 frames, found {n_frames}")
@@ -166,6 +166,6 @@ def interpolate(points: Floats, positions: Floats) -> Floats:
     """Rows of `points` at fractional row positions, linearly interpolated. Shape (len(positions), D)."""
     lower = np.clip(np.floor(positions).astype(np.int64), 0, len(points) - 1)
     upper = np.minimum(lower + 1, len(points) - 1)
-    share = (positions - lower)[:, None]
-    result: Floats = (1.0 - share) * points[lower] + share * points[upper]
+    fraction = (positions - lower)[:, None]
+    result: Floats = (1.0 - fraction) * points[lower] + fraction * points[upper]
     return result

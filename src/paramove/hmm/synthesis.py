@@ -36,20 +36,20 @@ def prototype(means: Floats, lengths: Floats, n_samples: int | None, timing: Tim
         raise ValueError(f"a movement has at least 2 samples, found {n_samples}")
     if timing not in get_args(Timing) or path not in get_args(Path):
         raise ValueError(f"timing is 'uniform' or 'expected' and path 'linear' or 'smooth', found {timing!r}, {path!r}")
-    spent = lengths if timing == "expected" else np.ones(len(means))
+    dwell = lengths if timing == "expected" else np.ones(len(means))
     if path == "smooth" and len(means) > 1:
-        return _smooth(means, spent, n_samples)
-    centres = np.cumsum(spent) - 0.5 * spent
+        return _smooth(means, dwell, n_samples)
+    centres = np.cumsum(dwell) - 0.5 * dwell
     times = np.linspace(centres[0], centres[-1], n_samples)
     return interpolate(means, np.interp(times, centres, np.arange(len(means), dtype=np.float64)))
 
 
-def _smooth(means: Floats, spent: Floats, n_samples: int) -> Floats:
+def _smooth(means: Floats, dwell: Floats, n_samples: int) -> Floats:
     """Derivative of a cubic spline through the cumulated means: its mean over each state's time is the state's."""
     from scipy.interpolate import CubicSpline
 
-    borders = np.concatenate([[0.0], np.cumsum(spent)])
-    cumulated = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means * spent[:, None], axis=0)])
+    borders = np.concatenate([[0.0], np.cumsum(dwell)])
+    cumulated = np.concatenate([np.zeros((1, means.shape[1])), np.cumsum(means * dwell[:, None], axis=0)])
     result: Floats = CubicSpline(borders, cumulated)(np.linspace(0.0, borders[-1], n_samples), 1)
     return result
 
@@ -121,6 +121,6 @@ def at_progress(values: Floats, tau: float | Floats) -> Floats:
     position = clipped * (len(values) - 1)
     lower = np.floor(position).astype(np.int64)  # Equation (6.5), counted from 0
     upper = np.ceil(position).astype(np.int64)  # Equation (6.6)
-    share = (position - lower).reshape(position.shape + (1,) * (values.ndim - 1))  # Equation (6.4)
-    result: Floats = (1.0 - share) * values[lower] + share * values[upper]
+    fraction = (position - lower).reshape(position.shape + (1,) * (values.ndim - 1))  # Equation (6.4)
+    result: Floats = (1.0 - fraction) * values[lower] + fraction * values[upper]
     return result

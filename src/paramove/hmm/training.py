@@ -23,7 +23,7 @@ class LikelihoodDecreaseWarning(RuntimeWarning):
 
 @dataclass
 class ConvergenceMonitor:
-    """Follows the objective that EM maximises, warns when it falls, says when it has converged."""
+    """Monitors the objective that EM maximises, warns when it falls, detects convergence."""
 
     tolerance_per_frame: float
     n_frames: int
@@ -49,7 +49,7 @@ class ConvergenceMonitor:
         self.objectives.append(objective)
 
     def summary(self, n_sequences: int) -> TrainingSummary:
-        """What happened, frozen."""
+        """The summary so far."""
         history, objectives = tuple(self.log_likelihoods), tuple(self.objectives)
         return TrainingSummary(history, objectives, n_sequences, self.n_frames, self.converged)
 
@@ -90,7 +90,7 @@ def segment_outputs(
     for i, part in enumerate(np.split(frames, np.cumsum(weight[:-1]).astype(np.int64))):
         means[i] = part.mean(axis=0)
         scatter[i] = (part - means[i]).T @ (part - means[i])
-    # The first E-step needs covariances that are safe whatever the options say, hence the pooled one underneath.
+    # The first E-step needs covariances that are safe with any options, hence the pooled one underneath.
     scale = root_mean_deviation(sequences)
     target = pooled_covariance(scatter, weight) + (1e-3 * scale) ** 2 * np.eye(dim)
     added, shrinkage = (options.prior_fraction * scale) ** 2, max(dim, options.shrinkage_frames)
@@ -110,17 +110,17 @@ def train(
     def expect(parameters: Parameters) -> Statistics:
         return Statistics.of(parameters, stacks, kind)
 
-    def maximise(old: Parameters, found: Statistics, regularisation: Regularisation) -> Parameters:
-        means = found.means()
-        covariances = covariances_of(found.scatter(means), found.weight, regularisation, kind)
-        durations = durations_of(found.durations, old.d_min, regularisation.duration_pseudocount)
+    def maximise(old: Parameters, statistics: Statistics, regularisation: Regularisation) -> Parameters:
+        means = statistics.means()
+        covariances = covariances_of(statistics.scatter(means), statistics.weight, regularisation, kind)
+        durations = durations_of(statistics.durations, old.d_min, regularisation.duration_pseudocount)
         return Parameters(means, covariances, durations, old.d_min)
 
     return iterate(initial, sequences, options, expect, maximise, penalty)
 
 
 class Expectation(Protocol):
-    """What an E-step finds, as far as the loop below must know it."""
+    """The result of an E-step that the loop below needs."""
 
     @property
     def log_likelihood(self) -> float: ...
@@ -134,15 +134,15 @@ class Expectation(Protocol):
 
 
 Model = TypeVar("Model")
-Found = TypeVar("Found", bound=Expectation)
+Expected = TypeVar("Expected", bound=Expectation)
 
 
 def iterate(
     initial: Model,
     sequences: Sequence[Floats],
     options: TrainingOptions,
-    expect: Callable[[Model], Found],
-    maximise: Callable[[Model, Found, Regularisation], Model],
+    expect: Callable[[Model], Expected],
+    maximise: Callable[[Model, Expected, Regularisation], Model],
     penalise: Callable[[Model, Regularisation], float],
 ) -> tuple[Model, TrainingSummary]:
     """Expectation maximisation with annealed prior and convergence monitor, for any kind of HMM."""
@@ -151,15 +151,15 @@ def iterate(
     parameters = initial
     target: Floats | None = None
     for iteration in range(options.max_iterations):
-        found = expect(parameters)
+        statistics = expect(parameters)
         annealing = iteration < options.annealing_iterations
         # The target moves while the prior does and then stays, which makes the objective a fixed function.
         if annealing or target is None or iteration == options.annealing_iterations:
-            target = pooled_covariance(found.scatter(found.means()), found.weight)
+            target = pooled_covariance(statistics.scatter(statistics.means()), statistics.weight)
         regularisation = regularisation_at(iteration, options, scale, target)
-        objective = None if annealing else found.log_likelihood + penalise(parameters, regularisation)
-        monitor.add(found.log_likelihood, objective)
-        parameters = maximise(parameters, found, regularisation)
+        objective = None if annealing else statistics.log_likelihood + penalise(parameters, regularisation)
+        monitor.add(statistics.log_likelihood, objective)
+        parameters = maximise(parameters, statistics, regularisation)
         if monitor.converged:
             break
     logger.debug("trained on %d sequences in %d iterations", len(sequences), iteration + 1)

@@ -8,7 +8,7 @@ import numpy as np
 from paramove.documents import Floats, Ints
 from paramove.hmm.compilation import compiled_arithmetic, compiled_sums
 
-UNDERFLOW = -230.0  # of a share that is lost without trace: 1e-100
+UNDERFLOW = -230.0  # of a fraction that is negligible: 1e-100
 LOG2_E = 1.4426950408889634
 LN2_HIGH = 0.693147180369123816490  # the upper 33 bits of ln 2, and the rest
 LN2_LOW = 1.90821492927058770002e-10
@@ -62,7 +62,7 @@ def log_of_one_plus(values: Floats, n: int, result: Floats) -> None:
 @compiled_arithmetic
 def log_of_positive(values: Floats, n: int, bits: Ints, result: Floats) -> None:
     """ln x of the first n values, normal numbers above 0: x = 2^k m with m in [0.7, 1.42), ln m = 2 artanh of at most
-    0.172. `bits` is room for n numbers."""
+    0.172. `bits` is scratch space for n numbers."""
     numbers, mantissas = bits.view(np.float64), result.view(np.int64)
     for j in range(n):
         numbers[j] = values[j]

@@ -2,7 +2,7 @@
 
 The upper arm is a tapered capsule from shoulder to elbow, the forearm one from elbow to wrist (the convex hulls of two
 spheres each), the hand an ellipsoid from the wrist to the tip of the index finger, in line with the forearm unless the
-pose tells where the wrist is.
+pose includes the wrist.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from paramove.documents import Floats, InputError
 POSE_POINTS = ("shoulder", "elbow", "hand")
 """The three points of an arm pose, in this order; the hand is the tip of the index finger."""
 BENT_POSE_POINTS = (*POSE_POINTS, "wrist")
-"""The four points of a pose that also tells where the wrist is. Without it the hand is in line with the forearm."""
+"""The four points of a pose that includes the wrist. Without it the hand is in line with the forearm."""
 HAND = slice(6, 9)
 """The coordinates of the hand in either pose."""
 
 _DEMONSTRATOR = ArmLengths()
 _BACK_AND_DOWN = np.array([-1.0, 0.0, -1.0])
 _MIN_BEND = 1e-9
-"""An elbow nearer than this to the line from shoulder to hand, m, tells no plane."""
+"""An elbow nearer than this to the line from shoulder to hand, m, defines no plane."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ArmSizes:
         for field in fields(self):
             value = getattr(self, field.name)
             if not (np.isfinite(value) and value > 0.0):
-                raise InputError(f"{field.name} of an arm is {value}: a length above 0 m is expected")
+                raise InputError(f"{field.name} of an arm: expected a length above 0 m, found {value}")
 
     @property
     def lower_arm(self) -> float:
@@ -74,21 +74,21 @@ class ArmSizes:
     def from_posture(cls, posture: ArrayLike) -> ArmSizes:
         """Sizes from measured postures (9,) or (M, 9), m: medians of the lengths; the rest is the default's, scaled.
 
-        The forearm and the hand share the measured length from elbow to fingertip as they do in the default, and the
-        thickness of all parts grows with the length of the arm. Raises InputError for postures that are no arm's.
+        The measured length from elbow to fingertip is divided between forearm and hand as in the default; the thickness
+        of all parts grows with the length of the arm. Raises InputError for lengths that no arm has.
         """
         points = np.atleast_2d(np.asarray(posture, dtype=np.float64)).reshape(-1, 3, 3)
         upper = float(np.median(np.linalg.norm(points[:, 1] - points[:, 0], axis=1)))
         lower = float(np.median(np.linalg.norm(points[:, 2] - points[:, 1], axis=1)))
         if not (0.1 < upper < 0.6 and 0.15 < lower < 0.9):
             raise InputError(
-                f"a posture with {upper:.3f} m from shoulder to elbow and {lower:.3f} m from elbow to fingertip found; "
-                "an arm of 0.1 to 0.6 m and 0.15 to 0.9 m expected: are the points shoulder, elbow, fingertip, in m?"
+                "expected an arm of 0.1 to 0.6 m from shoulder to elbow and 0.15 to 0.9 m from elbow to fingertip, "
+                f"found {upper:.3f} m and {lower:.3f} m: are the points shoulder, elbow, fingertip, in m?"
             )
         default = cls()
-        share = default.forearm / default.lower_arm
+        forearm_fraction = default.forearm / default.lower_arm
         scaled = default.scaled((upper + lower) / default.length)
-        return replace(scaled, upper_arm=upper, forearm=share * lower, hand=(1.0 - share) * lower)
+        return replace(scaled, upper_arm=upper, forearm=forearm_fraction * lower, hand=(1.0 - forearm_fraction) * lower)
 
 
 def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:
@@ -103,7 +103,7 @@ def fitted_poses(poses: ArrayLike, sizes: ArmSizes) -> Floats:
     points = np.asarray(poses, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (9, 12):
         raise InputError(
-            f"poses of shape {points.shape} found, (M, 9) expected: shoulder, elbow, hand; or (M, 12): and wrist"
+            f"expected poses (M, 9), shoulder, elbow, hand, or (M, 12), also the wrist; found shape {points.shape}"
         )
     points = np.where(np.isfinite(points).all(axis=1, keepdims=True), points, np.nan)
     if points.shape[1] == 9:
@@ -136,7 +136,7 @@ def _elbow_fitted(points: Floats, upper: float, lower: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Of length 1, (M, 3); zeros stay."""
+    """Vectors scaled to length 1, (M, 3); zeros stay."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), _MIN_BEND))
 
 

@@ -31,13 +31,13 @@ from paramove.observation.likelihood_kernels import (
 )
 from paramove.observation.matching_kernels import match, new_shifts
 from paramove.observation.options import ObservationOptions
-from paramove.observation.presence import Presence, seen_presence
-from paramove.observation.segment_sums import LANES, NX, NY, SHARE
+from paramove.observation.presence import Presence, presence_in_view
+from paramove.observation.segment_sums import FRACTION, LANES, NX, NY
 from paramove.observation.silhouette_kernels import Camera, new_canvas
 
 MIN_AREA_PX = 200.0
 CHUNK = 50
-"""Most postures that a thread takes at a time: their silhouettes share one canvas."""
+"""Maximum number of postures that a thread takes at a time: their silhouettes use one canvas."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class _View:
     kernel: Camera
     edges: EdgeImages
     background: Background | None
-    seen: bool = False
+    has_image: bool = False
     arm_area: float = 0.0
 
 
@@ -77,10 +77,10 @@ class ArmObserver:
 
     Args:
         sizes: of the person's arm.
-        cameras: one to as many as one likes; images come in this order.
+        cameras: one or more; images come in this order.
         options: parameters of the comparison.
         table: corners of the table's top in order, (n, 2), m, in its plane z = 0 of the world: it hides what is below.
-        threads: that share the work; as many as there are processors by default.
+        threads: number of worker threads; by default as many as there are processors.
     """
 
     def __init__(
@@ -93,13 +93,13 @@ class ArmObserver:
         threads: int | None = None,
     ) -> None:
         if not cameras:
-            raise InputError("no camera given: an arm is observed by at least one")
+            raise InputError("no camera given: expected at least one")
         self.sizes = sizes
         self.options = options if options is not None else ObservationOptions()
         self.threads = max(1, threads if threads is not None else len(os.sched_getaffinity(0)))
         corners = None if table is None else np.asarray(table, dtype=np.float64)
         if corners is not None and (corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3):
-            raise InputError(f"a table of shape {corners.shape} found, three or more corners (x, y) in m expected")
+            raise InputError(f"expected a table of three or more corners (x, y) in m, found shape {corners.shape}")
         self.table = corners
         self._views = [self._view(camera) for camera in cameras]
         radii = (sizes.shoulder_radius, sizes.elbow_radius, sizes.wrist_radius)
@@ -109,9 +109,9 @@ class ArmObserver:
 
     def _view(self, camera: CalibratedCamera) -> _View:
         small = camera.resized(self.options.width_px, self.options.height_px)
-        turn, shift = small.camera_from_world[:3, :3].copy(), small.camera_from_world[:3, 3].copy()
-        table = _table_seen(small, self.table)
-        kernel = Camera(turn, shift, small.matrix.copy(), small.width_px, small.height_px, table)
+        rotation, shift = small.camera_from_world[:3, :3].copy(), small.camera_from_world[:3, 3].copy()
+        table = _table_mask(small, self.table)
+        kernel = Camera(rotation, shift, small.matrix.copy(), small.width_px, small.height_px, table)
         learned = self.options.region_weight > 0.0 and self.options.likelihood == "matched"
         background = Background(small.width_px, small.height_px, self.options.still_edges) if learned else None
         return _View(camera, small, kernel, EdgeImages(self.options), background)
@@ -122,9 +122,9 @@ class ArmObserver:
         return tuple(view.camera for view in self._views)
 
     @property
-    def seen(self) -> tuple[bool, ...]:
+    def has_image(self) -> tuple[bool, ...]:
         """Which views had an image in the last `look`."""
-        return tuple(view.seen for view in self._views)
+        return tuple(view.has_image for view in self._views)
 
     @property
     def sharpness(self) -> Floats:
@@ -132,18 +132,18 @@ class ArmObserver:
 
         A covered or dark camera stays below about 2, whatever its noise; a lit scene has 10 and more.
         """
-        return np.array([view.edges.sharpness if view.seen else np.nan for view in self._views])
+        return np.array([view.edges.sharpness if view.has_image else np.nan for view in self._views])
 
     def look(self, images: Sequence[Image | None]) -> None:
-        """Take one image of each view, (H, W, 3) uint8, RGB or BGR alike; None is a view that is missing now.
+        """Take one image of each view, (H, W, 3) uint8, RGB or BGR; None for a missing view.
 
         The images must have the sizes of the calibration. Lens distortion is undone here, in the image. Raises
         InputError for another number, shape or type of images; the observer then has no image at all.
         """
         for view in self._views:
-            view.seen = False
+            view.has_image = False
         if len(images) != len(self._views):
-            raise InputError(f"{len(images)} images found, {len(self._views)} expected, None for a missing one")
+            raise InputError(f"expected {len(self._views)} images, None for a missing one; found {len(images)}")
         given = [(view, image) for view, image in zip(self._views, images, strict=True) if image is not None]
         for view, image in given:
             _check(view.camera, image)
@@ -157,17 +157,17 @@ class ArmObserver:
             ]
         )
         for view, _ in given:
-            view.seen = True
+            view.has_image = True
 
     def log_likelihoods(self, poses: ArrayLike) -> Floats:
         """ln P(I | x) of postures (M, 9), m, in the world's frame, up to a constant; (M,).
 
         Postures are fitted to the arm first. The errors of the views that have an image are added, (6.22), and
-        divided by 2 gamma^2, gamma for that many views. A view in which the arm is out of sight counts as if no edge
-        were there. A posture with NaN or infinity gets -inf. Without any image all are 0: nothing is known.
+        divided by 2 gamma^2, gamma for that many views. A view without the arm in sight counts as one without
+        edges. A posture with NaN or infinity gets -inf. Without any image all are 0: nothing is known.
         """
         fitted = fitted_poses(poses, self.sizes)
-        views = [view for view in self._views if view.seen]
+        views = [view for view in self._views if view.has_image]
         usable = np.isfinite(fitted).all(axis=1)
         result = np.where(usable, 0.0, -np.inf)
         if views and usable.any():
@@ -192,19 +192,19 @@ class ArmObserver:
         return flat.reshape(small.height_px + 2, small.width_px + 2)[1:-1, 1:-1].copy()
 
     def presence(self, pose: ArrayLike) -> Presence:
-        """What speaks for an arm in this posture, (9,), m, being seen at all; after `log_likelihoods`."""
+        """Evidence that the images show an arm in this posture, (9,), m; call after `log_likelihoods`."""
         fitted = fitted_poses(np.reshape(pose, (1, -1)), self.sizes)[0]
-        found = [
-            seen_presence(
+        presences = [
+            presence_in_view(
                 fitted, view.small, view.kernel.table, view.background.change, max(view.arm_area, MIN_AREA_PX)
             )
             for view in self._views
-            if view.background is not None and view.seen and np.isfinite(fitted).all()
+            if view.background is not None and view.has_image and np.isfinite(fitted).all()
         ]
-        return Presence.mean(found)
+        return Presence.mean(presences)
 
     def learn(self, pose: ArrayLike, elapsed_s: float) -> None:
-        """Take the images of the last `look` for the background of the arm in this posture, (9,), m.
+        """Update the background from the images of the last `look`, around the arm in this posture, (9,), m.
 
         The cameras must stand still. Call it after each image in which the arm is not lost.
         """
@@ -212,7 +212,7 @@ class ArmObserver:
         if not np.isfinite(fitted).all():
             return
         for view in self._views:
-            if view.background is None or not view.seen:
+            if view.background is None or not view.has_image:
                 continue
             hidden = np.zeros((view.small.height_px, view.small.width_px), np.uint8)
             silhouette(fitted, self._body, view.kernel, new_canvas(view.kernel.width, view.kernel.height), hidden)
@@ -247,7 +247,7 @@ class ArmObserver:
         return self.options.key_point_px, self.options.shift_unit, self.options.min_background
 
     def _run(self, jobs: Sequence[Callable[[], None]]) -> None:
-        """Do all jobs, which release the interpreter, on the threads; what one raises is raised."""
+        """Run all jobs, which release the interpreter lock, on the threads; raises what a job raises."""
         if self._pool is None or len(jobs) < 2:
             for job in jobs:
                 job()
@@ -266,7 +266,7 @@ class ArmObserver:
         Raises InputError if that view has no image or the likelihood is the simple one.
         """
         edges = self._views[view].edges
-        if not self._views[view].seen or self.options.likelihood == "simple":
+        if not self._views[view].has_image or self.options.likelihood == "simple":
             raise InputError(f"view {view} has no image to match with, or the likelihood is 'simple'")
         contour, count = self._contour(pose, view)
         if count == 0:
@@ -280,13 +280,13 @@ class ArmObserver:
         return self._matched(view, number, contour, shifts.shift, values, energy)
 
     def _matched(self, view: int, number: int, contour: Contour, s: Any, values: Any, energy: float) -> ContourMatch:
-        """The matching of a contour with the kernels' filling up of segments taken away."""
+        """The matching of a contour without the points with which the kernels fill up segments."""
         lane = np.arange(LANES)
         filled = EVERY * lane < np.diff(contour.starts[: number + 1])[:, None]
         compared = (contour.starts[:number, None] + EVERY * lane)[filled]
         rows = contour.lanes[:, LANES : (number + 1) * LANES].reshape(-1, number, LANES)[:, filled].astype(np.float64)
         segment = np.nonzero(filled)[0]
-        moved = (1.0 - rows[SHARE]) * s[segment] + rows[SHARE] * s[(segment + 1) % number]
+        moved = (1.0 - rows[FRACTION]) * s[segment] + rows[FRACTION] * s[(segment + 1) % number]
         normals = np.stack([rows[NX], rows[NY]], axis=1)
         edge = np.stack([contour.x[compared], contour.y[compared]], axis=1) + 0.5 * normals
         matched = edge + moved[:, None] * normals
@@ -307,15 +307,15 @@ class ArmObserver:
         return camera.distort((points + 0.5) * scale - 0.5)
 
 
-def _table_seen(camera: CalibratedCamera, corners: Floats | None) -> NDArray[np.uint8]:
-    """1 where the table is seen in the undistorted image, flat with one pixel of zeros about it; empty without one."""
+def _table_mask(camera: CalibratedCamera, corners: Floats | None) -> NDArray[np.uint8]:
+    """1 where the undistorted image shows the table, flat with a border of one pixel; empty without a table."""
     if corners is None:
         return np.zeros(0, np.uint8)
-    seen = camera.project(np.column_stack([corners, np.zeros(len(corners))]), distorted=False)
+    corners_px = camera.project(np.column_stack([corners, np.zeros(len(corners))]), distorted=False)
     mask = np.zeros((camera.height_px + 2, camera.width_px + 2), np.uint8)
-    if np.isfinite(seen).all():  # a table that reaches behind the camera is left out
+    if np.isfinite(corners_px).all():  # a table that reaches behind the camera is ignored
         inside = np.zeros((camera.height_px, camera.width_px), np.uint8)
-        cv2.fillPoly(inside, [np.clip(seen, -1e4, 1e4).round().astype(np.int32)], 1)
+        cv2.fillPoly(inside, [np.clip(corners_px, -1e4, 1e4).round().astype(np.int32)], 1)
         mask[1:-1, 1:-1] = inside
     return mask.reshape(-1)
 
@@ -323,8 +323,8 @@ def _table_seen(camera: CalibratedCamera, corners: Floats | None) -> NDArray[np.
 def _check(camera: CalibratedCamera, image: Image) -> None:
     if image.dtype != np.uint8 or image.shape != (camera.height_px, camera.width_px, 3):
         raise InputError(
-            f"camera {camera.name!r}: an image of shape {image.shape} and type {image.dtype} found, "
-            f"({camera.height_px}, {camera.width_px}, 3) uint8 expected as calibrated"
+            f"camera {camera.name!r}: expected an image of shape ({camera.height_px}, {camera.width_px}, 3) and type "
+            f"uint8, as calibrated; found {image.shape} and {image.dtype}"
         )
 
 
@@ -338,4 +338,4 @@ def _see(view: _View, image: Image) -> None:
         view.edges.see(smoothed)
         return
     view.background.see(smoothed)
-    view.edges.see(smoothed, view.background.weights if view.background.known_share > 0.0 else None)
+    view.edges.see(smoothed, view.background.weights if view.background.known_fraction > 0.0 else None)

@@ -1,4 +1,4 @@
-"""Kernels of the background: how much each pixel has changed, and learning what is behind the arm."""
+"""Kernels of the background: how much each pixel has changed, and learning the background."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,11 @@ Signed = NDArray[np.int8]
 Floats32 = NDArray[np.float32]
 
 FULL = 100
-"""Of a change: a pixel that surely shows something else has this, one that surely shows the background its negative."""
+"""Change of a pixel that certainly shows something else; its negative: certainly the background."""
 DARKEST, BRIGHTEST = np.float32(0.35), np.float32(1.02)
 """A shadow multiplies the background's colour by a factor between these."""
 SHIFTED_PX = 2
-"""What was so near before has only moved a little, as the clothes of a person who sways."""
+"""A colour that was this near before has only moved a little, such as the clothes of a person who sways."""
 
 
 @compiled
@@ -33,10 +33,10 @@ def samples(image: Bytes, background: Floats32, known: Bytes, every: int) -> tup
 
 
 @compiled
-def nearest_beside(
+def nearest_around(
     image: Bytes, background: Floats32, known: Bytes, scale: np.float32, row: int, column: int
 ) -> np.float32:
-    """Least squared distance of the colour of a pixel from those of the known background around it."""
+    """Minimum squared distance of the colour of a pixel from those of the known background around it."""
     height, width = known.shape
     minimum = np.float32(1e9)
     for y in range(max(row - SHIFTED_PX, 0), min(row + SHIFTED_PX + 1, height)):
@@ -56,12 +56,12 @@ def changes(
 ) -> None:
     """How much each pixel differs from the background, -FULL to FULL; 0 where the background is not known.
 
-    What a shadow may explain counts as 0 at most: the colour is the background's, only darker.
+    A pixel that may be in shadow gets 0 at most: it has the colour of the background, only darker.
 
     Args:
         image: (H, W, 3). background: (H, W, 3), times `gain`. known: 1 where it is known, (H, W).
-        low, high: distances of colours, grey levels, that are surely noise and surely none.
-        out: (H + 2, W + 2), one pixel of zeros about the image. still: 255 where nothing changed, else 0; (H, W).
+        low, high: distances of colours, grey levels, that are certainly noise and certainly not.
+        out: (H + 2, W + 2), a border of one pixel of zeros. still: 255 where nothing changed, else 0; (H, W).
     """
     height, width = known.shape
     unit = np.float32(2.0 / (high - low))
@@ -87,7 +87,7 @@ def changes(
                 if np.sqrt(max(beside, np.float32(0.0))) < np.float32(high) * np.float32(0.7):
                     value = np.float32(0.0)
             if value > np.float32(0.0):
-                distance = np.sqrt(min(squared, nearest_beside(image, background, known, scale, y, x)))
+                distance = np.sqrt(min(squared, nearest_around(image, background, known, scale, y, x)))
                 value = min(max((distance - np.float32(low)) * unit - np.float32(1.0), np.float32(0.0)), value)
             out[y + 1, x + 1] = np.int8(value * np.float32(FULL))
             still[y, x] = 255 if value < np.float32(-0.5) else 0
@@ -101,7 +101,7 @@ def learn(
     """Takes an image into the background, where no arm is.
 
     Args:
-        away: how long each pixel has been beside the arm and not known, s. hidden: 1 where the arm may be, (H, W).
+        away: how long each pixel has been outside the arm and unknown, s. hidden: 1 where the arm may be, (H, W).
         change: of this image, see `changes`. elapsed: s since the last image.
         numbers: s after which a pixel is known; s in which the background follows slow changes, and larger ones.
     """
@@ -114,9 +114,9 @@ def learn(
                 away[y, x] = np.float32(0.0)
                 continue
             if known[y, x] != 0:
-                share = slow if change[y + 1, x + 1] < 0 else slower
+                gain = slow if change[y + 1, x + 1] < 0 else slower
                 for c in range(3):
-                    background[y, x, c] += share * (np.float32(image[y, x, c]) - background[y, x, c])
+                    background[y, x, c] += gain * (np.float32(image[y, x, c]) - background[y, x, c])
                 continue
             away[y, x] += np.float32(elapsed)
             if away[y, x] >= np.float32(numbers[0]):
@@ -128,11 +128,14 @@ def learn(
 @compiled
 def covered(mask: Bytes, change: Signed, top: int, bottom: int, width: int, left: NDArray[np.int32],
             right: NDArray[np.int32]) -> tuple[int, int]:  # fmt: skip
-    """Sum of the changes under a silhouette and its area, px; mask and change flat with one pixel about the image."""
+    """Sum of the changes under a silhouette and its area, px; mask and change flat with a border of one pixel."""
     total, area = np.int32(0), np.int32(0)
     for y in range(top, bottom + 1):
-        place = (y + 1) * (width + 2) + 1
-        inside, changed = mask[place + left[y] : place + right[y] + 1], change[place + left[y] : place + right[y] + 1]
+        offset = (y + 1) * (width + 2) + 1
+        inside, changed = (
+            mask[offset + left[y] : offset + right[y] + 1],
+            change[offset + left[y] : offset + right[y] + 1],
+        )
         for x in range(len(inside)):
             total += np.int32(inside[x]) * np.int32(changed[x])
             area += np.int32(inside[x])

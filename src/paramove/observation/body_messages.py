@@ -1,4 +1,4 @@
-"""What a moment of the body tracker is on the bus: arm pose, and the arm drawn in the first camera's image."""
+"""Bus messages of the body tracker: arm pose, and the arm drawn in the first camera's image."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from paramove.cameras import WORLD_FRAME, CalibratedCamera
 from paramove.msgs.arm_pose_pb2 import ArmPose
-from paramove.observation.body_tracking import BodyMoment
+from paramove.observation.body_tracking import BodyPoints
 
 ALONG_THE_ARM = ("sternum", "shoulder", "elbow", "wrist", "knuckle", "index")
 GREEN = (0.2, 1.0, 0.4)
 
 
-def arm_pose_message(moment: BodyMoment) -> ArmPose:
-    """The points that were seen."""
+def arm_pose_message(body: BodyPoints) -> ArmPose:
+    """The detected points."""
     message = ArmPose(frame=WORLD_FRAME)
-    message.captured.FromNanoseconds(moment.captured_ns)
-    for name, point in moment.points.items():
-        x, y, z = point.place
+    message.captured.FromNanoseconds(body.captured_ns)
+    for name, point in body.points.items():
+        x, y, z = point.position
         message.points.add(name=name, x=x, y=y, z=z)
     return message
 
 
-def outline_message(moment: BodyMoment, camera: CalibratedCamera) -> ImageAnnotations:
-    """The points that were seen, joined by a line, in the image of a camera as captured."""
+def outline_message(body: BodyPoints, camera: CalibratedCamera) -> ImageAnnotations:
+    """The detected points, joined by a line, in the image of a camera as captured."""
     message = ImageAnnotations()
-    message.timestamp.FromNanoseconds(moment.captured_ns)
+    message.timestamp.FromNanoseconds(body.captured_ns)
     line = message.points.add(type=PointsAnnotation.LINE_STRIP, thickness=2.0)
     line.timestamp.CopyFrom(message.timestamp)
     line.outline_color.r, line.outline_color.g, line.outline_color.b = GREEN
     line.outline_color.a = 1.0
-    for name in _in_order(list(moment.points)):
-        x, y = camera.project(moment.points[name].place)
+    for name in _in_order(list(body.points)):
+        x, y = camera.project(body.points[name].position)
         if np.isfinite((x, y)).all():
             line.points.add(x=x, y=y)
             circle = message.circles.add(diameter=5.0, thickness=1.0)
@@ -47,17 +47,17 @@ def outline_message(moment: BodyMoment, camera: CalibratedCamera) -> ImageAnnota
     return message
 
 
-def scene_message(moment: BodyMoment) -> SceneUpdate:
-    """The points that were seen, joined by a line, in the world."""
+def scene_message(body: BodyPoints) -> SceneUpdate:
+    """The detected points, joined by a line, in the world."""
     message = SceneUpdate()
     entity = message.entities.add(id="arm", frame_id=WORLD_FRAME)
-    entity.timestamp.FromNanoseconds(moment.captured_ns)
+    entity.timestamp.FromNanoseconds(body.captured_ns)
     entity.lifetime.FromMilliseconds(1000)
     arm = entity.lines.add(thickness=0.02)
     arm.color.g = arm.color.a = 1.0
     arm.pose.orientation.w = 1.0
-    for name in _in_order(list(moment.points)):
-        x, y, z = moment.points[name].place
+    for name in _in_order(list(body.points)):
+        x, y, z = body.points[name].position
         arm.points.add(x=x, y=y, z=z)
     return message
 

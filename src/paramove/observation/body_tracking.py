@@ -1,4 +1,4 @@
-"""The stereo body tracker on streams of images: which images show one moment, where the arm is, and what is wrong."""
+"""The stereo body tracker on streams of images: aligns the images in time, locates the arm, and reports problems."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from paramove.documents import Image, InputError
 from paramove.objects import Colour
 from paramove.observation.markers import ArucoMarker, BodyTrackerOptions, MarkedPoint, StereoBodyTracker
 
-UNSEEN_S = 3.0
-"""A point that was not seen by two cameras for so long is told. A hand that rests below the table comes back sooner."""
+UNDETECTED_S = 3.0
+"""A point that two cameras have not detected for this long is reported. A hand below the table returns sooner."""
 
 
 @dataclass(frozen=True)
-class BodyMoment:
-    """The marked points of one moment.
+class BodyPoints:
+    """The marked points at one time.
 
     Attributes:
         captured_ns: Of the images.
-        points: Those that at least two cameras saw.
+        points: Those that at least two cameras detected.
     """
 
     captured_ns: int
@@ -31,14 +31,14 @@ class BodyMoment:
 
 
 class BodyTracking:
-    """Brings the images of one moment together and finds the marked points in them.
+    """Aligns the images of the cameras in time and locates the marked points in them.
 
     Args:
         cameras: As calibrated.
         options: What marks which point.
         period_s: Time between two images of a camera, s.
 
-    Raises StereoError for fewer than two cameras, InputError for markers given twice or none.
+    Raises StereoError for fewer than two cameras, InputError for duplicate markers or none.
     """
 
     def __init__(self, cameras: Sequence[CalibratedCamera], options: BodyTrackerOptions, period_s: float) -> None:
@@ -47,7 +47,7 @@ class BodyTracking:
         self._views = AlignedViews(list(self._calibrated), period_s)
         self._names = tuple(options.markers)
         self._watch = CameraWatch(cameras)
-        self._seen_ns: dict[str, int] = {}
+        self._detected_ns: dict[str, int] = {}
         self._latest_ns = 0
 
     @property
@@ -60,41 +60,45 @@ class BodyTracking:
         """Of the marked points."""
         return self._names
 
-    def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[BodyMoment]:
-        """The moments that this image of a calibrated camera completes.
+    def see(self, camera: str, captured_ns: int, image: Image) -> Iterator[BodyPoints]:
+        """The points at each time that this image of a calibrated camera completes.
 
-        One of another size than calibrated is left out and told; so is a late one, untold.
+        An image of another size than calibrated is ignored and reported; a late one is ignored silently.
         """
         if self._watch.accepts(camera, captured_ns, image):
             for views in self._views.add(camera, captured_ns, image):
-                yield self._moment(views)
+                yield self._located(views)
 
     def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
-        """An image that could not even be read."""
+        """Reports an image that could not be decoded."""
         self._watch.refuse(camera, captured_ns, why)
 
     def tick(self, now_ns: int) -> None:
-        """Time has passed, with images or without."""
+        """Advances the time, with images or without."""
         self._watch.tick(now_ns)
 
     def trouble(self) -> str:
-        """What cameras and markers do not tell at present; "" if all is well."""
-        return "; ".join([*self._watch.troubles(), *self._unseen()])
+        """Cameras without usable images and points that are not detected; "" if nothing is wrong."""
+        return "; ".join([*self._watch.troubles(), *self._undetected()])
 
-    def _moment(self, views: Views) -> BodyMoment:
+    def _located(self, views: Views) -> BodyPoints:
         points = self._tracker.located(views.images)
         self._latest_ns = views.captured_ns
         for name in self._names:
-            self._seen_ns.setdefault(name, views.captured_ns)
+            self._detected_ns.setdefault(name, views.captured_ns)
             if name in points:
-                self._seen_ns[name] = views.captured_ns
-        return BodyMoment(views.captured_ns, points)
+                self._detected_ns[name] = views.captured_ns
+        return BodyPoints(views.captured_ns, points)
 
-    def _unseen(self) -> list[str]:
-        names = [name for name, seen_ns in self._seen_ns.items() if self._latest_ns - seen_ns > UNSEEN_S * 1e9]
+    def _undetected(self) -> list[str]:
+        names = [
+            name
+            for name, detected_ns in self._detected_ns.items()
+            if self._latest_ns - detected_ns > UNDETECTED_S * 1e9
+        ]
         if not names:
             return []
-        return [f"no two cameras see {', '.join(names)}: turn the markers to the cameras, or look at the light"]
+        return [f"fewer than two cameras see {', '.join(names)}: turn the markers to the cameras, or check the light"]
 
 
 class MarkerSetup(BaseModel):
@@ -121,7 +125,7 @@ class MarkerSetup(BaseModel):
         return self
 
     def marker(self, name: str) -> ArucoMarker | Colour:
-        """For `StereoBodyTracker`. Raises InputError for a number or a colour that there is not."""
+        """For `StereoBodyTracker`. Raises InputError for an invalid number or colour."""
         if self.hue_deg is None:
             assert self.number is not None
             return ArucoMarker(self.number, self.inset)
@@ -137,7 +141,7 @@ class BodyTrackingSetup(BaseModel):
     Attributes:
         cameras: Calibration file; its cameras are camera_1, camera_2, … in their order.
         markers: Name of a point of the arm, as `ArmPose` has it -> what marks it.
-        max_residual_px: A point whose views disagree by more is left out.
+        max_residual_px: A point whose views disagree by more is rejected.
         rate_hz: Of the cameras.
     """
 

@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 from paramove.documents import Bytes
 from paramove.hmm import compiled, compiled_arithmetic
 from paramove.observation.edge_kernels import COSINES, DIRECTIONS, MARGIN, SINES
-from paramove.observation.segment_sums import BASE, FIELDS, LANES, NX, NY, PX, PY, SHARE
+from paramove.observation.segment_sums import BASE, FIELDS, FRACTION, LANES, NX, NY, PX, PY
 
 Floats32 = NDArray[np.float32]
 Ints32 = NDArray[np.int32]
 
 MIN_POINTS = 24
-"""A shorter contour is none: the arm is as good as out of sight."""
+"""A shorter contour is ignored: the arm is nearly out of sight."""
 EVERY = 2
-"""Of the contour pixels every second one is compared: in a smoothed image the one between says the same."""
+"""Of the contour pixels every second one is compared: in a smoothed image the one between adds nothing."""
 NORMAL_STEP = 4
-"""The normal at a point is across the line between the points so many places before and after it."""
+"""The normal at a point is across the line between the points this many pixels before and after it."""
 
 STEPS_X = np.array([-1, -1, 0, 1, 1, 1, 0, -1], np.int32)
 STEPS_Y = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int32)
@@ -28,12 +28,12 @@ STEPS_Y = np.array([0, 1, 1, 1, 0, -1, -1, -1], np.int32)
 def next_steps() -> NDArray[np.int8]:
     """For each neighbour that the loop came from and each set of neighbours that are in the mask, as bits: the next.
 
-    The first one in the mask after that which the loop came from, which is asked last; -1: none. Flat, 8 x 256.
+    The first neighbour in the mask after the one that the loop came from, which is tried last; -1: none. Flat, 8 x 256.
     """
     orders = (np.arange(8)[:, None] + np.arange(1, 9)) & 7
-    there = np.arange(256)[None, :, None] >> orders[:, None, :] & 1
-    found = np.take_along_axis(orders[:, None, :], there.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
-    return np.where(there.any(axis=2), found, -1).astype(np.int8).reshape(-1)
+    in_mask = np.arange(256)[None, :, None] >> orders[:, None, :] & 1
+    neighbour = np.take_along_axis(orders[:, None, :], in_mask.argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
+    return np.where(in_mask.any(axis=2), neighbour, -1).astype(np.int8).reshape(-1)
 
 
 NEXT_STEPS = next_steps()
@@ -44,7 +44,7 @@ class Contour(NamedTuple):
 
     Attributes:
         x, y: contour pixels in order, (N_max,).
-        starts: place of each key point in the contour, (K_max + 1,); starts[K] = N.
+        starts: index of each key point in the contour, (K_max + 1,); starts[K] = N.
         normals: outward at the key points, (2, K_max).
         keys: the key points, (2, K_max), in the edge images' coordinates without margin.
         lanes: of each segment, (FIELDS, (K_max + 1) LANES). Segment k is at slot k + 1; slot 0 repeats the last one, so
@@ -84,30 +84,30 @@ def trace(mask: Bytes, width: int, row: int, left: int, contour: Contour) -> int
     stride, xs, ys = width + 2, contour.x, contour.y
     steps = (-1, stride - 1, stride, stride + 1, 1, 1 - stride, -stride, -stride - 1)
     x, y = np.int32(left), np.int32(row)
-    place = (row + 1) * stride + left + 1
-    while x < width and mask[place] == 0:
-        x, place = np.int32(x + 1), place + 1
+    pixel = (row + 1) * stride + left + 1
+    while x < width and mask[pixel] == 0:
+        x, pixel = np.int32(x + 1), pixel + 1
     if x == width:
         return 0
-    maximum, count, first, first_step, turn = len(xs), 0, place, -1, 0
+    maximum, count, first, first_step, came_from = len(xs), 0, pixel, -1, 0
     one, line = np.uint64(1), np.uint64(stride)  # unsigned: such an index is not tested for counting from the end
     while count < maximum:
-        here = np.uint64(place)
+        here = np.uint64(pixel)
         above, below = here - line, here + line
         code = mask[here - one] | mask[below - one] << 1 | mask[below] << 2 | mask[below + one] << 3
         code |= mask[here + one] << 4 | mask[above + one] << 5 | mask[above] << 6 | mask[above - one] << 7
-        found = NEXT_STEPS[np.uint64(turn << 8 | code)]
-        if found < 0:  # a single pixel
+        step = NEXT_STEPS[np.uint64(came_from << 8 | code)]
+        if step < 0:  # a single pixel
             xs[0], ys[0] = x, y
             return 1
-        if place == first and found == first_step:
+        if pixel == first and step == first_step:
             return count
         if count == 0:
-            first_step = found
+            first_step = step
         xs[np.uint64(count)], ys[np.uint64(count)] = x, y
         count += 1
-        place, x, y = place + steps[found], np.int32(x + STEPS_X[found]), np.int32(y + STEPS_Y[found])
-        turn = (found + 4) & 7
+        pixel, x, y = pixel + steps[step], np.int32(x + STEPS_X[step]), np.int32(y + STEPS_Y[step])
+        came_from = (step + 4) & 7
     return count
 
 
@@ -139,7 +139,7 @@ def place_key_points(count: int, spacing: float, contour: Contour) -> int:
 
 @compiled_arithmetic
 def fill_segments(number: int, area: int, contour: Contour) -> int:
-    """Places, normals and directions of the compared contour points, segment by segment; returns their number.
+    """Positions, normals and directions of the compared contour points, segment by segment; returns their number.
 
     Normals between key points are interpolated. A segment is filled up with points in the margin.
     """
@@ -148,17 +148,17 @@ def fill_segments(number: int, area: int, contour: Contour) -> int:
         after = k + 1 if k + 1 < number else 0
         begin, length, at = contour.starts[k], contour.starts[k + 1] - contour.starts[k], (k + 1) * LANES
         nx, ny = contour.normals[0, k], contour.normals[1, k]
-        turn_x, turn_y = contour.normals[0, after] - nx, contour.normals[1, after] - ny
+        change_x, change_y = contour.normals[0, after] - nx, contour.normals[1, after] - ny
         step, taken = np.float32(EVERY) / np.float32(length), (length + EVERY - 1) // EVERY
         points += taken
         for lane in range(taken):
-            share = np.float32(lane) * step
-            lanes[SHARE, at + lane] = share
-            lanes[NX, at + lane], lanes[NY, at + lane] = nx + share * turn_x, ny + share * turn_y
+            fraction = np.float32(lane) * step
+            lanes[FRACTION, at + lane] = fraction
+            lanes[NX, at + lane], lanes[NY, at + lane] = nx + fraction * change_x, ny + fraction * change_y
             lanes[PX, at + lane] = np.float32(contour.x[begin + EVERY * lane])
             lanes[PY, at + lane] = np.float32(contour.y[begin + EVERY * lane])
         for lane in range(taken, LANES):
-            lanes[SHARE, at + lane] = lanes[NX, at + lane] = lanes[NY, at + lane] = np.float32(0.0)
+            lanes[FRACTION, at + lane] = lanes[NX, at + lane] = lanes[NY, at + lane] = np.float32(0.0)
             lanes[PX, at + lane] = lanes[PY, at + lane] = aside
     place_points(lanes[PX], lanes[PY], lanes[NX], lanes[NY], (number + 1) * LANES)
     choose_directions(lanes[NX], lanes[NY], area, lanes[BASE], (number + 1) * LANES)

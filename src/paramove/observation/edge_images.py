@@ -27,7 +27,7 @@ REACH_PX = 10
 
 
 class EdgeImages:
-    """The edge images of one view, made anew by each `see`.
+    """The edge images of one view, computed anew by each `see`.
 
     Attributes:
         intensities: g_i (6.24), flat, (D, H' W'), 255 for 1, with a margin of zeros; of "simple": |g^| alone, D = 1.
@@ -51,7 +51,7 @@ class EdgeImages:
         )
 
     def smoothed(self, image: Image) -> Image:
-        """The image slightly smoothed, as the options say."""
+        """The image slightly smoothed, by the options."""
         sigma = self.options.smoothing_px
         return np.asarray(cv2.GaussianBlur(image, (3, 3), sigma), np.uint8) if sigma > 0.0 else image
 

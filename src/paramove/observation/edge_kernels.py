@@ -13,10 +13,12 @@ from paramove.hmm import compiled, compiled_sums
 Floats32 = NDArray[np.float32]
 
 MARGIN = 32
-"""Pixels of zeros about an edge image; shifts, distance search and the look 10 px aside stay within it."""
+"""Width of the border of zeros about an edge image; shifts, distance search and samples 10 px aside stay within it."""
 DIRECTIONS = 10
 """D: search directions n_i = (sin(i pi / D), cos(i pi / D))."""
-SINES, COSINES = (turn(np.arange(DIRECTIONS) * np.pi / DIRECTIONS).astype(np.float32) for turn in (np.sin, np.cos))
+SINES, COSINES = (
+    function(np.arange(DIRECTIONS) * np.pi / DIRECTIONS).astype(np.float32) for function in (np.sin, np.cos)
+)
 BINS_PER_LEVEL = 4
 """Bins of the histogram of gradients in one grey level."""
 MAX_BINS = 361 * BINS_PER_LEVEL + 1
@@ -54,11 +56,11 @@ def gradient_scale(along_x: Floats32, along_y: Floats32, count: int, sizes: Floa
         flat[i] = np.sqrt(flat_x[i] * flat_x[i] + flat_y[i] * flat_y[i])
     for i in range(len(flat)):
         histogram[np.int32(flat[i] * np.float32(BINS_PER_LEVEL))] += 1
-    reached, place = 0, MAX_BINS
-    while place > 0 and reached < count:
-        place -= 1
-        reached += histogram[place]
-    return place / BINS_PER_LEVEL
+    reached, bin_index = 0, MAX_BINS
+    while bin_index > 0 and reached < count:
+        bin_index -= 1
+        reached += histogram[bin_index]
+    return bin_index / BINS_PER_LEVEL
 
 
 @compiled_sums

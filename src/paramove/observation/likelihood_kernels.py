@@ -16,7 +16,7 @@ from paramove.observation.contour_kernels import (
 )
 from paramove.observation.edge_kernels import MARGIN
 from paramove.observation.matching_kernels import Shifts, match, new_shifts
-from paramove.observation.segment_sums import BASE, LANES, NX, NY, PX, PY, SHARE
+from paramove.observation.segment_sums import BASE, FRACTION, LANES, NX, NY, PX, PY
 from paramove.observation.silhouette_kernels import Camera, Canvas, draw_arm, new_canvas, wipe
 
 Signed = NDArray[np.int8]
@@ -32,7 +32,7 @@ SCRATCH = 5
 
 @compiled
 def outline(pose: Floats, body: Floats, camera: Camera, canvas: Canvas, contour: Contour) -> int:
-    """The contour of the projected arm; its number of points, 0 if it is as good as out of sight."""
+    """The contour of the projected arm; its number of points, 0 if it is nearly out of sight."""
     top, bottom, start = draw_arm(pose, body, camera, canvas)
     count = 0
     if bottom >= top:
@@ -57,7 +57,7 @@ def outline_over(
 
 @compiled
 def silhouette(pose: Floats, body: Floats, camera: Camera, canvas: Canvas, out: Bytes) -> None:
-    """Writes 1 where the arm is seen, else 0, into an image (H, W)."""
+    """Writes 1 where the arm is visible, else 0, into an image (H, W)."""
     top, bottom, _ = draw_arm(pose, body, camera, canvas)
     stride = camera.width + 2
     for y in range(camera.height):
@@ -75,12 +75,12 @@ def strengths(
     out: (SCRATCH, slots LANES); its first row takes the result, in the order of `contour.lanes`.
     """
     end = (number + 1) * LANES
-    moved, share = out[1], contour.lanes[SHARE]
+    moved, fraction = out[1], contour.lanes[FRACTION]
     for k in range(number):
         here, there = shifts.shift[k], shifts.shift[k + 1 if k + 1 < number else 0]
         for lane in range(LANES):
             at = np.uint64((k + 1) * LANES + lane)
-            moved[at] = here + share[at] * (there - here)
+            moved[at] = here + fraction[at] * (there - here)
     for row in range(3):
         side = np.float32(0.0) if row == 0 else LOOK_ASIDE if row == 1 else -LOOK_ASIDE
         addresses(contour.lanes, out[1], side, np.float32(stride), end, out[2])
@@ -112,7 +112,7 @@ def boosted(shift: Floats32, one: Floats32, other: Floats32, minimum: np.float32
 
 @compiled_sums
 def mean_error(number: int, points: int, values: Floats32) -> float:
-    """Mean of (1 - G)^2 over the contour, (6.27). Points that fill segments up lie in the margin, where G is 0."""
+    """Mean of (1 - G)^2 over the contour, (6.27). Points that fill up segments lie in the margin, where G is 0."""
     end, total = (number + 1) * LANES, np.float32(0.0)
     for i in range(LANES, end):
         total += (np.float32(1.0) - values[i]) ** 2
@@ -127,8 +127,10 @@ def plain_error(image: Bytes, stride: int, points: int, contour: Contour) -> flo
     """
     total = 0.0
     for i in range(points):
-        place = (contour.y[i] + MARGIN) * stride + contour.x[i] + MARGIN
-        four = int(image[place]) + int(image[place - 1]) + int(image[place - stride]) + int(image[place - stride - 1])
+        offset = (contour.y[i] + MARGIN) * stride + contour.x[i] + MARGIN
+        four = (
+            int(image[offset]) + int(image[offset - 1]) + int(image[offset - stride]) + int(image[offset - stride - 1])
+        )
         total += (1.0 - four / 1020.0) ** 2
     return total / points
 

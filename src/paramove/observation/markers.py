@@ -1,4 +1,4 @@
-"""The stereo body tracker: marked points of an arm, seen by calibrated cameras, become an arm pose (paper 5.4).
+"""The stereo body tracker: an arm pose from marked points in the images of calibrated cameras (paper 5.4).
 
 "The recognition is based on the position of the elbow and wrist, that are estimated by our online body tracker based on
 3D data of a stereo head camera." Here the points carry ArUco markers or patches of one colour each.
@@ -19,11 +19,11 @@ from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects import Colour, ColourTracker
 
 BOARD_IDS = SIZE_UNTOLD_ID + MARKERS
-"""Smaller ids are those of calibration boards, which may lie on the table meanwhile."""
+"""Smaller ids are those of calibration boards, which may lie on the table at the same time."""
 MIN_SIDE, MAX_SIDE = 0.005, 0.15
-"""m. What four corners in two views make of a marker outside these limits was a wrong match."""
+"""m. A marker reconstructed with sides outside these limits was a wrong match."""
 SQUARENESS = 0.25
-"""Sides of a marker differ by less than this share of their mean."""
+"""Sides of a marker differ by less than this fraction of their mean."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,11 @@ class ArucoMarker:
     def __post_init__(self) -> None:
         last = len(dictionary().bytesList) - 1
         if not BOARD_IDS <= self.number <= last:
-            raise InputError(f"marker {self.number} found, {BOARD_IDS} to {last} expected: others are on boards")
+            raise InputError(
+                f"expected a marker from {BOARD_IDS} to {last}, found {self.number}: smaller numbers are on boards"
+            )
         if not 0.0 <= self.inset <= 0.15:
-            raise InputError(f"marker {self.number}: an inset of {self.inset:g} m found, 0 to 0.15 m expected")
+            raise InputError(f"marker {self.number}: expected an inset of 0 to 0.15 m, found {self.inset:g} m")
 
 
 DEFAULT_MARKERS: Mapping[str, ArucoMarker | Colour] = {
@@ -57,12 +59,12 @@ DEFAULT_MARKERS: Mapping[str, ArucoMarker | Colour] = {
 
 @dataclass(frozen=True)
 class BodyTrackerOptions:
-    """What marks which point, and what is believed.
+    """What marks which point, and which points are accepted.
 
     Attributes:
         markers: Name of a body point -> its marker, or its colour, which nothing else in view may have.
-        max_residual_px: A point whose views disagree by more (root mean square) was found wrongly, and is left out.
-        sigma_px: Standard deviation of a marker's place in an image.
+        max_residual_px: A point whose views disagree by more (root mean square) is a wrong match and rejected.
+        sigma_px: Standard deviation of a marker's position in an image.
         frame: Name of the frame that the cameras were calibrated in.
     """
 
@@ -74,17 +76,17 @@ class BodyTrackerOptions:
 
 @dataclass(frozen=True)
 class MarkedPoint:
-    """A point in space: place, m; its standard deviation over all directions, m; how far its views disagree, px."""
+    """A point in space: position, m; its standard deviation over all directions, m; how far its views disagree, px."""
 
-    place: Floats
+    position: Floats
     deviation: float
     residual_px: float
 
 
 class StereoBodyTracker:
-    """Finds marked points in the images of two or more cameras and tells where they are.
+    """Locates marked points in the images of two or more cameras.
 
-    Raises StereoError for cameras that cannot tell places, InputError for markers given twice or none.
+    Raises StereoError for cameras that cannot triangulate, InputError for duplicate markers or none.
     """
 
     def __init__(self, cameras: Sequence[CalibratedCamera], options: BodyTrackerOptions | None = None) -> None:
@@ -99,8 +101,8 @@ class StereoBodyTracker:
         hues = [colour.hue_deg for colour in self._colours]
         if not markers or len(set(numbers)) < len(numbers) or len(set(hues)) < len(hues):
             raise InputError(
-                f"markers {', '.join(map(str, numbers)) or 'none'} and {len(hues)} colours found: at least one marker, "
-                "and a number or colour of its own for each point expected"
+                "expected at least one marker, and a number or colour of its own for each point; found markers "
+                f"{', '.join(map(str, numbers)) or 'none'} and {len(hues)} colours"
             )
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -108,37 +110,37 @@ class StereoBodyTracker:
         self._trackers = [ColourTracker(self._colours) for _ in cameras] if self._colours else []
 
     def update(self, images: Sequence[Image | None], captured_ns: int = 0) -> ArmPose:
-        """The arm pose of one moment. Points that fewer than two cameras saw are left out.
+        """The arm pose at one time, of the points that at least two cameras detected.
 
         Args:
-            images: One per camera, [H, W, 3] uint8 BGR, taken at the same moment; None if a camera gave none.
-            captured_ns: Time of that moment.
+            images: One per camera, [H, W, 3] uint8 BGR, taken at the same time; None for a missing one.
+            captured_ns: That time.
 
         Raises InputError for another number of images, and for an image of another size than calibrated.
         """
         pose = ArmPose(frame=self._options.frame)
         pose.captured.FromNanoseconds(captured_ns)
         for name, point in self.located(images).items():
-            x, y, z = point.place
+            x, y, z = point.position
             pose.points.add(name=name, x=x, y=y, z=z)
         return pose
 
     def located(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
-        """The points of one moment with how sure they are, in the order of the options; arguments as for `update`."""
+        """The points with their uncertainty, in the order of the options; arguments as for `update`."""
         self._check(images)
-        found = self._aruco_points(images) | self._colour_points(images)
-        return {name: found[name] for name in self._options.markers if name in found}
+        points = self._aruco_points(images) | self._colour_points(images)
+        return {name: points[name] for name in self._options.markers if name in points}
 
     def _check(self, images: Sequence[Image | None]) -> None:
         cameras = self._rig.cameras
         if len(images) != len(cameras):
-            raise InputError(f"{len(images)} images found, one of each of {len(cameras)} cameras expected")
+            raise InputError(f"expected one image of each of {len(cameras)} cameras, found {len(images)}")
         for image, camera in zip(images, cameras, strict=True):
             expected = (camera.height_px, camera.width_px, 3)
             if image is not None and (image.shape != expected or image.dtype != np.uint8):
                 raise InputError(
-                    f"camera {camera.name!r}: image of shape {image.shape} and type {image.dtype} found, {expected} "
-                    "uint8 expected as calibrated"
+                    f"camera {camera.name!r}: expected an image of shape {expected} and type uint8, as calibrated; "
+                    f"found {image.shape} and {image.dtype}"
                 )
 
     def _aruco_points(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
@@ -155,7 +157,7 @@ class StereoBodyTracker:
                     at = rows[int(number)]
                     pixels[view, at : at + 4] = of_marker.reshape(4, 2)
         triangulated = self._rig.triangulate(pixels, self._options.sigma_px)
-        found = {}
+        points = {}
         for row, (name, marker) in enumerate(self._aruco.items()):
             own = slice(4 * row, 4 * row + 4)
             residual_px = float(np.sqrt(np.mean(triangulated.residuals_px[own] ** 2)))
@@ -163,23 +165,23 @@ class StereoBodyTracker:
             if not residual_px <= self._options.max_residual_px or not _is_square(corners_3d):
                 continue
             inwards = np.cross(corners_3d[2] - corners_3d[0], corners_3d[3] - corners_3d[1])
-            place = corners_3d.mean(axis=0) + marker.inset * inwards / np.linalg.norm(inwards)
+            position = corners_3d.mean(axis=0) + marker.inset * inwards / np.linalg.norm(inwards)
             deviation = float(np.sqrt(np.sum(triangulated.deviations[own] ** 2))) / 4.0
-            found[name] = MarkedPoint(place, deviation, residual_px)
-        return found
+            points[name] = MarkedPoint(position, deviation, residual_px)
+        return points
 
     def _colour_points(self, images: Sequence[Image | None]) -> dict[str, MarkedPoint]:
         """The middle of each coloured region, as if it were the image of one point."""
         names = [colour.name for colour in self._colours]
         pixels = np.full((len(images), len(names), 2), np.nan)
         for view, (image, tracker) in enumerate(zip(images, self._trackers, strict=False)):
-            for seen in [] if image is None else tracker.update(image).objects:
-                pixels[view, names.index(seen.name)] = seen.u_px, seen.v_px
+            for region in [] if image is None else tracker.update(image).objects:
+                pixels[view, names.index(region.name)] = region.u_px, region.v_px
         triangulated = self._rig.triangulate(pixels, self._options.sigma_px)
         rows = zip(names, triangulated.points, triangulated.deviations, triangulated.residuals_px, strict=True)
         return {
-            name: MarkedPoint(place, float(deviation), float(residual_px))
-            for name, place, deviation, residual_px in rows
+            name: MarkedPoint(position, float(deviation), float(residual_px))
+            for name, position, deviation, residual_px in rows
             if residual_px <= self._options.max_residual_px
         }
 

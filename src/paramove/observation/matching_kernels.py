@@ -1,7 +1,7 @@
 """Kernels of the contour matching: the objective function (6.26) and its maximisation (thesis 6.6.4).
 
 A shift of one key point changes the gradients of the two segments that it ends and two distortions; the rest of the
-objective is kept. A key point is not tried again with a step that was of no use until it or a neighbour has moved by
+objective is kept. A key point is not tried again with a useless step until it or a neighbour has moved by
 half of that step or more: that skips three of five trials and costs about a thousandth of the objective.
 """
 
@@ -23,7 +23,7 @@ ITERATIONS = 15
 GRADIENTS, SHIFTS, DISTORTIONS = 7.5, 1.0, 4.0
 """Factors of alpha_1(x) = 7.5 x^2, alpha_2(x) = x, alpha_3(x) = 4 x."""
 MIN_GAIN = 1e-9
-"""A smaller improvement of E is none."""
+"""Minimum improvement of E."""
 LENGTHWISE = np.float32(0.11)
 """Factor of |q|^2 in c."""
 
@@ -51,7 +51,7 @@ class Shifts(NamedTuple):
 
 @compiled
 def new_shifts(maximum: int) -> Shifts:
-    """Room for so many key points."""
+    """Arrays for this many key points."""
     return Shifts(
         np.zeros(maximum, np.float32),
         np.zeros(maximum, np.int32),
@@ -120,11 +120,11 @@ def match(images: Bytes, stride: int, number: int, points: int, unit: float, con
             up_a, up_b, down_a, down_b = trial_sums(images, contour.lanes, k, left, here, right, step, row)
             up_c, up_d = bend(shifts.slopes, before, left, up), bend(shifts.slopes, k, up, right)
             down_c, down_d = bend(shifts.slopes, before, left, down), bend(shifts.slopes, k, down, right)
-            kept = total - sums[before] - sums[k]
-            kept_cost = cost - shift_cost * here * here - bend_cost * (bends[before] + bends[k])
-            up_sum, down_sum = kept + up_a + up_b, kept + down_a + down_b
-            up_cost = kept_cost + shift_cost * up * up + bend_cost * (up_c + up_d)
-            down_cost = kept_cost + shift_cost * down * down + bend_cost * (down_c + down_d)
+            rest_sum = total - sums[before] - sums[k]
+            rest_cost = cost - shift_cost * here * here - bend_cost * (bends[before] + bends[k])
+            up_sum, down_sum = rest_sum + up_a + up_b, rest_sum + down_a + down_b
+            up_cost = rest_cost + shift_cost * up * up + bend_cost * (up_c + up_d)
+            down_cost = rest_cost + shift_cost * down * down + bend_cost * (down_c + down_d)
             higher, lower = gain * up_sum * up_sum - up_cost, gain * down_sum * down_sum - down_cost
             if max(higher, lower) <= gradients - cost + MIN_GAIN:
                 fruitless[k] |= bit

@@ -20,17 +20,17 @@ class ObservationOptions:
             image (6.23).
         width_px, height_px: Size at which images are compared; camera images are scaled down to it.
         smoothing_px: Standard deviation of the slight smoothing of the image; 0 for none.
-        normalised_pixels: N, so many pixels of a 320 x 240 image reach a gradient of 1; scales with the area.
-        min_gradient: Smallest gradient, grey levels per px, that counts as 1: below it an image is but noise.
+        normalised_pixels: N, number of pixels of a 320 x 240 image that reach a gradient of 1; scales with the area.
+        min_gradient: Smallest gradient, grey levels per px, that counts as 1: below it an image is only noise.
         gamma: Of (6.21) and (6.27), for one view; 0.15 in the thesis.
-        view_exponent: gamma grows with the number V of views by V to this power, since views err together.
+        view_exponent: gamma grows with the number V of views by V to this power, since the views have common errors.
         shift_unit: What a pixel counts in the penalties of (6.26), whose unit the thesis does not give.
         key_point_px: Distance of key points along the contour, at most 7.
         region_weight: Nats for a posture under which everything has changed from the learned background, against one
             under which half has; 0 leaves the background out, as the thesis does.
         still_edges: Weight of edges where nothing has changed from the background.
-        hidden_px: The background is not learned so near to the arm.
-        min_background: z of G+ is at least this, so that nothing is boosted beyond measure on an even background.
+        hidden_px: The background is not learned within this distance of the arm.
+        min_background: z of G+ is at least this, which limits the gain on an even background.
     """
 
     likelihood: Likelihood = "matched"
@@ -50,19 +50,19 @@ class ObservationOptions:
 
     def __post_init__(self) -> None:
         if self.likelihood not in ("matched", "simple"):
-            raise InputError(f"likelihood {self.likelihood!r} found, 'matched' or 'simple' expected")
+            raise InputError(f"expected likelihood 'matched' or 'simple', found {self.likelihood!r}")
         if not (32 <= self.width_px <= 960 and 32 <= self.height_px <= 960):
-            raise InputError(f"images of {self.width_px} x {self.height_px} px found, 32 to 960 px a side expected")
+            raise InputError(f"expected images of 32 to 960 px a side, found {self.width_px} x {self.height_px} px")
         for name in ("normalised_pixels", "min_gradient", "gamma", "shift_unit", "min_background"):
             if not getattr(self, name) > 0.0:
-                raise InputError(f"{name} is {getattr(self, name)}, a number above 0 expected")
+                raise InputError(f"expected {name} above 0, found {getattr(self, name)}")
         if not 3.0 <= self.key_point_px <= 7.0:
-            raise InputError(f"key points every {self.key_point_px} px found, 3 to 7 px expected")
+            raise InputError(f"expected key points every 3 to 7 px, found {self.key_point_px} px")
         if self.region_weight < 0.0 or not 0.0 <= self.still_edges <= 1.0 or not 0 <= self.hidden_px <= 60:
-            raise InputError("region_weight of at least 0, still_edges of 0 to 1 and hidden_px of 0 to 60 expected")
+            raise InputError("expected region_weight of at least 0, still_edges of 0 to 1 and hidden_px of 0 to 60")
         if self.smoothing_px < 0.0 or not 0.0 <= self.view_exponent <= 1.0:
-            raise InputError("smoothing_px of at least 0 and view_exponent of 0 to 1 expected")
+            raise InputError("expected smoothing_px of at least 0 and view_exponent of 0 to 1")
 
     def view_gamma(self, views: int) -> float:
-        """Gamma for so many views."""
+        """Gamma for this many views."""
         return self.gamma * math.pow(max(views, 1), self.view_exponent)

@@ -1,4 +1,4 @@
-"""Whether an arm is seen at all where one is believed to be, by what has changed from the learned background."""
+"""Whether an arm is visible at its estimated pose, from the changes against the learned background."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from paramove.documents import Floats
 from paramove.observation.arm_body import HAND
 from paramove.observation.background_kernels import FULL
 
-AXIS_SHARES = np.linspace(0.25, 0.95, 15)
-"""Of the line from elbow over the wrist to the fingertip: places at which something must be seen."""
+AXIS_FRACTIONS = np.linspace(0.25, 0.95, 15)
+"""Positions on the line from elbow over the wrist to the fingertip that must be visible, as fractions of it."""
 CHANGED = 30
-"""Of `FULL`: a pixel that has changed."""
+"""A pixel with more than this, of `FULL`, has changed."""
 AROUND = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1)), axis=-1).reshape(-1, 2)
-"""Pixels (x, y) about such a place."""
+"""Pixels (x, y) around such a position."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Presence:
     """Whether there is an arm at all, as far as the background is known.
 
     Attributes:
-        there: along forearm and hand, mean over the views: 1 where something else than the background is seen, -1 where
-            nothing but the background is, 0 where it is not known.
+        there: along forearm and hand, mean over the views: 1 where something else than the background is visible, -1
+            where only the background is, 0 where it is unknown.
         changed: area in which the images differ from the background, as a multiple of the arm's; mean over the views.
     """
 
@@ -36,20 +36,20 @@ class Presence:
 
     @staticmethod
     def mean(views: Sequence[Presence]) -> Presence:
-        """Of several views; of none, nothing is known."""
+        """Mean over the views; zeros for none."""
         if not views:
             return Presence()
         return Presence(float(np.mean([one.there for one in views])), float(np.mean([one.changed for one in views])))
 
 
-def seen_presence(
+def presence_in_view(
     pose: Floats, camera: CalibratedCamera, table: NDArray[np.uint8], change: NDArray[np.int8], arm_area: float
 ) -> Presence:
     """In one view.
 
     Args:
         pose: shoulder, elbow, fingertip, (9,), or also the wrist, (12,), m, world. camera: at the compared size.
-        table: 1 where the table is seen, and change: from the background; flat with one pixel about the image.
+        table: 1 where the table is visible, and change: from the background; both flat with a border of one pixel.
         arm_area: px.
     """
     changed = np.count_nonzero(change > CHANGED) / arm_area
@@ -57,11 +57,11 @@ def seen_presence(
     wrist = pose[9:12] if len(pose) > 9 else 0.5 * (elbow + hand)
     corners = np.stack([elbow, wrist, hand])
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    axis = np.stack([np.interp(AXIS_SHARES * lengths[-1], lengths, column) for column in corners.T], axis=1)
-    places = np.round(camera.project(axis, distorted=False))
+    axis = np.stack([np.interp(AXIS_FRACTIONS * lengths[-1], lengths, column) for column in corners.T], axis=1)
+    pixels = np.round(camera.project(axis, distorted=False))
     size, stride = (camera.width_px, camera.height_px), camera.width_px + 2
-    inside = ((places >= 0.0) & (places < size)).all(axis=1)  # NaN, behind the camera, is not
-    at = (places[inside].astype(np.int64) + 1) @ (1, stride)
+    inside = ((pixels >= 0.0) & (pixels < size)).all(axis=1)  # NaN, behind the camera, is not
+    at = (pixels[inside].astype(np.int64) + 1) @ (1, stride)
     if len(table) > 0:
         at = at[(table[at] == 0) | (axis[inside, 2] >= 0.0)]  # what the table does not hide
     there = change[at[:, None] + AROUND @ (1, stride)].mean() / FULL if len(at) > 0 else 0.0

@@ -16,10 +16,10 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 LANES = 4
-"""Compared contour points of a segment; shorter segments are filled up with points in the margin, where nothing is."""
+"""Compared contour points of a segment; shorter segments are filled up with points in the margin, which is 0."""
 FIELDS = 6
-PX, PY, NX, NY, SHARE, BASE = range(FIELDS)
-"""Rows of the lanes: places in the edge images, normals, share of the later key point, start of the direction."""
+PX, PY, NX, NY, FRACTION, BASE = range(FIELDS)
+"""Rows of the lanes: positions in the edge images, normals, fraction of the later key point, start of the direction."""
 
 _BYTE, _INT, _LONG, _FLOAT = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.FloatType()
 _FLOATS, _INTS = ir.VectorType(_FLOAT, 2 * LANES), ir.VectorType(_INT, 2 * LANES)
@@ -43,8 +43,8 @@ def _fields(context: Any, builder: Any, array_type: Any, lanes: Any, slot: Any) 
     first = builder.add(builder.ptrtoint(array.data, _LONG), builder.mul(slot, ir.Constant(_LONG, 4 * LANES)))
     vectors = []
     for field in range(FIELDS):
-        place = builder.add(first, builder.mul(row_bytes, ir.Constant(_LONG, field)))
-        vector = builder.load(builder.inttoptr(place, _FLOATS.as_pointer()))
+        address = builder.add(first, builder.mul(row_bytes, ir.Constant(_LONG, field)))
+        vector = builder.load(builder.inttoptr(address, _FLOATS.as_pointer()))
         vector.align = 4
         vectors.append(vector)
     return vectors
@@ -80,21 +80,21 @@ def _sums_of_gathered(builder: Any, data: Any, up: Any, down: Any) -> list[Any]:
 
 def _gathered(builder: Any, data: Any, addresses: Any) -> Any:
     """The bytes at the addresses as numbers. Each is read with the three after it, which the margin has."""
-    places = builder.gep(data, [addresses], source_etype=_BYTE)
-    places.type = ir.VectorType(data.type, 2 * LANES)
+    pointers = builder.gep(data, [addresses], source_etype=_BYTE)
+    pointers.type = ir.VectorType(data.type, 2 * LANES)
     flags = ir.VectorType(ir.IntType(1), 2 * LANES)
-    kind = ir.FunctionType(_INTS, [places.type, _INT, flags, _INTS])
+    kind = ir.FunctionType(_INTS, [pointers.type, _INT, flags, _INTS])
     name = f"llvm.masked.gather.v{2 * LANES}i32.v{2 * LANES}p0"
     gather: Any = cgutils.get_or_insert_function(builder.module, kind, name)  # type: ignore[no-untyped-call]
     every, none = ir.Constant(flags, [1] * (2 * LANES)), ir.Constant(_INTS, None)
-    words = builder.call(gather, [places, ir.Constant(_INT, 1), every, none])
+    words = builder.call(gather, [pointers, ir.Constant(_INT, 1), every, none])
     return builder.and_(words, ir.Constant(_INTS, [0xFF] * (2 * LANES)))
 
 
 def _generated(context: Any, builder: Any, signature: Any, arguments: Any, sums: Sums) -> Any:
     images, lanes, slot, left, here, right, step, stride = arguments
     data = context.make_array(signature.args[0])(context, builder, images).data
-    px, py, nx, ny, share, base = _fields(context, builder, signature.args[1], lanes, slot)
+    px, py, nx, ny, fraction, base = _fields(context, builder, signature.args[1], lanes, slot)
 
     def add(a: Any, b: Any) -> Any:
         return builder.fadd(a, b, _FLAGS)
@@ -106,20 +106,20 @@ def _generated(context: Any, builder: Any, signature: Any, arguments: Any, sums:
         return builder.sitofp(builder.fptosi(a, _INTS), _FLOATS)
 
     # The common key point is the later one of the first segment and the earlier one of the second.
-    rest = builder.fsub(_pair(builder, ir.Constant(_FLOAT, 1.0), ir.Constant(_FLOAT, 1.0)), share)
+    rest = builder.fsub(_pair(builder, ir.Constant(_FLOAT, 1.0), ir.Constant(_FLOAT, 1.0)), fraction)
     second = list(range(LANES)) + list(range(3 * LANES, 4 * LANES))
-    weight = builder.shuffle_vector(share, rest, ir.Constant(_INTS, second))
+    weight = builder.shuffle_vector(fraction, rest, ir.Constant(_INTS, second))
     others = _pair(builder, left, right)
     shift = add(others, times(weight, builder.fsub(_pair(builder, here, here), others)))
     x, y = add(px, times(shift, nx)), add(py, times(shift, ny))
     change = times(weight, _pair(builder, step, step))
     dx, dy = times(change, nx), times(change, ny)
     row = _pair(builder, stride, stride)
-    places = [
+    pointers = [
         builder.fptosi(add(add(times(whole(move(y, dy)), row), whole(move(x, dx))), base), _INTS)
         for move in (builder.fadd, builder.fsub)
     ]
-    return context.make_tuple(builder, signature.return_type, sums(builder, data, *places))
+    return context.make_tuple(builder, signature.return_type, sums(builder, data, *pointers))
 
 
 def _intrinsic(sums: Sums) -> Any:

@@ -1,6 +1,6 @@
 """Kernels that draw the silhouette of the projected arm: outlines of its parts as convex polygons, filled by rows.
 
-A sphere or ellipsoid is seen as an ellipse: with c its centre and M = A A^T its shape in the camera's frame, the lines
+A sphere or ellipsoid projects to an ellipse: with c its centre and M = A A^T its shape in the camera's frame, the lines
 that touch the ellipse satisfy l^T (M - c c^T) l = 0. The point of an ellipse furthest in a direction is known in closed
 form, and the furthest point of a hull of two ellipses is the further one of theirs: so the hulls need no search.
 """
@@ -27,10 +27,10 @@ COSINES, SINES = np.cos(TURN), np.sin(TURN)
 class Camera(NamedTuple):
     """What a kernel needs of a camera: rotation (3, 3) and shift (3,) of the world, matrix (3, 3), size, px.
 
-    table: 1 where the table is seen, flat with one pixel of zeros about the image; of length 0 if there is none.
+    table: 1 where the table is visible, flat with one pixel of zeros about the image; of length 0 if there is none.
     """
 
-    turn: Floats
+    rotation: Floats
     shift: Floats
     matrix: Floats
     width: int
@@ -82,7 +82,7 @@ def new_canvas(width: int, height: int) -> Canvas:
 
 @compiled_arithmetic
 def project_ellipsoid(centre: Floats, shape: Floats, matrix: Floats, ellipse: Floats) -> bool:
-    """The ellipse, px, as which an ellipsoid is seen; centre (3,) and shape (3, 3) in the camera's frame, m."""
+    """The ellipse, px, to which an ellipsoid projects; centre (3,) and shape (3, 3) in the camera's frame, m."""
     x, y, z = centre[0], centre[1], centre[2]
     below = z * z - shape[2, 2]
     if z < NEAREST_M or not below > NEAREST_M * NEAREST_M:
@@ -112,7 +112,7 @@ def arm_ellipses(pose: Floats, body: Floats, camera: Camera, canvas: Canvas) -> 
         for j in range(3):
             points[i, j] = camera.shift[j]
             for k in range(3):
-                points[i, j] += camera.turn[j, k] * pose[3 * i + k]
+                points[i, j] += camera.rotation[j, k] * pose[3 * i + k]
     if len(pose) == 9:
         put_wrist_straight(points, body[0])
     hand_axes(points, canvas.axes)
@@ -162,7 +162,7 @@ def hand_axes(points: Floats, axes: Floats) -> None:
     for i in range(3):
         axes[1, i] -= along * axes[0, i]
         width += axes[1, i] ** 2
-    if width < 1e-18:  # a stretched arm tells no plane: the width lies across the view
+    if width < 1e-18:  # a stretched arm defines no plane: the width lies across the view
         axes[1, 0], axes[1, 1], axes[1, 2] = -axes[0, 1], axes[0, 0], 1e-9
         width = axes[0, 0] ** 2 + axes[0, 1] ** 2 + 1e-18
     for i in range(3):
@@ -227,14 +227,14 @@ def _fill_rows(width: int, first: int, last: int, cut: bool, canvas: Canvas) -> 
         top, bottom = min(top, y), y
         canvas.left[y] = min(canvas.left[y], begin)
         canvas.right[y] = max(canvas.right[y], end)
-        place = (y + 1) * (width + 2) + 1
-        canvas.mask[place + begin : place + end + 1] = 1
+        offset = (y + 1) * (width + 2) + 1
+        canvas.mask[offset + begin : offset + end + 1] = 1
     return top, bottom, cut
 
 
 @compiled
 def draw_arm(pose: Floats, body: Floats, camera: Camera, canvas: Canvas) -> tuple[int, int, int]:
-    """Draw the arm's silhouette. First and last row (last < first: nothing is seen), and the row to trace it from.
+    """Draw the arm's silhouette. First and last row (last < first: nothing is visible), and the row to trace it from.
 
     The outline is traced from the first row of all, or, where the image cuts the arm and may have parted it, from the
     first row of the forearm or hand.
@@ -261,15 +261,15 @@ def draw_arm(pose: Floats, body: Floats, camera: Camera, canvas: Canvas) -> tupl
 
 @compiled_arithmetic
 def hide_below_table(pose: Floats, camera: Camera, top: int, bottom: int, canvas: Canvas) -> None:
-    """Takes from the silhouette what lies below the table, z < 0 in the world, and is seen where the table is.
+    """Takes from the silhouette what lies below the table, z < 0 in the world, and is visible where the table is.
 
-    That is all beyond the place where the arm's axis goes through the plane.
+    That is all beyond the point where the arm's axis crosses the plane.
     """
     ends, through = np.empty((2, 2)), 1 if pose[5] > 0.0 else 0
     upper, lower = pose[3 * through + 2], pose[3 * through + 5]
-    share = upper / (upper - lower) if upper > 0.0 else 0.0
+    fraction = upper / (upper - lower) if upper > 0.0 else 0.0
     for end in range(2):
-        along = share if end == 0 else 1.0
+        along = fraction if end == 0 else 1.0
         x, y, z = 0.0, 0.0, 0.0
         for i in range(3):
             here, there = canvas.points[through, i], canvas.points[through + 1, i]
@@ -282,20 +282,20 @@ def hide_below_table(pose: Floats, camera: Camera, top: int, bottom: int, canvas
         ends[end, 0], ends[end, 1] = x / z, y / z
     dx, dy = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
     for row in range(top, bottom + 1):
-        place = (row + 1) * (camera.width + 2) + 1
+        offset = (row + 1) * (camera.width + 2) + 1
         beyond = (row - ends[0, 1]) * dy - ends[0, 0] * dx
         for column in range(canvas.left[row], canvas.right[row] + 1):
-            if camera.table[place + column] != 0 and beyond + column * dx > 0.0:
-                canvas.mask[place + column] = 0
+            if camera.table[offset + column] != 0 and beyond + column * dx > 0.0:
+                canvas.mask[offset + column] = 0
 
 
 @compiled
 def first_row(begin: int, bottom: int, width: int, canvas: Canvas) -> int:
     """The first row from `begin` on in which something of the silhouette is left; `begin` if none has."""
     for row in range(begin, bottom + 1):
-        place = (row + 1) * (width + 2) + 1
+        offset = (row + 1) * (width + 2) + 1
         for column in range(canvas.left[row], canvas.right[row] + 1):
-            if canvas.mask[place + column] != 0:
+            if canvas.mask[offset + column] != 0:
                 return row
     return begin
 
@@ -304,7 +304,7 @@ def first_row(begin: int, bottom: int, width: int, canvas: Canvas) -> int:
 def wipe(top: int, bottom: int, width: int, canvas: Canvas) -> None:
     """Empty the canvas between these rows."""
     for y in range(top, bottom + 1):
-        place = (y + 1) * (width + 2) + 1
+        offset = (y + 1) * (width + 2) + 1
         if canvas.right[y] >= canvas.left[y]:
-            canvas.mask[place + canvas.left[y] : place + canvas.right[y] + 1] = 0
+            canvas.mask[offset + canvas.left[y] : offset + canvas.right[y] + 1] = 0
         canvas.left[y], canvas.right[y] = width, -1

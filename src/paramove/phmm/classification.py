@@ -1,10 +1,10 @@
-"""Which action a movement is, where it points, and whether it is any of the known ones (thesis 4.1.2.3, 2.2.5).
+"""Classification of movements into actions, with theta and rejection of unknown ones (thesis 4.1.2.3, 2.2.5).
 
-Which action a movement is going to be, from its first frames: discriminants by the time that has passed.
+The beginning of a movement is classified from its first frames, by discriminants for the time that has passed.
 
-Likelihoods of complete movements do not serve here: nobody knows how far a movement has come. What is known is how long
-it has lasted, so all training movements that lasted as long are compared with it after the same time, by how they went
-on since their first frame, with one covariance for all actions.
+Likelihoods of complete movements do not apply to beginnings: the progress of the movement is unknown. Its duration so
+far is known, so it is compared with all training movements that last at least as long, after the same time, by their
+increments since the first frame, with one covariance for all actions.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from paramove.phmm.polynomial import PolynomialPHMM, QuadraticPHMM
 from paramove.phmm.storage import ModelFileError, ModelRecord, read_record, write_record
 
 SHRINKAGE = 0.1
-"""Share of each variance that is taken for independent."""
+"""Fraction of each variance that counts as independent."""
 TEMPERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)
-"""Candidates for the share of the distances that counts: features are not as normal as the model says."""
+"""Candidates for the factor on distances: features are not as normally distributed as the model assumes."""
 INDEX_FILE = "classifier.npz"
 
 
 @dataclass(frozen=True)
 class Classification:
-    """What a movement is taken for.
+    """Result of classifying a movement.
 
     Attributes:
         action: the most probable action.
         posterior: probability of each action.
         estimates: of theta under each action.
         p_value: probability that a genuine movement of this action has at least this outlier score; a small one is a
-            reason to reject the movement. 1 from models that do not know how performances vary.
+            reason to reject the movement. 1 from models without a distribution of executions.
     """
 
     action: str
@@ -54,7 +54,7 @@ class Classification:
 
 
 class MovementClassifier:
-    """Movement models that compete for a movement, complete or just begun.
+    """Classifies movements, complete or just begun, by competing movement models.
 
     Args:
         model: untrained model of every action, or a mapping from actions to untrained models. Without one:
@@ -73,9 +73,9 @@ class MovementClassifier:
 
     @classmethod
     def from_models(cls, models: Mapping[str, ParametricHMM]) -> Self:
-        """Trained models of several actions. They tell complete movements apart, but not beginnings."""
+        """From trained models of several actions. They classify complete movements, but not beginnings."""
         if not models:
-            raise ValueError("at least one model is needed, found none")
+            raise ValueError("expected at least one model, found none")
         classifier = cls()
         classifier.classes_ = tuple(sorted(models))
         classifier.models_ = {action: models[action] for action in classifier.classes_}
@@ -108,14 +108,14 @@ class MovementClassifier:
         return self
 
     def classify(self, sequence: ArrayLike, *, finished: bool = True) -> Classification:
-        """What a movement is, or, with `finished=False`, what it is going to be.
+        """Classifies a movement, or, with `finished=False`, the beginning of one.
 
         Raises ValueError for a beginning that is shorter than those modelled, or if there were no training movements.
         """
         checked = checked_sequence(sequence)
-        examined = {action: _examined(model, checked, finished) for action, model in self._trained().items()}
+        results = {action: _result(model, checked, finished) for action, model in self._trained().items()}
         if finished:
-            scores = np.array([score for _, score, _ in examined.values()])
+            scores = np.array([score for _, score, _ in results.values()])
             log_posterior = scores - logsumexp(scores)
         else:
             log_posterior = self._discriminant(len(checked)).log_probabilities(checked)
@@ -123,8 +123,8 @@ class MovementClassifier:
         return Classification(
             best,
             {action: float(np.exp(value)) for action, value in zip(self.classes_, log_posterior, strict=True)},
-            {action: estimate for action, (estimate, _, _) in examined.items()},
-            examined[best][2],
+            {action: estimate for action, (estimate, _, _) in results.items()},
+            results[best][2],
         )
 
     def predict(self, sequences: Sequence[ArrayLike], *, finished: bool = True) -> NDArray[np.str_]:
@@ -132,11 +132,11 @@ class MovementClassifier:
         return np.array([self.classify(sequence, finished=finished).action for sequence in sequences])
 
     def score(self, sequences: Sequence[ArrayLike], labels: Sequence[str], *, finished: bool = True) -> float:
-        """Share of sequences whose action is right."""
+        """Fraction of sequences whose action is correct."""
         return float(np.mean(self.predict(sequences, finished=finished) == np.asarray(labels)))
 
     def save(self, folder: str | Path) -> None:
-        """Write a folder with a model file per action, each of use alone, and an index."""
+        """Write a folder with a model file per action, each usable alone, and an index."""
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)
         for action, model in self._trained().items():
@@ -144,7 +144,7 @@ class MovementClassifier:
         arrays: dict[str, Floats] = {}
         for number, one in enumerate(self._beginnings):
             arrays[f"means{number}"], arrays[f"root{number}"] = one.means, one.root
-            arrays[f"scalars{number}"] = np.array([one.n_frames, one.temper, *np.exp(one.log_shares)])
+            arrays[f"scalars{number}"] = np.array([one.n_frames, one.temper, *np.exp(one.log_priors)])
         write_record(
             path / INDEX_FILE, ModelRecord(type(self).__name__, {"actions": list(self.classes_)}, None, arrays)
         )
@@ -183,30 +183,28 @@ class MovementClassifier:
         return self.models_
 
     def _discriminant(self, n_frames: int) -> BeginningDiscriminant:
-        known = [one for one in self._beginnings if one.n_frames <= n_frames]
+        usable = [one for one in self._beginnings if one.n_frames <= n_frames]
         if not self._beginnings:
-            raise ValueError(
-                "beginnings are told apart only by a classifier trained with `fit` on all actions together"
-            )
-        if not known:
+            raise ValueError("only a classifier trained with `fit` on all actions together classifies beginnings")
+        if not usable:
             minimum = self._beginnings[0].n_frames
             raise ValueError(
                 f"a beginning has at least {minimum} frames, found {n_frames}: wait for more of the movement"
             )
-        return known[-1]
+        return usable[-1]
 
 
-def _examined(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[ParameterEstimate, float, float]:
+def _result(model: ParametricHMM, sequence: Floats, finished: bool) -> tuple[ParameterEstimate, float, float]:
     """Estimate of theta, score of a complete movement, and p-value.
 
     Scores of models with correlated residuals are logarithms of p-values: densities of movements that lie far from
-    every model (another person's) would compare how wide the models are, not how far the movement is for each.
+    every model (another person's) would compare the widths of the models instead of the distances from them.
     """
     if isinstance(model, PolynomialPHMM) and model.performances_ is not None:
-        found = model.examine(sequence, finished=finished)
-        return found.estimate, found.log_p_value, found.p_value
+        examination = model.examine(sequence, finished=finished)
+        return examination.estimate, examination.log_p_value, examination.p_value
     estimate = model.estimate(sequence, finished=finished)
-    # Neighbouring frames say the same: the frames of a state count as one.
+    # Neighbouring frames are redundant: the frames of a state count as one.
     frames = model.resampled_frames if model.resampled_frames is not None else len(sequence)
     return estimate, estimate.log_likelihood * model.n_states / frames, 1.0
 
@@ -224,8 +222,8 @@ def _discriminant_from(arrays: Mapping[str, Floats], number: int, n_actions: int
     if scalars.shape != (2 + n_actions,):
         raise ValueError(f"expected {2 + n_actions} numbers in scalars{number}, found shape {scalars.shape}")
     with np.errstate(divide="ignore"):
-        log_shares = np.log(scalars[2:])
-    return BeginningDiscriminant(int(scalars[0]), means, root, log_shares, float(scalars[1]))
+        log_priors = np.log(scalars[2:])
+    return BeginningDiscriminant(int(scalars[0]), means, root, log_priors, float(scalars[1]))
 
 
 @dataclass(frozen=True)
@@ -236,14 +234,14 @@ class BeginningDiscriminant:
         n_frames: that have passed.
         means: of the features, one row per action; NaN-free, zero for an action that never lasts so long. Shape (A, n).
         root: triangular root of the common covariance, shape (n, n).
-        log_shares: logarithm of each action's share of the training movements that last so long; -inf for none, (A,).
-        temper: share of the distances that counts.
+        log_priors: logarithm of each action's fraction of the training movements of that length; -inf for none, (A,).
+        temper: factor on the distances.
     """
 
     n_frames: int
     means: Floats
     root: Floats
-    log_shares: Floats
+    log_priors: Floats
     temper: float
 
     @classmethod
@@ -259,10 +257,11 @@ class BeginningDiscriminant:
             if not (~tested).any():
                 continue
             other = cls._estimated(features[~tested], actions[~tested], n_actions, n_frames)
-            for place, temper in enumerate(TEMPERS):
-                found = other._log_probabilities(features[tested], temper)
-                scores[place] += np.maximum(found[np.arange(len(found)), actions[tested]], -20.0).sum()
-        return cls(n_frames, start.means, start.root, start.log_shares, TEMPERS[int(scores.argmax())])
+            for index, temper in enumerate(TEMPERS):
+                log_probabilities = other._log_probabilities(features[tested], temper)
+                own = log_probabilities[np.arange(len(log_probabilities)), actions[tested]]
+                scores[index] += np.maximum(own, -20.0).sum()
+        return cls(n_frames, start.means, start.root, start.log_priors, TEMPERS[int(scores.argmax())])
 
     @classmethod
     def _estimated(cls, features: Floats, actions: Ints, n_actions: int, n_frames: int) -> BeginningDiscriminant:
@@ -277,8 +276,8 @@ class BeginningDiscriminant:
         moments += 1e-3 * diagonal.mean() * np.eye(len(moments)) + 1e-12 * np.eye(len(moments))
         root = np.linalg.cholesky(moments).astype(np.float64)
         with np.errstate(divide="ignore"):
-            log_shares = np.log(counts / counts.sum()).astype(np.float64)
-        return cls(n_frames, means, root, log_shares, 1.0)
+            log_priors = np.log(counts / counts.sum()).astype(np.float64)
+        return cls(n_frames, means, root, log_priors, 1.0)
 
     def log_probabilities(self, sequence: Floats) -> Floats:
         """Of the actions, for a movement that has lasted at least `n_frames`. Shape (A,)."""
@@ -290,13 +289,13 @@ class BeginningDiscriminant:
         white_means = np.linalg.solve(self.root, self.means.T).T
         white = np.linalg.solve(self.root, features.T).T
         distances = ((white[:, None] - white_means[None]) ** 2).sum(axis=2)
-        scores = self.log_shares - 0.5 * temper * distances
+        scores = self.log_priors - 0.5 * temper * distances
         result: Floats = scores - logsumexp(scores, axis=1, keepdims=True)
         return result
 
 
 def growth_features(sequence: Floats, n_frames: int) -> Floats:
-    """How a movement goes on in its first frames, wherever it began: increments. Shape (4 D,)."""
+    """Increments of a movement over its first frames, independent of its starting point. Shape (4 D,)."""
     features = beginning_features(sequence, n_frames).reshape(BEGINNING_POINTS, -1)
     return features[1:].ravel()
 
@@ -304,7 +303,7 @@ def growth_features(sequence: Floats, n_frames: int) -> Floats:
 def discriminants(
     sequences: Sequence[Floats], actions: Ints, n_actions: int, groups: Ints
 ) -> tuple[BeginningDiscriminant, ...]:
-    """One for every number of frames of a geometric raster, as long as movements of training last."""
+    """One for every number of frames of a geometric grid, up to the lengths of the training movements."""
     lengths = np.array([len(sequence) for sequence in sequences])
     result, n_frames = [], float(FIRST_FRAMES)
     while round(n_frames) <= np.quantile(lengths, 0.95):

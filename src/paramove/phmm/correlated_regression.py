@@ -1,10 +1,10 @@
 """Polynomial regression of whole movements on theta, whose residuals are correlated in time and between points.
 
-The likelihood of an HMM takes frames for independent: it is sure of a theta long before it may be, and it does not know
-that a hand that starts too high usually ends too high. Here a movement is one vector y (all state averages), with
-y = Z phi(theta) + e, e ~ N(0, C). All that has to be chosen is chosen by leaving out groups of training movements (all
-those of one person, or of one theta): how strongly each degree of the polynomial is held back, how far correlations are
-shrunk, and how far regions of theta must be widened to hold what they promise.
+The likelihood of an HMM assumes independent frames: it is overconfident about theta, and does not model that a hand
+that starts too high usually ends too high. Here a movement is one vector y (all state averages), with
+y = Z phi(theta) + e, e ~ N(0, C). All choices are made by cross-validation over groups of training movements
+(all those of one person, or of one theta): the regularisation of each degree of the polynomial, the shrinkage of the
+correlations, and the inflation of regions of theta that gives them their nominal coverage.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from paramove.phmm.ridge import chosen_ridge, penalties, residuals_left_out
 from paramove.phmm.search_kernels import Movement, aligned_parts, nearest
 
 SHRINKAGES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.97, 1.0)
-"""Candidates for the share of each variance that is taken for independent."""
-MIN_SHARE = 0.02
-"""Standard deviations below this share of the mean one are lifted to it: they are known no better."""
+"""Candidates for the fraction of each variance that counts as independent."""
+MIN_RELATIVE_DEVIATION = 0.02
+"""Minimum standard deviation as a fraction of the mean one: smaller ones are not known accurately."""
 NEWTON_STEPS = 12
 
 
@@ -39,10 +39,10 @@ class CorrelatedRegression:
         monomials: of theta.
         coefficients: Z, shape (n, F).
         root: lower triangular L with C = L L', shape (n, n).
-        inflation: factor on covariances of theta that makes regions hold what they promise.
+        inflation: factor on covariances of theta that gives regions their nominal coverage.
         distances: squared Mahalanobis distances of training movements, each left out, in their order. Shape (K,).
         groups: number of the group of each, shape (K,).
-        ridge: share per degree above 0. shrinkage: of the correlations.
+        ridge: per degree above 0. shrinkage: of the correlations.
     """
 
     monomials: Monomials
@@ -71,12 +71,12 @@ class CorrelatedRegression:
     def best_fitted(
         cls, descriptions: Iterable[Floats], theta: Floats, monomials: Monomials, groups: Ints
     ) -> CorrelatedRegression:
-        """From the one of several descriptions of the same movements, (K, n) each, that tells theta best.
+        """From the one of several descriptions of the same movements, (K, n) each, that predicts theta best.
 
-        Of unseen groups; the first where nothing can be left out.
+        For left-out groups; the first description if nothing can be left out.
         """
-        found = [cls._fitted(y, theta, monomials, groups, None, SHRINKAGES) for y in descriptions]
-        return min(found, key=lambda one: one[1])[0]
+        candidates = [cls._fitted(y, theta, monomials, groups, None, SHRINKAGES) for y in descriptions]
+        return min(candidates, key=lambda one: one[1])[0]
 
     @classmethod
     def _fitted(
@@ -93,14 +93,14 @@ class CorrelatedRegression:
         ridge = ridge if ridge is not None else chosen_ridge(y, features, degrees, groups)
         penalty = penalties(ridge, degrees, len(y))
         solved = np.linalg.solve(features.T @ features + penalty, features.T @ y)
-        coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as a file gives it back
+        coefficients = np.ascontiguousarray(solved.T, dtype=np.float64)  # as after reading a file
         left_out = residuals_left_out(y, features, penalty, groups)
         deviation = deviations_of(left_out)
         folds = _folds(y / deviation, theta, monomials, penalty, groups)
         shrinkage, excess, tested, error = chosen_shrinkage(folds, shrinkages)
         inflation = inflation_of(excess, theta.shape[1], len(np.unique(groups)), minimum=1e-6)
         triangle = np.linalg.cholesky(shrunk(left_out / deviation, shrinkage))
-        # What no fold could test is compared with a covariance that knows it.
+        # Movements that no fold tested are compared with a covariance that includes them.
         distances = (solve_triangular(triangle, (left_out / deviation).T, lower=True) ** 2).sum(axis=0)
         for fold, distance in zip(folds, tested, strict=False):
             distances[fold.members] = distance
@@ -117,16 +117,16 @@ class CorrelatedRegression:
 
         Args:
             y: the movement, (n,).
-            margin: how far outside the bounds of the training theta may lie, as a share of their width.
+            margin: how far outside the bounds of the training theta may lie, as a fraction of their width.
         """
         self._check_length(y)
         _, projector, triangle = self._condensing
         own, bound = self.monomials, 1.0 + 2.0 * margin
-        place, slopes = nearest(own.starts, bound, own.exponents, projector @ y, triangle, NEWTON_STEPS)
+        position, slopes = nearest(own.starts, bound, own.exponents, projector @ y, triangle, NEWTON_STEPS)
         information = slopes.T @ slopes
-        information.flat[:: len(place) + 1] += 1.0 / bound**2
+        information.flat[:: len(position) + 1] += 1.0 / bound**2
         covariance = np.linalg.inv(information) * (self.inflation * own.scale[:, None] * own.scale)
-        return own.centre + own.scale * place, covariance
+        return own.centre + own.scale * position, covariance
 
     def distance(self, y: Floats, theta: Floats) -> float:
         """Squared Mahalanobis distance of a movement (n,) from that of theta (P,)."""
@@ -137,7 +137,7 @@ class CorrelatedRegression:
     def aligned_parts(
         self, sequence: Floats, movement: Movement, begins: Ints, alignments: int, margin: float
     ) -> Floats:
-        """See `search_kernels.aligned_parts`; theta is where `estimate` finds it."""
+        """See `search_kernels.aligned_parts`; theta is that of `estimate`."""
         _, projector, triangle = self._condensing
         starts, bound = self.monomials.starts, 1.0 + 2.0 * margin
         return aligned_parts(sequence, movement, begins, alignments, starts, bound, projector, triangle, NEWTON_STEPS)
@@ -157,8 +157,8 @@ class CorrelatedRegression:
     def log_p_value(self, distance: float) -> float:
         """Logarithm of the probability that a genuine movement lies as far from the model or farther.
 
-        The logarithms of the distances of unseen training movements are taken for normally distributed, in a group that
-        was not seen about another mean.
+        The logarithms of the distances of left-out training movements are assumed normally distributed, with a mean for
+        each group.
         """
         return self._usual.log_above(float(np.log(distance + 1e-9)))
 
@@ -175,7 +175,7 @@ class CorrelatedRegression:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], prefix: str, monomials: Monomials) -> CorrelatedRegression:
-        """From what `arrays` gave, with a prefix to the names. Raises ValueError for shapes that do not fit.
+        """From the result of `arrays`, with a prefix to the names. Raises ValueError for shapes that do not fit.
 
         Files of earlier releases hold no groups: each movement is then one of its own.
         """
@@ -199,13 +199,13 @@ class CorrelatedRegression:
 
     def _check_length(self, y: Floats) -> None:
         if len(y) != len(self.coefficients):
-            raise ValueError(f"expected a movement as {len(self.coefficients)} numbers, found {len(y)}")
+            raise ValueError(f"expected a movement of {len(self.coefficients)} numbers, found {len(y)}")
 
     @cached_property
     def _condensing(self) -> tuple[Floats, Floats, Floats]:
         """L^-1, Q' L^-1 and R, where L^-1 Z = Q R: |L^-1 (y - Z phi)|^2 = |Q' L^-1 y - R phi|^2 + a rest.
 
-        So a movement is searched for in as many numbers as there are monomials.
+        So the search takes as many numbers as there are monomials.
         """
         inverse = solve_triangular(self.root, np.eye(len(self.root)), lower=True)
         basis, triangle = np.linalg.qr(inverse @ self.coefficients)
@@ -214,12 +214,12 @@ class CorrelatedRegression:
 
 @dataclass(frozen=True)
 class LeftOutFold:
-    """Movements that a regression has not seen: residuals (k, n) and slopes (k, n, P) by the others' coefficients.
+    """Movements left out of a regression: residuals (k, n) and slopes (k, n, P) by the others' coefficients.
 
     `members` (k,) are their numbers.
 
-    `reference` are residuals of the others, each left out in turn; had their regression seen the tested movements, the
-    covariance would know the noise of those.
+    `reference` are residuals of the others, each left out in turn, by regressions without the tested movements:
+    otherwise the covariance would include the noise of those.
     """
 
     members: Ints
@@ -231,10 +231,10 @@ class LeftOutFold:
 def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, groups: Ints) -> list[LeftOutFold]:
     features, folds = monomials.at(theta), []
     for tested, others in folds_of(groups):
-        seen = features[others]
-        coefficients = np.linalg.solve(seen.T @ seen + penalty, seen.T @ y[others]).T
+        known = features[others]
+        coefficients = np.linalg.solve(known.T @ known + penalty, known.T @ y[others]).T
         slopes = np.stack([coefficients @ monomials.jacobian(one) * monomials.scale for one in theta[tested]])
-        reference = residuals_left_out(y[others], seen, penalty, groups[others])
+        reference = residuals_left_out(y[others], known, penalty, groups[others])
         folds.append(LeftOutFold(tested, reference, y[tested] - features[tested] @ coefficients.T, slopes))
     return folds
 
@@ -242,20 +242,20 @@ def _folds(y: Floats, theta: Floats, monomials: Monomials, penalty: Floats, grou
 def chosen_shrinkage(
     folds: list[LeftOutFold], candidates: tuple[float, ...]
 ) -> tuple[float, Floats, list[Floats], float]:
-    """Shrinkage with the smallest error of theta on unseen movements.
+    """Shrinkage with the smallest error of theta on left-out movements.
 
-    Those errors in predicted deviations, of all folds, the distances of the movements of each fold, and the mean error.
+    Also these errors in predicted deviations, of all folds, the distances of the movements of each fold, mean error.
     """
     best, minimum = (candidates[-1], np.zeros(0), list[Floats](), np.inf), np.inf
     for shrinkage in candidates:
-        found = [_tested(fold, shrinkage) for fold in folds]
-        if not found:
+        tested = [_tested(fold, shrinkage) for fold in folds]
+        if not tested:
             break
-        error, excess, _ = np.concatenate(found, axis=1)
+        error, excess, _ = np.concatenate(tested, axis=1)
         total = float(np.sqrt(error + 1e-12).mean())
         if total < minimum:
             minimum = total
-            best = shrinkage, excess, [np.maximum(distance, 0.0) for _, _, distance in found], total
+            best = shrinkage, excess, [np.maximum(distance, 0.0) for _, _, distance in tested], total
     return best
 
 
@@ -268,14 +268,14 @@ def _tested(fold: LeftOutFold, shrinkage: float) -> Floats:
     for k in range(count):
         wide = solved[:, count + k * dimension : count + (k + 1) * dimension]
         gradient = wide.T @ fold.residuals[k]
-        missed = _solved_or_least(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
-        excess = float(missed @ gradient)
-        result[:, k] = missed @ missed, excess, fold.residuals[k] @ solved[:, k] - excess
+        error = _solved_or_shortest(fold.slopes[k].T @ wide + 1e-9 * np.eye(dimension), gradient)
+        excess = float(error @ gradient)
+        result[:, k] = error @ error, excess, fold.residuals[k] @ solved[:, k] - excess
     return result
 
 
-def _solved_or_least(matrix: Floats, right: Floats) -> Floats:
-    """matrix^-1 right; the shortest solution where two or three movements say nothing about a direction of theta."""
+def _solved_or_shortest(matrix: Floats, right: Floats) -> Floats:
+    """matrix^-1 right; the shortest solution where two or three movements do not determine a direction of theta."""
     try:
         return np.linalg.solve(matrix, right).astype(np.float64)
     except np.linalg.LinAlgError:
@@ -285,7 +285,7 @@ def _solved_or_least(matrix: Floats, right: Floats) -> Floats:
 def deviations_of(residuals: Floats) -> Floats:
     """Standard deviations of residuals (K, n), none much below the mean one. Shape (n,)."""
     deviation = np.sqrt((residuals**2).mean(axis=0))
-    result: Floats = np.maximum(deviation, MIN_SHARE * float(np.sqrt((deviation**2).mean())) + 1e-12)
+    result: Floats = np.maximum(deviation, MIN_RELATIVE_DEVIATION * float(np.sqrt((deviation**2).mean())) + 1e-12)
     return result
 
 

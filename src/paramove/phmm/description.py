@@ -1,4 +1,4 @@
-"""What a movement model is about: action, points, unit, frame, names of the parameters."""
+"""Description of a movement model: action, points, unit, frame, names of the parameters."""
 
 from dataclasses import asdict, dataclass, fields
 from math import isfinite
@@ -7,7 +7,7 @@ from typing import Any, Self
 
 @dataclass(frozen=True)
 class MovementDescription:
-    """Labels that travel with a model.
+    """Labels that are stored with a model.
 
     Attributes:
         action: name of the action.

@@ -34,7 +34,7 @@ class Monomials:
     def of_degree(cls, degree: int, theta: Floats) -> Monomials:
         """Monomials for labels (K, P), which give centre and scale.
 
-        Raises ValueError for a degree below 1, and for more monomials or parameters than are ever used.
+        Raises ValueError for a degree below 1, and for too many monomials or parameters.
         """
         if degree < 1:
             raise ValueError(f"the degree of a polynomial model is at least 1, found {degree}")
@@ -58,7 +58,7 @@ class Monomials:
 
     @cached_property
     def starts(self) -> Floats:
-        """Scaled places where theta is looked for: the middle, and half-way to the corners unless linear. (S, P)."""
+        """Scaled starting points of the search for theta: the middle, and half-way to corners unless linear. (S, P)."""
         middle = np.zeros((1, len(self.centre)))
         if self.degrees.max() <= 1:
             return middle
@@ -82,7 +82,7 @@ class Monomials:
         return result
 
     def n_distinct(self, theta: Floats) -> int:
-        """How many monomials the labels (K, P) can tell apart: the rank of their values."""
+        """How many monomials the labels (K, P) determine: the rank of their values."""
         return int(np.linalg.matrix_rank(self.at(theta), tol=1e-8 * np.sqrt(len(theta))))
 
 

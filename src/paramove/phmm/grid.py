@@ -12,7 +12,7 @@ from paramove.documents import Floats, Ints
 
 @dataclass(frozen=True)
 class ParameterGrid:
-    """Points of an undistorted P-dimensional cuboid at which local models stand.
+    """Points of an undistorted P-dimensional cuboid of the local models.
 
     Attributes:
         origin: theta of coordinates (0, ..., 0), shape (P,).
@@ -107,7 +107,7 @@ class ParameterGrid:
         return self.theta(np.stack([axis.ravel() for axis in mesh], axis=1))
 
     def nearest(self, theta: Floats) -> tuple[Ints, Floats]:
-        """Index of the nearest grid point of each theta, and the distance in shares of the cell. Shapes (K,)."""
+        """Index of the nearest grid point of each theta, and the distance as a fraction of the cell. Shapes (K,)."""
         coordinates = self.coordinates(theta)
         multi, distance = [], np.zeros(len(theta))
         for component, knots in zip(coordinates.T, self.knots, strict=True):
@@ -118,17 +118,17 @@ class ParameterGrid:
         return np.ravel_multi_index(tuple(multi), self.shape).astype(np.int64), distance
 
     def weights(self, coordinates: Floats, clamped: bool) -> tuple[Ints, Floats]:
-        """Grid points around each place and their multilinear weights (3.8)-(3.10). Shapes (M, 2^P).
+        """Grid points around each position and their multilinear weights (3.8)-(3.10). Shapes (M, 2^P).
 
-        Outside the grid the weights extrapolate linearly, or, clamped, are those of the nearest place inside.
+        Outside the grid the weights extrapolate linearly, or, clamped, are those of the nearest position inside.
         """
-        places = np.clip(coordinates, 0.0, 1.0) if clamped else coordinates
-        indices = np.zeros((len(places), 1), dtype=np.int64)
-        weights = np.ones((len(places), 1))
-        for component, knots in zip(places.T, self.knots, strict=True):
+        positions = np.clip(coordinates, 0.0, 1.0) if clamped else coordinates
+        indices = np.zeros((len(positions), 1), dtype=np.int64)
+        weights = np.ones((len(positions), 1))
+        for component, knots in zip(positions.T, self.knots, strict=True):
             cell = np.clip(np.searchsorted(knots, component, side="right") - 1, 0, len(knots) - 2)
-            share = ((component - knots[cell]) / (knots[cell + 1] - knots[cell]))[:, None]
+            fraction = ((component - knots[cell]) / (knots[cell + 1] - knots[cell]))[:, None]
             lower = indices * len(knots) + cell[:, None]
             indices = np.concatenate([lower, lower + 1], axis=1)
-            weights = np.concatenate([weights * (1.0 - share), weights * share], axis=1)
+            weights = np.concatenate([weights * (1.0 - fraction), weights * fraction], axis=1)
         return indices, weights

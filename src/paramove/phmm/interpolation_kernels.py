@@ -1,7 +1,7 @@
-"""Compiled likelihood of an interpolative PHMM and its exact derivative in the place on the grid (thesis 3.4).
+"""Compiled likelihood of an interpolative PHMM and its exact derivative in the position on the grid (thesis 3.4).
 
-A place u in grid coordinates lies in a cell of 2^P local models. Everything that is interpolated depends on u through
-the weights of these corners alone, so the derivative of ln p follows from one number per corner, for means, covariances
+A position u in grid coordinates lies in a cell of 2^P local models. All interpolated values depend on u only through
+the weights of these corners, so the derivative of ln p follows from one number per corner, for means, covariances
 and durations alike (Fisher's identity).
 """
 
@@ -18,19 +18,19 @@ LOG_2PI = 1.8378770664093453
 def corner_weights(u: Floats, cell: Ints, knots: Floats, clamped: bool) -> tuple[Floats, Floats]:
     """Multilinear weights of a cell's corners (3.8)-(3.10), shape (2^P,), and their slopes in u, (2^P, P).
 
-    The first dimension has the highest bit of a corner's number. Clamped weights are those of the nearest place inside.
+    The first dimension has the highest bit of a corner's number. Clamped weights are those of the nearest inside.
     """
     dimension = len(u)
     n_corners = 1 << dimension
     weights, slopes = np.ones(n_corners), np.ones((n_corners, dimension))
     for p in range(dimension):
         low, high = knots[p, cell[p]], knots[p, cell[p] + 1]
-        share, slope = (u[p] - low) / (high - low), 1.0 / (high - low)
+        fraction, slope = (u[p] - low) / (high - low), 1.0 / (high - low)
         if clamped and (u[p] < 0.0 or u[p] > 1.0):
-            share, slope = min(1.0, max(0.0, share)), 0.0
+            fraction, slope = min(1.0, max(0.0, fraction)), 0.0
         for c in range(n_corners):
             upper = (c >> (dimension - 1 - p)) & 1
-            factor = share if upper else 1.0 - share
+            factor = fraction if upper else 1.0 - fraction
             weights[c] *= factor
             for q in range(dimension):
                 slopes[c, q] *= (slope if upper else -slope) if q == p else factor
@@ -202,24 +202,24 @@ def expectation_at(
     gradient, information = np.zeros(dimension), np.zeros((dimension, dimension))
     if not value > -np.inf:
         return value, gradient, information
-    from_means, from_spread = np.zeros(len(numbers)), np.zeros(len(numbers))
+    from_means, from_covariances = np.zeros(len(numbers)), np.zeros(len(numbers))
     score, moved = np.empty((dim, 1)), np.empty((dim, dimension))
-    pulled, spread = np.empty((dim, white.shape[2])), np.empty((dim, dim))
-    shares = np.empty(white.shape[2])
+    pulled, score_matrix = np.empty((dim, white.shape[2])), np.empty((dim, dim))
+    frame_weights = np.empty(white.shape[2])
     flat = np.empty(dim * dim)
     for i in range(n_states):
         n, weight = 0, 0.0
         for f in range(ends[i + 1, 1] - ends[i, 0]):
-            share = gamma[i, ends[i, 0] + f]
-            if share < NEGLIGIBLE:
+            weight_t = gamma[i, ends[i, 0] + f]
+            if weight_t < NEGLIGIBLE:
                 continue
-            shares[n] = share
-            weight += share
+            frame_weights[n] = weight_t
+            weight += weight_t
             for k in range(dim):
                 pulled[k, n] = white[i, k, f]
             n += 1
         for k in range(dim):
-            score[k, 0] = smoothing * dot(pulled[k, :n], shares[:n])
+            score[k, 0] = smoothing * dot(pulled[k, :n], frame_weights[:n])
         for p in range(dimension):
             for k in range(dim):
                 moved[k, p] = 0.0
@@ -230,25 +230,32 @@ def expectation_at(
             for q in range(p + 1):
                 for k in range(dim):
                     information[p, q] += smoothing * weight * moved[k, p] * moved[k, q]
-        _spread_score(roots[i], dim, pulled, shares, n, weight / smoothing, spread, flat)
+        _covariance_score(roots[i], dim, pulled, frame_weights, n, weight / smoothing, score_matrix, flat)
         _backward_substituted(roots[i], dim, 1, score)
         for c in range(len(numbers)):
             from_means[c] += dot(means[numbers[c], i], score[:, 0])
-            from_spread[c] += 0.5 * smoothing * dot(flat, covariances[numbers[c], i])
+            from_covariances[c] += 0.5 * smoothing * dot(flat, covariances[numbers[c], i])
             for d in range(d_min - 1, d_max):
                 if counted[i, d] > 0.0:
-                    from_spread[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])
+                    from_covariances[c] += counted[i, d] * durations[numbers[c], i, d] / np.exp(log_duration[i, d])
     for p in range(dimension):
         for c in range(len(numbers)):
-            gradient[p] += slopes[c, p] * from_means[c] + clamped_slopes[c, p] * from_spread[c]
+            gradient[p] += slopes[c, p] * from_means[c] + clamped_slopes[c, p] * from_covariances[c]
         for q in range(p):
             information[q, p] = information[p, q]
     return value, gradient, information
 
 
 @compiled_sums
-def _spread_score(
-    root: Floats, dim: int, pulled: Floats, shares: Floats, n: int, weight: float, spread: Floats, flat: Floats
+def _covariance_score(
+    root: Floats,
+    dim: int,
+    pulled: Floats,
+    frame_weights: Floats,
+    n: int,
+    weight: float,
+    score_matrix: Floats,
+    flat: Floats,
 ) -> None:
     """Derivative of the expected log outputs in a covariance, twice: Sigma^-1 S Sigma^-1 - gamma Sigma^-1, (D D,).
 
@@ -258,18 +265,18 @@ def _spread_score(
         for column in range(row + 1):
             total = 0.0
             for f in range(n):
-                total += shares[f] * pulled[row, f] * pulled[column, f]
+                total += frame_weights[f] * pulled[row, f] * pulled[column, f]
             if row == column:
                 total -= weight
-            spread[row, column] = total
-            spread[column, row] = total
-    _backward_substituted(root, dim, dim, spread)
+            score_matrix[row, column] = total
+            score_matrix[column, row] = total
+    _backward_substituted(root, dim, dim, score_matrix)
     for row in range(dim):
         for column in range(row):
-            kept = spread[row, column]
-            spread[row, column] = spread[column, row]
-            spread[column, row] = kept
-    _backward_substituted(root, dim, dim, spread)
+            upper = score_matrix[row, column]
+            score_matrix[row, column] = score_matrix[column, row]
+            score_matrix[column, row] = upper
+    _backward_substituted(root, dim, dim, score_matrix)
     for row in range(dim):
         for column in range(dim):
-            flat[row * dim + column] = spread[row, column]
+            flat[row * dim + column] = score_matrix[row, column]

@@ -13,19 +13,19 @@ from paramove.documents import Floats, Ints
 from paramove.hmm import Evaluator, LeftRightHMM, Parameters, TrainingOptions, check_length, checked_sequence
 from paramove.phmm import interpolation_kernels, interpolation_search
 from paramove.phmm.description import MovementDescription
+from paramove.phmm.execution_covariance import ExecutionCovariance, Sensitivity, left_out_of_groups
 from paramove.phmm.grid import ParameterGrid
 from paramove.phmm.local_models import check_local_models
 from paramove.phmm.noise import AddedNoise, expected_responsibilities
 from paramove.phmm.parametric import ParameterEstimate, ParametricHMM, TrainingData
 from paramove.phmm.performance import state_averages
-from paramove.phmm.performance_spread import PerformanceSpread, Sensitivity, left_out_of_groups
 from paramove.phmm.synchronisation import synchronised
 
 UNSEEN_BEND = 0.03
-"""Standard deviation of theta half-way between the only two lines of a dimension, as a share of the grid: what lies
-between cannot be known from them. The 2 x 2 model of thesis 4.2.5 is 3.5 cm off in the middle of 80 cm."""
+"""Standard deviation of theta half-way between the only two lines of a dimension, as a fraction of the grid: the
+movements between them are unknown. The 2 x 2 model of thesis 4.2.5 is 3.5 cm off in the middle of 80 cm."""
 SMOOTHING = 0.3
-"""Factor on squared distances where the search begins: covariances are widened as much (paper 5.3)."""
+"""Factor on squared distances where the search begins: covariances are widened by its inverse (paper 5.3)."""
 
 
 class InterpolativePHMM(ParametricHMM):
@@ -37,9 +37,9 @@ class InterpolativePHMM(ParametricHMM):
     Args:
         n_states, d_min, d_max, options, resampled_frames, description: as in `ParametricHMM`.
         corners: for a cuboid that is not axis-parallel: theta of (0, 0, ..), (1, 0, ..), (0, 1, ..), ..; (P + 1, P).
-        shape: grid lines per dimension; with `corners` only. Without them the grid is found from theta.
+        shape: grid lines per dimension; with `corners` only. Without them the grid follows from theta.
         local_iterations: EM steps of the local models, the first with the global responsibilities.
-        search_margin: how far outside the grid `estimate` looks, as a share of the grid.
+        search_margin: how far outside the grid `estimate` searches, as a fraction of the grid.
         covariance_inflation: further factor on the covariance of `estimate`, see `calibrate`.
 
     Attributes:
@@ -47,10 +47,10 @@ class InterpolativePHMM(ParametricHMM):
         means_: shape (G, N, D), grid points with the last dimension fastest.
         covariances_: shape (G, N, D, D).
         durations_: shape (G, N, d_max).
-        spread_: how whole training performances vary; None for a model made of given local HMMs.
+        spread_: covariance of whole training executions; None for a model made of given local HMMs.
     """
 
-    spread_: PerformanceSpread | None = None
+    spread_: ExecutionCovariance | None = None
     _prepared: tuple[Any, ...] | None = None
 
     def __init__(
@@ -103,8 +103,8 @@ class InterpolativePHMM(ParametricHMM):
     def calibrate(self, sequences: Sequence[ArrayLike], theta: ArrayLike) -> Self:
         """Set `covariance_inflation` so that covariances of `estimate` match its errors on labelled sequences.
 
-        Needed for a model made of given local HMMs; one that was trained knows how performances vary, but not what it
-        was never shown. Use sequences that did not train the model. Raises ValueError for fewer than two.
+        Needed for a model made of given local HMMs; a trained one knows how executions vary, but only those of its
+        training. Use sequences that did not train the model. Raises ValueError for fewer than two.
         """
         labels = np.atleast_2d(np.asarray(theta, dtype=np.float64))
         if len(sequences) < 2:
@@ -112,9 +112,9 @@ class InterpolativePHMM(ParametricHMM):
         self.covariance_inflation = 1.0
         squared = []
         for sequence, label in zip(sequences, labels, strict=True):
-            found = self.estimate(sequence)
-            error = found.theta - label
-            squared.append(float(error @ np.linalg.solve(found.covariance, error)))
+            estimate = self.estimate(sequence)
+            error = estimate.theta - label
+            squared.append(float(error @ np.linalg.solve(estimate.covariance, error)))
         self.covariance_inflation = float(np.mean(squared)) / self.grid_.dimension
         return self
 
@@ -126,9 +126,9 @@ class InterpolativePHMM(ParametricHMM):
         local = synchronised(everything.parameters, groups, options, self.local_iterations)
         self.training_ = everything.training_
         self._set_local(grid, local)
-        self.spread_ = self._performance_spread(data.sequences, data.theta)
+        self.spread_ = self._execution_covariance(data.sequences, data.theta)
 
-    def _performance_spread(self, sequences: Sequence[Floats], theta: Floats) -> PerformanceSpread:
+    def _execution_covariance(self, sequences: Sequence[Floats], theta: Floats) -> ExecutionCovariance:
         numbers = self.grid_.nearest(theta)[0]
         evaluators = [Evaluator.of(one) for one in self.local_models()]
         averages = [
@@ -140,9 +140,9 @@ class InterpolativePHMM(ParametricHMM):
         sensitivities = []
         for g, sequence in zip(numbers.tolist(), sequences, strict=True):
             cell = np.minimum(np.unravel_index(g, self.grid_.shape), counts - 2)
-            place = self.grid_.coordinates(self.grid_.points()[g])
-            sensitivities.append(self._sensitivity(place, cell, len(sequence)))
-        return PerformanceSpread.fitted(left_out_of_groups(residuals, numbers), sensitivities, self.grid_.size)
+            position = self.grid_.coordinates(self.grid_.points()[g])
+            sensitivities.append(self._sensitivity(position, cell, len(sequence)))
+        return ExecutionCovariance.fitted(left_out_of_groups(residuals, numbers), sensitivities, self.grid_.size)
 
     def _grid_for(self, theta: Floats) -> ParameterGrid:
         if self.corners is None:
@@ -177,11 +177,13 @@ class InterpolativePHMM(ParametricHMM):
         return self._at_progress(self.covariances_, theta, tau, clamped=True)
 
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
-        """Maximum likelihood theta; its covariance from how whole training performances differ from their local model.
+        """Maximum likelihood theta; its covariance from the differences of whole training executions from their local
+        model.
 
-        A model made of given local HMMs knows no performances: its covariance is the inverse information, far too sure.
+        A model made of given local HMMs has no executions: its covariance is the inverse information, which is far too
+        small.
 
-        Raises ValueError for `finished=False`: a grid of local models knows nothing of beginnings.
+        Raises ValueError for `finished=False`: a grid of local models does not model beginnings.
         """
         if not finished:
             raise ValueError(
@@ -204,14 +206,14 @@ class InterpolativePHMM(ParametricHMM):
         else:
             covariance = self._curvature_covariance(checked, best, cell, widest)
         edges = self.grid_.edges
-        spread = self.covariance_inflation * (edges.T @ covariance @ edges)
-        return ParameterEstimate(self.grid_.theta(best), spread, float(value))
+        theta_covariance = self.covariance_inflation * (edges.T @ covariance @ edges)
+        return ParameterEstimate(self.grid_.theta(best), theta_covariance, float(value))
 
     def _expect(self, noise: AddedNoise) -> None:
         self.covariances_ = self.covariances_ + noise.of_states
         self._prepared = None
         if self.spread_ is not None:
-            gamma = expected_responsibilities(self.durations_.mean(axis=0), noise.seen)
+            gamma = expected_responsibilities(self.durations_.mean(axis=0), noise.n_model_frames)
             of_states = noise.of_averages(lambda frames: state_averages(gamma, frames)[0])
             self.spread_ = replace(self.spread_, own=self.spread_.own + np.diagonal(of_states))
 
@@ -220,7 +222,7 @@ class InterpolativePHMM(ParametricHMM):
         return int(self.means_.shape[-1])
 
     def _kernel_arrays(self) -> tuple[Any, ...]:
-        """Grid lines (P, most), their numbers (P,), and the local models as the kernels take them."""
+        """Grid lines (P, maximum), their numbers (P,), and the local models as the kernels take them."""
         if self._prepared is None:
             grid = self.grid_
             knots = np.zeros((grid.dimension, max(grid.shape)))
@@ -238,10 +240,10 @@ class InterpolativePHMM(ParametricHMM):
         moved = np.einsum("cp,cnd->ndp", slopes, self.means_[numbers])
         return Sensitivity.of(self._interpolated(coordinates), moved, n_frames)
 
-    def _curvature_covariance(self, sequence: Floats, place: Floats, cell: Ints, widest: float) -> Floats:
-        """Inverse information of the likelihood: far too sure, but all that is known without performances."""
+    def _curvature_covariance(self, sequence: Floats, position: Floats, cell: Ints, widest: float) -> Floats:
+        """Inverse information of the likelihood: far too small, but all that is known without executions."""
         columns, arrays = np.ascontiguousarray(sequence.T), self._kernel_arrays()
-        information = interpolation_kernels.expectation_at(place, cell, 1.0, columns, *arrays)[2]
+        information = interpolation_kernels.expectation_at(position, cell, 1.0, columns, *arrays)[2]
         values, vectors = np.linalg.eigh(information)
         result: Floats = (vectors / np.maximum(values, 1.0 / widest**2)) @ vectors.T
         return result
@@ -278,9 +280,9 @@ class InterpolativePHMM(ParametricHMM):
         position = progress * (self.n_states - 1)
         lower, upper = np.floor(position).astype(np.int64), np.ceil(position).astype(np.int64)
         indices, weights = self.grid_.weights(rows, clamped)
-        share = (position - lower)[:, None]
-        result = np.einsum("mc,mc...->m...", weights * (1.0 - share), values[indices, lower[:, None]])
-        result += np.einsum("mc,mc...->m...", weights * share, values[indices, upper[:, None]])
+        fraction = (position - lower)[:, None]
+        result = np.einsum("mc,mc...->m...", weights * (1.0 - fraction), values[indices, lower[:, None]])
+        result += np.einsum("mc,mc...->m...", weights * fraction, values[indices, upper[:, None]])
         single = coordinates.ndim == 1 and np.ndim(tau) == 0
         return cast(Floats, result[0] if single else result)
 
@@ -304,8 +306,8 @@ class InterpolativePHMM(ParametricHMM):
                 raise ValueError(f"expected {name} of shape {shape}, found {arrays[name].shape}")
         check_local_models(self.means_, self.covariances_, self.durations_, self.d_min)
         self._prepared = None
-        known = "spread_factor" in arrays  # models made of given local HMMs know no performances
-        self.spread_ = PerformanceSpread.from_arrays(arrays, self.n_states * dim) if known else None
+        known = "spread_factor" in arrays  # models made of given local HMMs have no executions
+        self.spread_ = ExecutionCovariance.from_arrays(arrays, self.n_states * dim) if known else None
 
 
 def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list[list[Floats]]:
@@ -331,26 +333,31 @@ def grouped(sequences: list[Floats], theta: Floats, grid: ParameterGrid) -> list
 
 
 def bending(grid: ParameterGrid, means: Floats, coordinates: Floats, gain: Floats) -> Floats:
-    """Covariance of theta in grid coordinates (P, P) at a place (P,).
+    """Covariance of theta in grid coordinates (P, P) at a position (P,), from the error of interpolation.
 
-    Interpolation between lines h apart misses s (1 - s) h^2 f'' / 2, with s the share of the way; f'' follows from
+    Interpolation between lines h apart misses s (1 - s) h^2 f'' / 2, with s the fraction between them; f'' follows from
     three neighbouring lines.
 
     Args:
-        means: of the local models, (G, N, D). gain: what averages of the states move theta by, (P, N D).
+        means: of the local models, (G, N, D). gain: change of theta with the averages of the states, (P, N D).
     """
     shaped = means.reshape(*grid.shape, -1)
     total = np.zeros((grid.dimension, grid.dimension))
     for p, knots in enumerate(grid.knots):
         line = int(np.clip(np.searchsorted(knots, coordinates[p], side="right") - 1, 0, len(knots) - 2))
         width = knots[line + 1] - knots[line]
-        share = float(np.clip((coordinates[p] - knots[line]) / width, 0.0, 1.0))
+        fraction = float(np.clip((coordinates[p] - knots[line]) / width, 0.0, 1.0))
         if len(knots) == 2:
-            total[p, p] += (4.0 * UNSEEN_BEND * share * (1.0 - share)) ** 2
+            total[p, p] += (4.0 * UNSEEN_BEND * fraction * (1.0 - fraction)) ** 2
             continue
         for middle in {max(1, line), min(line + 1, len(knots) - 2)}:
             moved = (
-                0.5 * share * (1.0 - share) * width**2 * gain @ _second_derivative(shaped, grid, p, middle, coordinates)
+                0.5
+                * fraction
+                * (1.0 - fraction)
+                * width**2
+                * gain
+                @ _second_derivative(shaped, grid, p, middle, coordinates)
             )
             total += np.outer(moved, moved)
     return total
@@ -358,8 +365,8 @@ def bending(grid: ParameterGrid, means: Floats, coordinates: Floats, gain: Float
 
 def _second_derivative(shaped: Floats, grid: ParameterGrid, p: int, middle: int, coordinates: Floats) -> Floats:
     """Of the means along dimension p at an inner line, at the nearest lines of the other dimensions. (N D,)."""
-    place = [int(np.abs(knots - at).argmin()) for knots, at in zip(grid.knots, coordinates, strict=True)]
-    before, here, after = (shaped[(*place[:p], middle + step, *place[p + 1 :])] for step in (-1, 0, 1))
+    position = [int(np.abs(knots - at).argmin()) for knots, at in zip(grid.knots, coordinates, strict=True)]
+    before, here, after = (shaped[(*position[:p], middle + step, *position[p + 1 :])] for step in (-1, 0, 1))
     knots = grid.knots[p]
     low, high = knots[middle] - knots[middle - 1], knots[middle + 1] - knots[middle]
     result: Floats = 2.0 * ((after - here) / high - (here - before) / low) / (low + high)

@@ -1,4 +1,4 @@
-"""Which movements are left out together, and how much wider regions of theta must be for errors seen on them."""
+"""Folds of cross-validation over groups, and inflation of covariances of theta by errors of left-out movements."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ MAX_FOLDS = 10
 def fold_numbers(groups: Ints) -> Ints:
     """Number below `MAX_FOLDS` of each movement's fold, from its group (K,); groups stay together. Shape (K,).
 
-    Of one or two groups, parts of their movements.
+    For one or two groups, parts of their movements.
     """
     different = np.unique(groups)
     numbers = np.searchsorted(different, groups) if len(different) > 2 else np.arange(len(groups))
@@ -30,13 +30,13 @@ def folds_of(groups: Ints) -> Iterator[tuple[Ints, Ints]]:
 
 
 def inflation_of(excess: Floats, dimension: int, n_groups: int, minimum: float) -> float:
-    """What a covariance of theta must be multiplied by so that regions hold what they promise.
+    """Factor on covariances of theta that gives regions their nominal coverage.
 
     Args:
         excess: squared errors of left-out movements in predicted deviations, (K,); none if nothing could be left out.
         dimension: P. n_groups: how many different groups those are from. minimum: lower bound of the result.
     """
-    few = (n_groups + dimension) / max(1, n_groups - 1)  # few groups know little of the tails
+    few = (n_groups + dimension) / max(1, n_groups - 1)  # few groups determine the tails badly
     if not len(excess):
         return few
     level = min(1.0, 0.95 * (1.0 + 1.0 / len(excess)))

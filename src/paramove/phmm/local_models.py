@@ -1,4 +1,4 @@
-"""Checks of local HMMs that come from a file: whether they can be models at all."""
+"""Checks of local HMMs that come from a file: whether they are valid models."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ def check_local_models(means: Floats, covariances: Floats, durations: Floats, d_
 
     Args:
         means: shape (G, N, D). covariances: shape (G, N, D, D). durations: p_i(d) in column d - 1, (G, N, d_max).
-        d_min: fewest frames of a state.
+        d_min: minimum number of frames of a state.
 
     Raises:
         ValueError: for covariances that are not symmetric and positive definite, and rows of durations that are no
@@ -35,8 +35,8 @@ def check_local_models(means: Floats, covariances: Floats, durations: Floats, d_
     minimum = np.linalg.eigvalsh(covariances)[..., 0]
     bad = np.argwhere(minimum <= 0)
     if len(bad):
-        found = f"the eigenvalue {minimum[tuple(bad[0])]:.3g} {_where(bad[0])}"
-        raise ValueError(f"expected covariances that are positive definite, found {found}")
+        eigenvalue = f"{minimum[tuple(bad[0])]:.3g} {_where(bad[0])}"
+        raise ValueError(f"expected covariances that are positive definite, found the eigenvalue {eigenvalue}")
 
 
 def _where(index: NDArray[np.intp]) -> str:

@@ -1,4 +1,4 @@
-"""Models that are trained from demonstrations at their first use and kept in a file from then on."""
+"""Models that are trained from demonstrations at their first use and then cached in a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ logger = logging.getLogger(__name__)
 
 
 def stored_model(kind: type[Model], path: Path | None) -> Model | None:
-    """The model of a file, if there is one that can be read; what cannot is told in the log."""
+    """The model of a file, if it exists and can be read; logs why it cannot."""
     if path is None or not path.exists():
         return None
     try:
@@ -38,12 +38,12 @@ def cached_model(
 
     Args:
         kind: of the model. name: of its file.
-        source: what it is trained from and how, which its description then names; another source is another file.
+        source: what it is trained from and how, which its description then names; each source has its own file.
         train: gives one with a description; called only if it is needed.
-        modules: whose code decides what comes out, with all that they import, beside the module of `train`.
+        modules: whose code, with all that they import, determines the model, in addition to the module of `train`.
     """
-    kept_in = folder if folder is not None else user_cache_path("paramove") / "actions"
-    path = kept_in / f"{name}_{crc32(source.encode()):08x}.npz"
+    cache_folder = folder if folder is not None else user_cache_path("paramove") / "actions"
+    path = cache_folder / f"{name}_{crc32(source.encode()):08x}.npz"
     source = f"{source}, code {code_digest(train.__module__, *modules)}"
     stored = stored_model(kind, path)
     if stored is not None and stored.description is not None and stored.description.source == source:
@@ -55,5 +55,5 @@ def cached_model(
         path.parent.mkdir(parents=True, exist_ok=True)
         model.save(path)
     except OSError as error:
-        logger.warning("the trained model is not kept: %s", error)
+        logger.warning("the trained model is not cached: %s", error)
     return model

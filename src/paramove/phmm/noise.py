@@ -1,10 +1,10 @@
-"""Independent noise on every frame of a movement that is asked about, beyond what the training movements had.
+"""Independent noise on every frame of a movement, beyond the noise of the training movements.
 
 Directions in which bodies hardly vary, such as the lengths of bones, get great weight in a model, and a noisy sensor
-fills them with nonsense (thesis 4.2.5). How much noise there is, the sequence tells itself: movements are smooth, so
-their third differences over neighbouring frames are those of the noise, which have 20 times its variance. What is
-clearly more than in training is then expected of this sequence: state covariances grow by it, and covariances of
-averages by what is left of it in an average. A sequence without such noise is judged exactly as if this did not exist.
+adds errors there (thesis 4.2.5). The noise is estimated from the sequence itself: movements are smooth, so
+their third differences over neighbouring frames are those of the noise, which have 20 times its variance. Noise that
+is clearly above that of the training is then expected of this sequence: it is added to state covariances, and its part
+in averages to their covariances. For a sequence without such noise nothing changes.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from paramove.documents import Floats
 from paramove.hmm import compiled_sums, resample
 
 MEDIAN_OF_SQUARES = 0.4549364
-"""Of a standard normal variable; a median since reversals, impacts and gaps make a few great differences."""
-FEWEST_DIFFERENCES = 20
+"""Of a standard normal variable; a median since reversals, impacts and gaps cause a few large differences."""
+MIN_DIFFERENCES = 20
 CLEARLY = 9.0
-"""Noise counts if its variance is more than so many times the largest of the training: three times the deviation.
+"""Noise counts if its variance is more than this many times the largest of the training: three times the deviation.
 Below that it hardly matters, and movements sampled at an eighth of the rate stay below."""
 
 
 def noise_variance(sequence: Floats) -> float:
-    """Variance of white noise on each coordinate of (T, D), pooled over all; zero if too short to tell."""
+    """Variance of white noise on each coordinate of (T, D), pooled over all; zero if the sequence is too short."""
     differences = np.diff(sequence, n=3, axis=0)
-    if differences.size < FEWEST_DIFFERENCES:
+    if differences.size < MIN_DIFFERENCES:
         return 0.0
     return float(np.median(differences**2)) / MEDIAN_OF_SQUARES / 20.0
 
@@ -47,7 +47,7 @@ def _mean_squared_difference(sequence: Floats) -> float:
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """How noisy training movements are.
+    """Noise of training movements.
 
     Attributes:
         usual: median of their `noise_variance`. maximum: of them.
@@ -63,14 +63,14 @@ class NoiseLevel:
         return cls(float(np.median(variances)), max(variances))
 
     def added(self, recorded: Floats, n_frames: int | None = None) -> AddedNoise | None:
-        """What a recorded sequence (T, D) has in addition; None if that is not clear. `n_frames`: see `AddedNoise`."""
+        """Additional noise of a recorded sequence (T, D); None if not significant. `n_frames`: see `AddedNoise`."""
         # A median is at most twice the mean, which takes a tenth of the time.
         if len(recorded) < 4 or _mean_squared_difference(recorded) <= 10.0 * MEDIAN_OF_SQUARES * CLEARLY * self.maximum:
             return None
-        found = noise_variance(recorded)
-        if found <= CLEARLY * self.maximum:
+        variance = noise_variance(recorded)
+        if variance <= CLEARLY * self.maximum:
             return None
-        return AddedNoise(found - self.usual, recorded, n_frames)
+        return AddedNoise(variance - self.usual, recorded, n_frames)
 
     def array(self) -> Floats:
         """For a file."""
@@ -78,7 +78,7 @@ class NoiseLevel:
 
     @classmethod
     def from_array(cls, array: Floats) -> NoiseLevel:
-        """From what `array` gave. Raises ValueError for anything but two variances."""
+        """From the result of `array`. Raises ValueError for anything but two variances."""
         if array.shape != (2,) or (array < 0.0).any():
             raise ValueError(f"expected two variances in training_noise, found shape {array.shape}: {array}")
         return cls(*map(float, array))
@@ -91,8 +91,8 @@ class AddedNoise:
     Attributes:
         variance: of each coordinate of each recorded frame.
         sequence: as it was recorded, (T, D).
-        n_frames: number of frames that the model brings them to by interpolation, which lowers the noise of a frame to
-            about two thirds and makes neighbours alike; None if it does not.
+        n_frames: number of frames to which the model resamples, which lowers the noise of a frame to about two
+            thirds and correlates neighbours; None if it does not.
     """
 
     variance: float
@@ -100,56 +100,56 @@ class AddedNoise:
     n_frames: int | None = None
 
     @property
-    def seen(self) -> int:
-        """Number of frames that the model sees."""
+    def n_model_frames(self) -> int:
+        """Number of frames of the model's input."""
         return len(self.sequence) if self.n_frames is None else self.n_frames
 
     @property
-    def shares(self) -> Floats:
-        """Shares of the recorded frames in those that the model sees, shape (n_frames, T)."""
+    def weights(self) -> Floats:
+        """Weights of the recorded frames in those of the model's input, shape (n_frames, T)."""
         everything = np.eye(len(self.sequence))
-        return resample(everything, self.seen)
+        return resample(everything, self.n_model_frames)
 
     @property
     def of_frames(self) -> float:
-        """Variance of each coordinate of the frames that the model sees, on average."""
-        return self.variance * float((self.shares**2).sum(axis=1).mean())
+        """Variance of each coordinate of the frames of the model's input, on average."""
+        return self.variance * float((self.weights**2).sum(axis=1).mean())
 
     @property
     def of_states(self) -> Floats:
-        """What state covariances grow by, shape (D, D)."""
+        """Addition to state covariances, shape (D, D)."""
         return self.of_frames * np.eye(self.sequence.shape[1])
 
     def of_averages(self, averaged: Callable[[Floats], Floats]) -> Floats:
         """Covariance (m D, m D) of m averages of frames, one after the other, of all coordinates.
 
-        `averaged` makes m D numbers of a sequence with any number D of coordinates, linearly, each coordinate alike.
+        `averaged` maps a sequence with any number D of coordinates linearly to m D numbers, each coordinate alike.
         """
-        shares = averaged(self.shares).reshape(-1, len(self.sequence))
-        of_one = self.variance * (shares @ shares.T)
+        weights = averaged(self.weights).reshape(-1, len(self.sequence))
+        of_one = self.variance * (weights @ weights.T)
         return np.kron(of_one, np.eye(self.sequence.shape[1])).astype(np.float64)
 
 
 def distances_with_noise(distances: Floats, covariance: Floats, moments: Floats, noise: Floats) -> Floats:
-    """What squared Mahalanobis distances (K,) would be if there had been noise, and the covariance knew it.
+    """Squared Mahalanobis distances (K,) as they would be with noise, and a covariance that includes it.
 
     Args:
         covariance: by which they were measured, (n, n). moments: second moments of what they were measured of, up to a
-            factor; less than the covariance in directions that few movements do not show.
+            factor; less than the covariance in directions that few movements do not determine.
         noise: covariance of the noise.
     """
     inverse = np.linalg.inv(covariance + noise)
     own, added = inverse @ moments, inverse @ noise
-    own_share = np.trace(own) / np.trace(np.linalg.solve(covariance, moments))
-    mean = own_share * distances + np.trace(added)
+    own_fraction = np.trace(own) / np.trace(np.linalg.solve(covariance, moments))
+    mean = own_fraction * distances + np.trace(added)
     variance = 2.0 * (added * added.T).sum() + 4.0 * (own * added.T).sum()
-    scatter = np.random.default_rng(0).standard_normal(len(distances))  # as noise does, and always the same
+    scatter = np.random.default_rng(0).standard_normal(len(distances))  # as of noise, and reproducible
     result: Floats = np.maximum(mean + np.sqrt(variance) * scatter, 0.1 * mean)
     return result
 
 
 def expected_responsibilities(durations: Floats, n_frames: int) -> Floats:
-    """Share of each frame in each state if states last as long as expected of (N, d_max) durations. Shape (N, T)."""
+    """Fraction of each frame in each state if states last as long as expected of (N, d_max) durations. Shape (N, T)."""
     lengths = durations @ np.arange(1.0, durations.shape[1] + 1.0)
     borders = np.concatenate([[0.0], np.cumsum(lengths)]) * n_frames / lengths.sum()
     frames = np.arange(float(n_frames))

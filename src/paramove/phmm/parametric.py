@@ -50,7 +50,7 @@ class TrainingData:
     """Checked demonstrations.
 
     Attributes:
-        sequences: brought to `resampled_frames` if the model does so, (T_k, D) each.
+        sequences: resampled to `resampled_frames` if the model does so, (T_k, D) each.
         recorded: the same in their own time.
         theta: shape (K, P).
         groups: number of the group of each, shape (K,).
@@ -68,14 +68,14 @@ class ParametricHMM(ABC):
     Args:
         n_states, d_min, d_max: as in `LeftRightHMM`.
         options: training options.
-        resampled_frames: if given, every sequence is first brought to this many frames (thesis 4.1.2.1).
+        resampled_frames: if given, every sequence is first resampled to this many frames (thesis 4.1.2.1).
         description: labels that are saved with the model.
 
     Attributes:
         parameter_bounds_: minimum and maximum theta of the training, shape (2, P).
         training_theta_: the different theta of the training, shape (K, P); None in files of earlier releases.
-        training_noise_: how noisy the training is; None in files of earlier releases, where noise is not looked for.
-        training_: what training did.
+        training_noise_: noise of the training; None in files of earlier releases, which then ignore noise.
+        training_: summary of the training.
     """
 
     def __init__(
@@ -129,8 +129,8 @@ class ParametricHMM(ABC):
     def fit(self, sequences: Sequence[ArrayLike], theta: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Train on sequences (T_k, D) labelled with theta (K, P).
 
-        `groups` (K,) says which sequences belong together (such as those of one person): what is chosen by leaving out
-        is chosen by leaving out groups. Without them sequences with the same theta belong together.
+        `groups` (K,) defines which sequences belong together (such as those of one person): cross-validation leaves out
+        whole groups. Without them sequences with the same theta belong together.
 
         Raises SequenceLengthError for impossible lengths, ValueError for labels or values that do not fit.
         """
@@ -206,7 +206,7 @@ class ParametricHMM(ABC):
         return self
 
     def __sklearn_tags__(self) -> Any:
-        """What scikit-learn's model selection asks, where it is installed: nothing special, but theta is needed."""
+        """Tags for scikit-learn's model selection, where it is installed: theta is required."""
         from sklearn.utils import Tags, TargetTags
 
         return Tags(estimator_type=None, target_tags=TargetTags(required=True))
@@ -245,15 +245,15 @@ class ParametricHMM(ABC):
             model.training_noise_ = None if noise is None else NoiseLevel.from_array(noise)
             model._set_arrays(arrays)
         except KeyError as error:
-            found = ", ".join(sorted(record.arrays)) or "none"
-            raise ModelFileError(f"{path}: expected an array {error}, found {found}") from error
+            names = ", ".join(sorted(record.arrays)) or "none"
+            raise ModelFileError(f"{path}: expected an array {error}, found {names}") from error
         except (ArithmeticError, AttributeError, IndexError, TypeError, ValueError) as error:
             raise ModelFileError(f"{path}: {error}") from error
         model.training_ = record.training
         return model
 
     def _expecting_noise_of(self, recorded: Floats) -> Self:
-        """This model, or if a recorded sequence has more noise than the training, one that expects as much."""
+        """This model, or if a recorded sequence has more noise than the training, one that expects this noise."""
         noise = None
         if self.training_noise_ is not None:
             noise = self.training_noise_.added(recorded, self.resampled_frames)
@@ -265,7 +265,7 @@ class ParametricHMM(ABC):
         return model
 
     def _expect(self, noise: AddedNoise) -> None:  # noqa: B027 (a model may leave noise to the likelihood)
-        """Take sequences for so noisy; changes a copy of a trained model."""
+        """Expect this noise in sequences; changes a copy of a trained model."""
 
     def _check_counts(self) -> None:
         counts = {name: getattr(self, name) for name in ("n_states", "d_min", "d_max")}
@@ -292,11 +292,11 @@ class ParametricHMM(ABC):
         return sequence if self.resampled_frames is None else resample(sequence, self.resampled_frames)
 
 
-_CLASSES: dict[str, type[ParametricHMM]] = {}  # what a file may name; filled as the classes are defined
+_CLASSES: dict[str, type[ParametricHMM]] = {}  # classes that a file may name; filled as they are defined
 
 
 def _load_all_classes() -> None:
-    """The package loads a class when it is first used; a file may name one that nobody has used yet."""
+    """The package loads a class when it is first used; a file may name one that has not been used yet."""
     package = importlib.import_module(__package__ or "")  # no import statement: cached results depend on no other class
     for name in dir(package):
         getattr(package, name)

@@ -1,4 +1,4 @@
-"""What a parametric HMM learns about whole performances beside its states: how they vary, complete or just begun."""
+"""Distribution of whole executions, complete or just begun, that a parametric HMM learns besides its states."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ FIRST_FRAMES, GROWTH = 5, 1.25
 """Beginnings are modelled at 5 frames and then at every length a quarter longer."""
 BEGINNING_POINTS = 5
 MOVEMENT_PARTS = (5, 3, 10)
-"""How many parts of a movement theta is told by: whichever tells it best of groups that are left out."""
+"""Candidates for the number of parts of a movement: the best predictor of theta of left-out groups is chosen."""
 BEGINNING_SHRINKAGES = (0.1, 0.3)
-PACE_PARTS, PACE_SHRINKAGE, PACE_SHARE = 10, 0.1, 0.35
+PACE_PARTS, PACE_SHRINKAGE, PACE_WEIGHT = 10, 0.1, 0.35
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast movements of one kind are in each tenth of their time: what a person who stops or returns gives away.
+    """Speed of movements of one kind in each tenth of their time: detects a person who stops or returns.
 
     Attributes:
         mean: of `pace_features`, shape (10,). root: triangular root of their covariance, shape (10, 10).
@@ -57,11 +57,11 @@ class Pace:
 
     def expecting(self, noise: float, sequence: Floats) -> Pace:
         """The same for a sequence with noise of that variance on each coordinate of each frame."""
-        seen, own = noisy_pace(sequence, noise), self.root @ self.root.T
-        mean = np.maximum(self.mean, seen.minimum)
-        # As a genuine movement has it: a person who rests is seen to rest as well as noise allows.
+        observed, own = noisy_pace(sequence, noise), self.root @ self.root.T
+        mean = np.maximum(self.mean, observed.minimum)
+        # As for a genuine movement: rest is measured as well as the noise allows.
         squared = np.exp(2.0 * mean)
-        errors = (squared * seen.of_steps + 0.5 * seen.of_steps**2) / (sequence.shape[1] * squared**2)
+        errors = (squared * observed.of_steps + 0.5 * observed.of_steps**2) / (sequence.shape[1] * squared**2)
         distances = distances_with_noise(self.distances, own, own, np.diag(errors))
         return Pace(mean, np.linalg.cholesky(own + np.diag(errors)).astype(np.float64), distances, noise)
 
@@ -114,11 +114,11 @@ class Performances:
         return replace(self, complete=self.complete.widened(of_parts), pace=pace, noise=noise)
 
     def n_parts(self, dimension: int) -> int:
-        """In how many parts complete movements of so many coordinates are described."""
+        """Number of parts of complete movements with this many coordinates."""
         return len(self.complete.coefficients) // dimension - 1
 
     def outlier_score(self, distance: float, pace_distance: float) -> float:
-        """How unlike the training a complete movement is; genuine ones have about 1.3.
+        """Distance of a complete movement from the training; about 1.3 for genuine ones.
 
         Args:
             distance: of its parts from the model at the best theta. pace_distance: of its pace.
@@ -128,8 +128,8 @@ class Performances:
     def log_p_value(self, outlier_score: float) -> float:
         """Logarithm of the p-value: the probability that a genuine movement has at least this outlier score.
 
-        The logarithms of the scores of left-out training movements are taken for normally distributed, in a group that
-        was left out about another mean.
+        The logarithms of the scores of left-out training movements are assumed normally distributed, with a different
+        mean in each group.
         """
         return self._usual.log_above(float(np.log(outlier_score + 1e-9)))
 
@@ -141,7 +141,7 @@ class Performances:
         return PredictiveDistribution.of(known, self.complete.groups)
 
     def beginning(self, n_frames: int) -> tuple[int, CorrelatedRegression]:
-        """The longest modelled beginning of at most so many frames. Raises ValueError where that is too short."""
+        """The longest modelled beginning of at most this many frames. Raises ValueError where that is too short."""
         known = [one for one in self.beginnings if one[0] <= n_frames]
         if not known:
             raise ValueError(
@@ -164,7 +164,7 @@ class Performances:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], monomials: Monomials) -> Performances:
-        """From what `arrays` gave. Raises KeyError for a missing array and ValueError for shapes that do not fit."""
+        """From the result of `arrays`. Raises KeyError for a missing array, ValueError for shapes that do not fit."""
         complete = CorrelatedRegression.from_arrays(arrays, "complete_", monomials)
         beginnings = tuple(
             (int(n_frames), CorrelatedRegression.from_arrays(arrays, f"beginning{number}_", monomials))
@@ -180,13 +180,13 @@ class Performances:
 
 
 def _outlier_score(distance: Any, pace_distance: Any, known: Floats, known_pace: Floats) -> Any:
-    """Both distances in units of their medians. Roots, so that one outlier in pace does not outweigh all else."""
+    """Both distances in units of their medians. Roots, so that an outlier in pace does not dominate."""
     usual = np.median(known) + 1e-9, np.median(known_pace) + 1e-9
-    return np.sqrt(distance / usual[0]) + PACE_SHARE * np.sqrt(pace_distance / usual[1])
+    return np.sqrt(distance / usual[0]) + PACE_WEIGHT * np.sqrt(pace_distance / usual[1])
 
 
 def pace_features(sequence: Floats) -> Floats:
-    """Logarithm of the length of the way of all points in each tenth of the time, in the unit of the data. (10,)."""
+    """Logarithm of the path length of all points in each tenth of the time, in the unit of the data. (10,)."""
     steps = np.diff(resample(sequence, PACE_PARTS + 1), axis=0)
     lengths = np.sqrt((steps**2).mean(axis=1))
     result: Floats = np.log(lengths + 0.02 * lengths.mean() + 1e-12)
@@ -194,7 +194,7 @@ def pace_features(sequence: Floats) -> Floats:
 
 
 class NoisyPace(NamedTuple):
-    """`pace_features` of a sequence without its noise, the least that is seen of them, and the noise of its steps."""
+    """`pace_features` of a sequence without its noise, their minimum under the noise, and the noise of its steps."""
 
     features: Floats
     minimum: Floats
@@ -204,8 +204,8 @@ class NoisyPace(NamedTuple):
 def noisy_pace(sequence: Floats, noise: float) -> NoisyPace:
     """Of a sequence with noise of that variance. Each of shape (10,).
 
-    Steps are those between averages of as many frames as the noise asks for. What noise adds to the square of a step on
-    average is taken away; where less remains than noise scatters, the step may as well be nothing.
+    Steps are those between averages of as many frames as the noise requires. The mean contribution of the noise to the
+    square of a step is subtracted; the result is at least the standard deviation of that contribution.
     """
     for width in (1, len(sequence) // (2 * PACE_PARTS), len(sequence) // PACE_PARTS):
         averages, counts = moving_average(sequence, width)
@@ -227,10 +227,10 @@ def state_averages(gamma: Floats, sequence: Floats) -> tuple[Floats, Floats]:
 
 
 def part_averages(averages: Floats, weights: Floats, sequence: Floats, n_parts: int) -> Floats:
-    """Mean of the frames in each of at most so many parts of the movement, of several states each, and the last frame.
+    """Mean of the frames in each of at most `n_parts` parts of the movement (several states each), and the last frame.
 
-    Correlations between many states would have to be learned from few movements, and they say the same many times. The
-    last frame is there since movements end where theta says, more exactly than they get there. Shape ((n + 1) D,).
+    Correlations between many states would have to be learned from few movements and are redundant. The last frame is
+    included since theta determines the end of a movement more exactly than its course. Shape ((n + 1) D,).
     """
     begins = part_begins(len(averages), n_parts)
     sums = np.add.reduceat(averages * weights[:, None], begins, axis=0)
@@ -239,13 +239,13 @@ def part_averages(averages: Floats, weights: Floats, sequence: Floats, n_parts: 
 
 
 def part_begins(n_states: int, n_parts: int) -> Ints:
-    """First state of each of at most so many parts."""
+    """First state of each of at most `n_parts` parts."""
     n_parts = min(n_parts, n_states)
     return np.arange(n_parts) * n_states // n_parts
 
 
 def beginning_lengths(lengths: Ints) -> list[int]:
-    """Numbers of frames at which beginnings are modelled: as long as half of the movements last so long."""
+    """Numbers of frames at which beginnings are modelled: at least half of the movements last that long."""
     result, n_frames = [], float(FIRST_FRAMES)
     while n_frames <= np.median(lengths):
         result.append(round(n_frames))
@@ -254,19 +254,19 @@ def beginning_lengths(lengths: Ints) -> list[int]:
 
 
 def beginning_features(sequence: ArrayLike, n_frames: int) -> Floats:
-    """Where a movement begins and how it goes on: first frame and increments over its first frames. Shape (5 D,)."""
+    """First frame of a movement and increments over its first frames. Shape (5 D,)."""
     points = resample(np.asarray(sequence, dtype=np.float64)[:n_frames], BEGINNING_POINTS)
     return np.concatenate([points[:1], np.diff(points, axis=0)]).ravel()
 
 
 def groups_of(groups: ArrayLike | None, theta: Floats) -> Ints:
-    """Number of the group of each movement: as given, else movements of the same theta are one. Shape (K,)."""
+    """Number of the group of each movement: as given, else movements of the same theta form one. Shape (K,)."""
     if groups is None:
-        spread = np.maximum(np.ptp(theta, axis=0), 1e-12)
-        found = np.unique(np.round(theta / spread, 4), axis=0, return_inverse=True)[1]
+        ranges = np.maximum(np.ptp(theta, axis=0), 1e-12)
+        numbers = np.unique(np.round(theta / ranges, 4), axis=0, return_inverse=True)[1]
     else:
         labels = np.asarray(groups)
         if labels.shape != (len(theta),):
             raise ValueError(f"groups has one label per sequence: expected shape ({len(theta)},), found {labels.shape}")
-        found = np.unique(labels, return_inverse=True)[1]
-    return np.asarray(found, dtype=np.int64).reshape(-1)
+        numbers = np.unique(labels, return_inverse=True)[1]
+    return np.asarray(numbers, dtype=np.int64).reshape(-1)

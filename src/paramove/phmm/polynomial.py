@@ -44,11 +44,11 @@ ALIGNMENTS = 3
 
 
 class Examination(NamedTuple):
-    """A sequence seen by one model.
+    """A sequence examined by one model.
 
     Attributes:
         estimate: of theta.
-        outlier_score: how far it is from the training movements, see `Performances.outlier_score`; of a beginning the
+        outlier_score: distance from the training movements, see `Performances.outlier_score`; of a beginning the
             root of its distance in units of the median one.
         log_density: of `part_averages`, or of the features of a beginning.
         log_p_value: logarithm of `p_value`.
@@ -75,19 +75,19 @@ class PolynomialPHMM(ParametricHMM):
     Args:
         n_states, d_min, d_max, options, resampled_frames, description: as in `ParametricHMM`.
         degree: of the polynomials; 1 is the linear PHMM of Wilson and Bobick.
-        smoothness: over which share of the movement the dependence on theta changes little: length of the prior that
-            couples the slopes of neighbouring states, its strength found by the evidence. None: no prior, plain EM.
-        residuals: "correlated" learns how whole performances vary: `estimate` then knows that frames are not
-            independent, its covariance is honest, beginnings and outliers are recognised, and the means are
-            those that predict left-out groups best. "independent" is the thesis: maximum likelihood of frames.
-        search_margin: how far outside the training's bounds `estimate` looks, as a share of their width.
+        smoothness: fraction of the movement over which the dependence on theta changes little: length of the prior that
+            couples the slopes of neighbouring states, its strength chosen by the evidence. None: no prior, plain EM.
+        residuals: "correlated" learns how whole executions vary: `estimate` then models dependent frames, its
+            covariance is realistic, beginnings and outliers are recognised, and the means are those
+            that predict left-out groups best. "independent" is the thesis: maximum likelihood of frames.
+        search_margin: how far outside the training's bounds `estimate` searches, as a fraction of their width.
 
     Attributes:
         monomials_: the Monomials.
         coefficients_: Z, shape (N, D, F), in the unit of the sequences.
         covariances_: shape (N, D, D).
         durations_: p_i(d) in column d - 1, shape (N, d_max).
-        performances_: what was learned about whole performances; None with independent residuals.
+        performances_: distribution of whole executions; None with independent residuals.
     """
 
     def __init__(
@@ -135,8 +135,8 @@ class PolynomialPHMM(ParametricHMM):
         if self.residuals == "correlated":
             averages, performances = self._performances(data, trained, monomials)
             if self.smoothness is not None:
-                found = smoothed(features, monomials.degrees, averages, data.groups)
-                coefficients = found.reshape(coefficients.shape)
+                smooth = smoothed(features, monomials.degrees, averages, data.groups)
+                coefficients = smooth.reshape(coefficients.shape)
                 trained = with_coefficients(trained, coefficients, data.sequences, features, options)
         self._set_learned(monomials, trained)
         self.performances_ = performances
@@ -144,22 +144,22 @@ class PolynomialPHMM(ParametricHMM):
     def _performances(
         self, data: TrainingData, trained: RegressedParameters, monomials: Monomials
     ) -> tuple[Floats, Performances]:
-        """State averages (K, N D), and what they and the recorded movements say about performances."""
+        """State averages (K, N D), and the distribution of executions from them and the recorded movements."""
         common = Evaluator.of(trained.at(monomials.at(monomials.centre)))
-        found = []
+        state_means = []
         for sequence, theta in zip(data.sequences, data.theta, strict=True):
             own = replace(common, means=trained.coefficients @ monomials.at(theta))
-            found.append(state_averages(own.expectation(sequence)[1].T, sequence))
+            state_means.append(state_averages(own.expectation(sequence)[1].T, sequence))
         parts = [
-            np.stack([part_averages(*one, x, n_parts) for one, x in zip(found, data.sequences, strict=True)])
+            np.stack([part_averages(*one, x, n_parts) for one, x in zip(state_means, data.sequences, strict=True)])
             for n_parts in MOVEMENT_PARTS
         ]
-        averages = np.stack([one.ravel() for one, _ in found])
+        averages = np.stack([one.ravel() for one, _ in state_means])
         return averages, Performances.fitted(parts, data.recorded, data.theta, monomials, data.groups)
 
     def _set_learned(self, monomials: Monomials, learned: RegressedParameters) -> None:
         self.monomials_ = monomials
-        # Contiguous, as a file gives them back: sums in another order differ in the last bits.
+        # Contiguous, as after reading a file: sums in another order differ in the last bits.
         self.coefficients_ = np.ascontiguousarray(learned.coefficients)
         self.covariances_ = np.ascontiguousarray(learned.covariances)
         self.durations_ = np.ascontiguousarray(learned.durations)
@@ -178,8 +178,8 @@ class PolynomialPHMM(ParametricHMM):
 
     def log_likelihood_and_gradient(self, sequence: ArrayLike, theta: ArrayLike) -> tuple[float, Floats]:
         """ln p(X | lambda^theta) and its derivative with respect to theta (P,), exact."""
-        place = (self._checked_theta(theta) - self.monomials_.centre) / self.monomials_.scale
-        value, gradient, _ = search_kernels.expectation_at(place, self._prepared(self._checked(sequence)))
+        u = (self._checked_theta(theta) - self.monomials_.centre) / self.monomials_.scale
+        value, gradient, _ = search_kernels.expectation_at(u, self._prepared(self._checked(sequence)))
         return float(value), gradient / self.monomials_.scale
 
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
@@ -206,7 +206,7 @@ class PolynomialPHMM(ParametricHMM):
     def examine(self, sequence: ArrayLike, *, finished: bool = True) -> Examination:
         """Estimate of theta, outlier score and p-value of the sequence.
 
-        Raises ValueError for a model with independent residuals, which does not know how performances vary, and for a
+        Raises ValueError for a model with independent residuals, which has no distribution of executions, and for a
         beginning of fewer frames than are modelled.
         """
         if self.performances_ is None:
@@ -222,19 +222,19 @@ class PolynomialPHMM(ParametricHMM):
             distance = regression.distance(features, theta)
             density = regression.log_density(features, distance)
             outlier_score = float(np.sqrt(distance / (np.median(regression.distances) + 1e-9)))
-            found = ParameterEstimate(theta, covariance, density)
-            return Examination(found, outlier_score, density, regression.log_p_value(distance))
-        found, parts = self._refined(self._checked(recorded), self.performances_)
-        distance = self.performances_.complete.distance(parts, found.theta)
+            estimate = ParameterEstimate(theta, covariance, density)
+            return Examination(estimate, outlier_score, density, regression.log_p_value(distance))
+        estimate, parts = self._refined(self._checked(recorded), self.performances_)
+        distance = self.performances_.complete.distance(parts, estimate.theta)
         outlier_score = self.performances_.outlier_score(distance, self.performances_.pace.distance(recorded))
         density = self.performances_.complete.log_density(parts, distance)
-        return Examination(found, outlier_score, density, self.performances_.log_p_value(outlier_score))
+        return Examination(estimate, outlier_score, density, self.performances_.log_p_value(outlier_score))
 
     def _refined(self, checked: Floats, performances: Performances) -> tuple[ParameterEstimate, Floats]:
-        """Estimate by whole performances, and the averages of the parts of this one.
+        """Estimate from the distribution of whole executions, and the averages of the parts of this one.
 
-        When a movement is where hardly depends on theta: the middle tells which frames belong to which states, theta
-        follows from the averages of these, and moves them a little.
+        The timing of a movement hardly depends on theta: the middle theta gives the alignment of frames and states,
+        their averages give theta, which changes the alignment a little.
         """
         prepared, regression = self._prepared(checked), performances.complete
         begins = part_begins(self.n_states, performances.n_parts(checked.shape[1]))
@@ -247,7 +247,7 @@ class PolynomialPHMM(ParametricHMM):
         self.covariances_ = self.covariances_ + noise.of_states
         self._white = None
         if self.performances_ is not None:
-            gamma = expected_responsibilities(self.durations_, noise.seen)
+            gamma = expected_responsibilities(self.durations_, noise.n_model_frames)
             self.performances_ = self.performances_.expecting(noise, gamma)
 
     @property
@@ -263,7 +263,7 @@ class PolynomialPHMM(ParametricHMM):
         return best, float(value), gradient
 
     def _prepared(self, sequence: Floats) -> search_kernels.Movement:
-        """What the kernels need beside a place."""
+        """Input of the kernels except theta."""
         evaluator, white = self._whitened()
         ends = evaluator.ends(len(sequence))
         frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)

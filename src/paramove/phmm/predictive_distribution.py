@@ -1,9 +1,9 @@
 """Predictive distribution of a value of a new person's movement, learned from few persons: it gives p-values.
 
-Movements of one person are alike, so a hundred movements of nine persons say about a tenth person hardly more than nine
-numbers do. A value of a new person's movement has the variance between persons and that within them, and its mean is
-known from few: it follows Student's t, not a normal distribution, and a normal one would reject several times as many
-genuine movements as it promises.
+Movements of one person are similar, so a hundred movements of nine persons carry hardly more information about a tenth
+person than nine numbers do. A value of a new person's movement has the variance between persons and that within
+them, and its mean is estimated from few: it follows Student's t. A normal distribution would reject several times as
+many genuine movements as its nominal level.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ MIN_DEVIATION = 1e-3
 
 @dataclass(frozen=True)
 class PredictiveDistribution:
-    """Student's t distribution of a value of a movement of a group that was not among those seen.
+    """Student's t distribution of a value of a movement of a new group.
 
     Attributes:
-        mean: of the values. deviation: its scale; infinite if too few values were seen to tell.
-        freedom: degrees of freedom; of about one less than there are groups if groups differ, of one less than there
-            are values if they do not.
+        mean: of the values. deviation: its scale; infinite for too few values.
+        freedom: degrees of freedom; about the number of groups minus one if groups differ, the number of values minus
+            one if they do not.
     """
 
     mean: float
@@ -38,7 +38,7 @@ class PredictiveDistribution:
 
         The means of G groups vary by a = s_between^2, their values within by s_within^2. A value of a new group then
         varies by V = a (1 + 1/G) + s_within^2 (1 - mean of 1/n_g), with the degrees of freedom of Satterthwaite. Values
-        of one group alone tell about that group.
+        of a single group describe only that group.
         """
         if len(values) < 2:
             return cls(0.0, np.inf, 1.0)
@@ -56,7 +56,7 @@ class PredictiveDistribution:
         return cls(float(means.mean()), float(np.sqrt(variance)), min(freedom, len(values) - 1.0))
 
     def log_above(self, value: float) -> float:
-        """Logarithm of the probability of a greater value, finite; 0 if too few values were seen to tell."""
+        """Logarithm of the probability of a larger value, finite; 0 for too few values."""
         if not np.isfinite(self.deviation):
             return 0.0
         return log_upper_tail((value - self.mean) / self.deviation, self.freedom)
@@ -64,9 +64,9 @@ class PredictiveDistribution:
 
 def log_upper_tail(t: float, freedom: float) -> float:
     """Logarithm of the probability that Student's t exceeds t, finite wherever t is."""
-    share = float(stdtr(freedom, -t))
-    if share > 1e-290:
-        return float(np.log(share))
+    probability = float(stdtr(freedom, -t))
+    if probability > 1e-290:
+        return float(np.log(probability))
     # (t^2 + n) / (n t) times the density: exact for large t, whatever n is.
     far = float(np.log1p(t**2 / freedom))
     density = gammaln(0.5 * freedom + 0.5) - gammaln(0.5 * freedom) - 0.5 * np.log(np.pi * freedom)

@@ -1,6 +1,6 @@
 """Baum-Welch of HMMs whose state means are linear in features of theta (thesis 3.3.1, corrected (3.3)-(3.4)).
 
-A prior on how state means depend on theta: weak slopes, alike in neighbouring states.
+A prior on how state means depend on theta: weak slopes, similar in neighbouring states.
 
 With few demonstrations the coefficients of a polynomial model are poorly determined and differ from state to state, so
 that synthesised movements wobble. Coefficients z of monomials of degree g have the prior precision
@@ -35,7 +35,7 @@ from paramove.hmm import (
 MIN_STRENGTH, MAX_STRENGTH = 1e-8, 1e8
 CONJUGATE_STEPS = 6
 EVIDENCE_ITERATIONS = 8
-"""The prior's strength follows the evidence while covariances anneal, but at least so long; then it is constant."""
+"""The prior's strength follows the evidence while covariances anneal, but at least this many; then it is constant."""
 
 
 @dataclass(frozen=True)
@@ -148,24 +148,24 @@ def train_regressed(
     parameters, prior, target = initial, None, None
     stacks = Stack.parts(sequences, len(initial.coefficients))
     for iteration in range(options.max_iterations):
-        found = RegressionStatistics.gathered(parameters, stacks, features)
+        statistics = RegressionStatistics.gathered(parameters, stacks, features)
         if smoothness is not None and iteration <= settled:
-            prior = _prior(prior, parameters, found, degrees, smoothness, n_frames / len(sequences))
-        change = _change(parameters, found, prior)
-        scatter = found.scatter(change)
+            prior = _prior(prior, parameters, statistics, degrees, smoothness, n_frames / len(sequences))
+        change = _change(parameters, statistics, prior)
+        scatter = statistics.scatter(change)
         annealing = iteration < settled
         if annealing or target is None or iteration == settled:
-            target = pooled_covariance(scatter, found.weight)
+            target = pooled_covariance(scatter, statistics.weight)
         regularisation = regularisation_at(iteration, options, scale, target)
         objective = None
         if not annealing:
-            objective = found.log_likelihood + penalty(parameters.at(features[0]), regularisation)
+            objective = statistics.log_likelihood + penalty(parameters.at(features[0]), regularisation)
             objective += prior.log_density(parameters.coefficients) if prior is not None else 0.0
-        monitor.add(found.log_likelihood, objective)
+        monitor.add(statistics.log_likelihood, objective)
         parameters = RegressedParameters(
             parameters.coefficients + change,
-            covariances_of(scatter, found.weight, regularisation),
-            durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+            covariances_of(scatter, statistics.weight, regularisation),
+            durations_of(statistics.durations, parameters.d_min, options.duration_pseudocount),
             parameters.d_min,
         )
         if monitor.converged:
@@ -181,14 +181,14 @@ def with_coefficients(
     options: TrainingOptions,
 ) -> RegressedParameters:
     """The family with other coefficients (N, D, F); covariances and durations follow by one more M-step."""
-    found = RegressionStatistics.gathered(parameters, Stack.parts(sequences, len(coefficients)), features)
-    scatter = found.scatter(coefficients - parameters.coefficients)
-    target = pooled_covariance(scatter, found.weight)
+    statistics = RegressionStatistics.gathered(parameters, Stack.parts(sequences, len(coefficients)), features)
+    scatter = statistics.scatter(coefficients - parameters.coefficients)
+    target = pooled_covariance(scatter, statistics.weight)
     regularisation = regularisation_at(options.max_iterations, options, root_mean_deviation(sequences), target)
     return RegressedParameters(
         coefficients,
-        covariances_of(scatter, found.weight, regularisation),
-        durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+        covariances_of(scatter, statistics.weight, regularisation),
+        durations_of(statistics.durations, parameters.d_min, options.duration_pseudocount),
         parameters.d_min,
     )
 
@@ -196,28 +196,30 @@ def with_coefficients(
 def _prior(
     prior: SlopePrior | None,
     parameters: RegressedParameters,
-    found: RegressionStatistics,
+    statistics: RegressionStatistics,
     degrees: Ints,
     smoothness: float,
     mean_frames: float,
 ) -> SlopePrior:
     n_states = len(parameters.coefficients)
-    pooled = found.squared.sum(axis=0) / found.weight.sum()
+    pooled = statistics.squared.sum(axis=0) / statistics.weight.sum()
     pooled = pooled + 1e-6 * np.trace(pooled) / len(pooled) * np.eye(len(pooled))
     fresh = SlopePrior.weak(n_states, degrees, smoothness, pooled, max(1.0, mean_frames / n_states))
     if prior is None:
         return fresh
     renewed = replace(fresh, strength=prior.strength)
-    return renewed.with_evidence(parameters.coefficients, found.weights, degrees)
+    return renewed.with_evidence(parameters.coefficients, statistics.weights, degrees)
 
 
-def _change(parameters: RegressedParameters, found: RegressionStatistics, prior: SlopePrior | None) -> Floats:
-    """What the M-step adds to the coefficients. Shape (N, D, F)."""
+def _change(parameters: RegressedParameters, statistics: RegressionStatistics, prior: SlopePrior | None) -> Floats:
+    """Change of the coefficients in the M-step. Shape (N, D, F)."""
     if prior is not None:
-        improved = prior.improved(parameters.coefficients, found.weights, found.crossed, parameters.covariances)
+        improved = prior.improved(
+            parameters.coefficients, statistics.weights, statistics.crossed, parameters.covariances
+        )
         return improved - parameters.coefficients
     try:
-        solved = np.linalg.solve(found.weights, np.swapaxes(found.crossed, 1, 2))  # Equation (3.3), corrected
+        solved = np.linalg.solve(statistics.weights, np.swapaxes(statistics.crossed, 1, 2))  # Equation (3.3), corrected
     except np.linalg.LinAlgError as error:
         raise ValueError(
             "the labels do not determine the model and it has no prior: give more different theta"
@@ -233,7 +235,7 @@ class SlopePrior:
         coupling: I + l^4 D'D, shape (N, N).
         strength: lambda of each monomial, 0 for the constant, shape (F,).
         whitening: makes the pooled covariance the identity, shape (D, D).
-        frames: how many frames count as one observation; neighbouring frames say the same twice.
+        frames: how many frames count as one observation; neighbouring frames are redundant.
     """
 
     coupling: Floats
@@ -243,7 +245,7 @@ class SlopePrior:
 
     @classmethod
     def weak(cls, n_states: int, degrees: Ints, smoothness: float, pooled: Floats, frames: float) -> SlopePrior:
-        """A start for the evidence. `smoothness` is l as a share of all states; `pooled` covariance (D, D)."""
+        """A start for the evidence. `smoothness` is l as a fraction of all states; `pooled` covariance (D, D)."""
         length = smoothness * n_states
         second = np.diff(np.eye(n_states), n=2, axis=0) if n_states > 2 else np.zeros((0, n_states))
         coupling = np.eye(n_states) + length**4 * second.T @ second
@@ -267,13 +269,13 @@ class SlopePrior:
         n_states, dim, n_monomials = coefficients.shape
         white = self.whitening @ coefficients
         size = np.einsum("idf,ij,jdf->f", white, self.coupling, white)
-        spread = np.linalg.inv(self._precision(weights / self.frames)).reshape((n_states, n_monomials) * 2)
-        remaining = np.einsum("ij,jfif->f", self.coupling, spread) * dim
+        posterior = np.linalg.inv(self._precision(weights / self.frames)).reshape((n_states, n_monomials) * 2)
+        remaining = np.einsum("ij,jfif->f", self.coupling, posterior) * dim
         strength = np.zeros(n_monomials)
         for degree in range(1, int(degrees.max()) + 1):
             same = degrees == degree
-            found = n_states * dim * same.sum() / (size[same].sum() + remaining[same].sum())
-            strength[same] = np.clip(found, MIN_STRENGTH, MAX_STRENGTH)
+            value = n_states * dim * same.sum() / (size[same].sum() + remaining[same].sum())
+            strength[same] = np.clip(value, MIN_STRENGTH, MAX_STRENGTH)
         return SlopePrior(self.coupling, strength, self.whitening, self.frames)
 
     def improved(self, coefficients: Floats, weights: Floats, crossed: Floats, covariances: Floats) -> Floats:
@@ -292,8 +294,8 @@ class SlopePrior:
         """
         unwhitening = np.linalg.inv(self.whitening)
         curvature = unwhitening.T @ np.linalg.solve(covariances, unwhitening[None])  # (N, D, D), 1 if all are pooled
-        share = np.trace(curvature, axis1=1, axis2=2) / curvature.shape[1]
-        factor = np.linalg.inv(self._precision(share[:, None, None] * weights))
+        mean_curvature = np.trace(curvature, axis1=1, axis2=2) / curvature.shape[1]
+        factor = np.linalg.inv(self._precision(mean_curvature[:, None, None] * weights))
         white = self.whitening @ coefficients
 
         def pulled(direction: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Ridge regression of movements on monomials of theta; what holds the slopes back is chosen by leaving out groups."""
+"""Ridge regression of movements on monomials of theta; its regularisation is chosen by leaving out groups."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from paramove.documents import Floats, Ints
 
 STRENGTHS = np.append(10.0 ** np.arange(-5.0, 1.1, 0.5), 1e4)
-"""Candidates for the ridge of each degree, as a share of the number of movements."""
+"""Candidates for the ridge of each degree, as a fraction of the number of movements."""
 MAX_ROUNDS = 4
 SIMPLER = 0.005
-"""A degree above 1 is held back as far as possible while errors grow by no more than this share."""
+"""A degree above 1 is regularised as far as possible while errors grow by no more than this fraction."""
 OFFSETS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Candidates for the variance of `GroupOffsets`."""
 
@@ -23,26 +23,26 @@ class GroupOffsets:
     """Movements of a group have an offset in common that theta does not explain: covariance 1 + variance 1 1'.
 
     Persons sit and reach differently, and what theta is differs between them too. Were their movements independent,
-    a habit would be taken for an effect of theta; with offsets, differences within persons count for more.
+    a habit would be mistaken for an effect of theta; with offsets, differences within persons count for more.
 
     Attributes:
         groups: of each movement, (K,).
-        variance: of the offsets, as a share of a movement's own; 0 is independent movements.
+        variance: of the offsets, relative to that of a movement; 0 means independent movements.
     """
 
     groups: Ints
     variance: float
 
     def whitened(self, rows: Floats) -> Floats:
-        """Rows (K, n) so that generalised least squares is ordinary: a share of the group's mean taken off."""
-        return self._moved(rows, lambda share: -share)
+        """Rows (K, n) so that generalised least squares becomes ordinary: minus a fraction of the group's mean."""
+        return self._moved(rows, lambda fraction: -fraction)
 
     def restored(self, rows: Floats) -> Floats:
         """Inverse of `whitened`."""
-        return self._moved(rows, lambda share: share / (1.0 - share))
+        return self._moved(rows, lambda fraction: fraction / (1.0 - fraction))
 
-    def missed(self, y: Floats, features: Floats, penalty: Floats) -> Floats:
-        """What generalised least squares without a movement's group misses of it. Shape (K, n)."""
+    def residuals(self, y: Floats, features: Floats, penalty: Floats) -> Floats:
+        """Residual of each movement from generalised least squares without its group. Shape (K, n)."""
         return self.restored(residuals_left_out(self.whitened(y), self.whitened(features), penalty, self.groups))
 
     def _moved(self, rows: Floats, factor: Callable[[float], float]) -> Floats:
@@ -50,25 +50,25 @@ class GroupOffsets:
             return rows
         result = rows.copy()
         for members in members_of(self.groups):
-            share = 1.0 - 1.0 / float(np.sqrt(1.0 + self.variance * len(members)))
-            result[members] += factor(share) * rows[members].mean(axis=0)
+            fraction = 1.0 - 1.0 / float(np.sqrt(1.0 + self.variance * len(members)))
+            result[members] += factor(fraction) * rows[members].mean(axis=0)
         return result
 
 
 def smoothed(features: Floats, degrees: Ints, values: Floats, groups: Ints) -> Floats:
     """Coefficients (m, F) that predict the values (K, m) of left-out groups best, by generalised least squares.
 
-    Every value is the same weighted mean of training values, so what was smooth in training stays so.
+    Every value is the same weighted mean of training values, so smooth training data give smooth predictions.
     """
     offsets, ridge = _chosen_offsets(values, features, degrees, groups)
-    seen = offsets.whitened(features)
+    white = offsets.whitened(features)
     penalty = penalties(ridge, degrees, len(values))
-    solved = np.linalg.solve(seen.T @ seen + penalty, seen.T @ offsets.whitened(values))
+    solved = np.linalg.solve(white.T @ white + penalty, white.T @ offsets.whitened(values))
     return np.ascontiguousarray(solved.T, dtype=np.float64)
 
 
 def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Ints) -> Floats:
-    """What a regression without a movement's group misses of it, for all at once. Shape (K, n)."""
+    """Residual of each movement from a regression without its group, for all at once. Shape (K, n)."""
     hat = features @ np.linalg.solve(features.T @ features + penalty, features.T)
     residuals: Floats = y - hat @ y
     if len(np.unique(groups)) < 2:
@@ -83,13 +83,13 @@ def residuals_left_out(y: Floats, features: Floats, penalty: Floats, groups: Int
 
 
 def chosen_ridge(y: Floats, features: Floats, degrees: Ints, groups: Ints, relative: bool = True) -> tuple[float, ...]:
-    """The ridge per degree, as a share of the number of movements, that predicts left-out groups best.
+    """The ridge per degree, as a fraction of the number of movements, that predicts left-out groups best.
 
-    Relative errors let a fingertip that is a millimetre off at the target count as one that is a centimetre off on the
-    way, which theta is found by; a movement that is to be made should be near in centimetres: by its root mean square
-    error, averaged over movements, so that one odd person does not decide.
+    Relative errors weight a fingertip that is a millimetre off at the target like one that is a centimetre off before,
+    which suits the estimation of theta. A movement that is synthesised should be near in centimetres: by its root mean
+    square error, averaged over movements, so that one unusual person does not decide.
 
-    One degree after the other, until none changes; a higher degree is never held back less than a lower one.
+    One degree after the other, until none changes; a higher degree is never regularised less than a lower one.
     """
     return _best_ridge(y, features, degrees, GroupOffsets(groups, 0.0), relative)
 
@@ -103,7 +103,7 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
 
     def error(candidate: tuple[float, ...]) -> float:
         if candidate not in known:
-            squared = offsets.missed(y, features, penalties(candidate, degrees, len(y))) ** 2
+            squared = offsets.residuals(y, features, penalties(candidate, degrees, len(y))) ** 2
             if relative:
                 known[candidate] = float(np.log(squared.sum(axis=0) + 1e-12).mean())
             else:
@@ -112,14 +112,14 @@ def _best_ridge(y: Floats, features: Floats, degrees: Ints, offsets: GroupOffset
 
     for _ in range(MAX_ROUNDS):
         before = ridge
-        for place in range(len(ridge)):
+        for index in range(len(ridge)):
             allowed: list[tuple[float, ...]] = [
-                (*ridge[:place], float(strength), *ridge[place + 1 :])
+                (*ridge[:index], float(strength), *ridge[index + 1 :])
                 for strength in STRENGTHS
-                if strength >= max(ridge[:place], default=0.0) and strength <= min(ridge[place + 1 :], default=np.inf)
+                if strength >= max(ridge[:index], default=0.0) and strength <= min(ridge[index + 1 :], default=np.inf)
             ]
             minimum = min(map(error, allowed))
-            slack = SIMPLER if place else 0.0
+            slack = SIMPLER if index else 0.0
             ridge = [one for one in allowed if error(one) <= minimum + slack][-1]
         if ridge == before:
             break
@@ -131,20 +131,20 @@ def _chosen_offsets(y: Floats, features: Floats, degrees: Ints, groups: Ints) ->
 
     Errors of few groups differ by chance: the smallest variance within one standard error of the best, group by group.
 
-    None where theta does not vary within groups: nothing tells offsets from an effect of theta. Errors are relative
-    then, since to leave out a place at the border is to extrapolate, and centimetres there would decide all.
+    None if theta does not vary within groups: offsets then cannot be distinguished from an effect of theta. Errors are
+    relative in this case, since leaving out a theta at the border is extrapolation, whose centimetres would dominate.
     """
     members = list(members_of(groups))
     within = max(float(np.ptp(features[own], axis=0).max()) for own in members)
     candidates = [GroupOffsets(groups, variance) for variance in OFFSETS]
     if within < 1e-6 or len(members) < 3:
         return candidates[0], chosen_ridge(y, features, degrees, groups)
-    if y.shape[1] > len(y):  # as many numbers as movements have the same sums of squares
+    if y.shape[1] > len(y):  # a projection to as many numbers as movements has the same sums of squares
         y = np.asarray(np.linalg.qr(y.T, mode="r"), dtype=np.float64).T
     ridges = [_best_ridge(y, features, degrees, one, relative=False) for one in candidates]
     errors = np.empty((len(candidates), len(members)))
     for i, (offsets, ridge) in enumerate(zip(candidates, ridges, strict=True)):
-        squared = (offsets.missed(y, features, penalties(ridge, degrees, len(y))) ** 2).sum(axis=1)
+        squared = (offsets.residuals(y, features, penalties(ridge, degrees, len(y))) ** 2).sum(axis=1)
         errors[i] = [float(np.sqrt(squared[own]).sum()) for own in members]
     worse = errors - errors[np.argmin(errors.sum(axis=1))]
     chosen = int(np.argmax(worse.sum(axis=1) <= worse.std(axis=1, ddof=1) * np.sqrt(len(members))))

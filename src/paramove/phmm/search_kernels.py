@@ -14,14 +14,14 @@ from paramove.phmm.features import monomials_at
 
 NEGLIGIBLE = 1e-15  # of a responsibility
 WIDTH = 1e-5
-"""Of differences of gradients."""
+"""Step of differences of gradients."""
 
 
 class Movement(NamedTuple):
-    """What the search needs of one movement and one model, none of which depends on theta.
+    """Input of the search from one movement and one model; nothing in it depends on theta.
 
     Attributes:
-        frames: whitened, of state i from the first frame that it can have on, (N, D, room).
+        frames: whitened, of state i from its first possible frame on, (N, D, room).
         rows: the same as (N, room, D).
         white: whitened coefficients of the means, (N, D, F). exponents: of the monomials, (F, P).
         log_norm: ln of the output densities at the means, (N,). log_duration: (N, d_max). d_min: in frames.
@@ -52,7 +52,7 @@ def _add_whitened(matrix: Floats, frames: Floats, result: Floats) -> None:
 
 @compiled
 def whitened_frames(columns: Floats, whitening: Floats, ends: Ints) -> tuple[Floats, Floats]:
-    """U_i x_t of the feasible pairs from frames (D, T): state i from the first frame it can have on.
+    """U_i x_t of the feasible pairs from frames (D, T): state i from its first possible frame on.
 
     In both orders, (N, D, room) to compute with all frames of a state at once, and (N, room, D).
     """
@@ -76,9 +76,9 @@ def _squared_distances(frames: Floats, mean: Floats, result: Floats) -> None:
     for f in range(len(result)):
         result[f] = 0.0
     for row in range(len(mean)):
-        source, place = frames[row], mean[row]
+        source, centre = frames[row], mean[row]
         for f in range(len(result)):
-            result[f] += (source[f] - place) * (source[f] - place)
+            result[f] += (source[f] - centre) * (source[f] - centre)
 
 
 @compiled_sums
@@ -89,7 +89,7 @@ def _log_densities(squared: Floats, log_norm: float, result: Floats) -> None:
 
 @compiled
 def log_outputs_at(features: Floats, movement: Movement) -> tuple[Floats, Floats]:
-    """ln b_i(x_t) of the feasible pairs, other entries have no meaning, (N, T), and whitened means (N, D)."""
+    """ln b_i(x_t) of the feasible pairs, other entries are undefined, (N, T), and whitened means (N, D)."""
     n_states, dim, room = movement.frames.shape
     means = np.dot(movement.white.reshape(n_states * dim, len(features)), features).reshape(n_states, dim)
     out, squared = np.empty((n_states, movement.ends[n_states, 1])), np.empty(room)
@@ -130,14 +130,14 @@ def responsibilities_at(u: Floats, movement: Movement) -> Floats:
 def _aligned(features: Floats, movement: Movement) -> tuple[float, Floats, Floats, Floats]:
     """ln p with these monomials, how many frames each state has (N,), the sum of these (N, D), and the means (N, D)."""
     value, gamma, means = _responsibilities(features, movement)
-    taken, sums = np.zeros(len(means)), np.zeros(means.shape)
+    occupancy, sums = np.zeros(len(means)), np.zeros(means.shape)
     if value > -np.inf:
         for i in range(len(means)):
             for t in range(movement.ends[i, 0], movement.ends[i + 1, 1]):
                 if gamma[i, t] > NEGLIGIBLE:
-                    taken[i] += gamma[i, t]
+                    occupancy[i] += gamma[i, t]
                     add_multiple(gamma[i, t], movement.rows[i, t - movement.ends[i, 0]], sums[i])
-    return value, taken, sums, means
+    return value, occupancy, sums, means
 
 
 @compiled
@@ -150,14 +150,14 @@ def expectation_at(u: Floats, movement: Movement) -> tuple[float, Floats, Floats
     n_states, dim = movement.white.shape[0], movement.white.shape[1]
     features, slopes = np.empty(n_features), np.empty((n_features, n_components))
     monomials_at(u, movement.exponents, features, slopes)
-    value, taken, sums, means = _aligned(features, movement)
+    value, occupancy, sums, means = _aligned(features, movement)
     gradient, information = np.zeros(n_components), np.zeros((n_components, n_components))
     moved = np.ascontiguousarray(np.dot(movement.white.reshape(n_states * dim, n_features), slopes).T)
     for i in range(n_states):
-        add_multiple(-taken[i], means[i], sums[i])
+        add_multiple(-occupancy[i], means[i], sums[i])
     for p in range(n_components):
         gradient[p] = dot(moved[p], sums.ravel())
-        weighted = (moved[p].reshape(n_states, dim) * taken.reshape(n_states, 1)).ravel()
+        weighted = (moved[p].reshape(n_states, dim) * occupancy.reshape(n_states, 1)).ravel()
         for other in range(n_components):
             information[p, other] = dot(weighted, moved[other])
     return value, gradient, information
@@ -167,44 +167,44 @@ def expectation_at(u: Floats, movement: Movement) -> tuple[float, Floats, Floats
 def climbed(
     start: Floats, lower: Floats, upper: Floats, max_steps: int, tolerance: float, movement: Movement
 ) -> tuple[Floats, float, Floats]:
-    """EM (linear models) or generalised EM from a start, within bounds: the place reached, its log-likelihood, and the
+    """EM (linear models) or generalised EM from a start, within bounds: the u reached, its log-likelihood, and the
     gradient there.
 
     A step solves for the parameter with the responsibilities of the last (thesis 3.3.1, (3.5)); where means are not
     linear it is a Gauss-Newton step, halved while the likelihood would fall.
     """
-    place = np.minimum(np.maximum(start, lower), upper)
-    value, gradient, information = expectation_at(place, movement)
+    u = np.minimum(np.maximum(start, lower), upper)
+    value, gradient, information = expectation_at(u, movement)
     for _ in range(max_steps):
         if not value > -np.inf:
             break
-        step = bounded_step(place, gradient, information, lower, upper)
+        step = bounded_step(u, gradient, information, lower, upper)
         if 0.5 * np.dot(gradient, step) < tolerance:
             break
         gain = -np.inf
-        share = 1.0
+        fraction = 1.0
         for _ in range(8):
-            candidate = np.minimum(np.maximum(place + share * step, lower), upper)
+            candidate = np.minimum(np.maximum(u + fraction * step, lower), upper)
             new_value, new_gradient, new_information = expectation_at(candidate, movement)
             gain = new_value - value
             if gain >= 0.0:
                 break
-            share *= 0.4
+            fraction *= 0.4
         if not gain >= 0.0:
             break
-        place, value, gradient, information = candidate, new_value, new_gradient, new_information
-    return place, value, gradient
+        u, value, gradient, information = candidate, new_value, new_gradient, new_information
+    return u, value, gradient
 
 
 @compiled
-def bounded_step(place: Floats, gradient: Floats, information: Floats, lower: Floats, upper: Floats) -> Floats:
+def bounded_step(u: Floats, gradient: Floats, information: Floats, lower: Floats, upper: Floats) -> Floats:
     """Newton step of the components that are not held at a bound by the gradient. Shape (P,)."""
-    n_components = len(place)
+    n_components = len(u)
     matrix, right = information.copy(), gradient.copy()
     trace = np.trace(information) / n_components
     for p in range(n_components):
         matrix[p, p] += 1e-9 * trace + 1e-300
-        held = (place[p] <= lower[p] and gradient[p] < 0.0) or (place[p] >= upper[p] and gradient[p] > 0.0)
+        held = (u[p] <= lower[p] and gradient[p] < 0.0) or (u[p] >= upper[p] and gradient[p] > 0.0)
         if held:
             for other in range(n_components):
                 matrix[p, other] = 0.0
@@ -218,11 +218,11 @@ def bounded_step(place: Floats, gradient: Floats, information: Floats, lower: Fl
 def _likeliest_start(starts: Floats, movement: Movement) -> tuple[int, float]:
     """Number of the start that is likeliest for the states that the frames have at the first one, and ln p there.
 
-    Where a movement is depends much on theta, when it is there little.
+    The path of a movement depends much on theta, its timing little.
     """
     features, slopes = np.empty(len(movement.exponents)), np.empty(movement.exponents.shape)
     monomials_at(starts[0], movement.exponents, features, slopes)
-    value, taken, sums, means = _aligned(features, movement)
+    value, occupancy, sums, means = _aligned(features, movement)
     flat = movement.white.reshape(means.size, len(movement.exponents))
     best, largest = 0, -np.inf
     for s in range(len(starts)):
@@ -231,7 +231,7 @@ def _likeliest_start(starts: Floats, movement: Movement) -> tuple[int, float]:
         expected = 0.0
         for i in range(len(means)):
             for row in range(means.shape[1]):
-                expected += means[i, row] * (sums[i, row] - 0.5 * taken[i] * means[i, row])
+                expected += means[i, row] * (sums[i, row] - 0.5 * occupancy[i] * means[i, row])
         if expected > largest:
             best, largest = s, expected
     return best, value
@@ -245,10 +245,10 @@ def best_climbed(
     best, first = 0, -np.inf
     if len(starts) > 1:
         best, first = _likeliest_start(starts, movement)
-    found = climbed(starts[best], lower, upper, max_steps, tolerance, movement)
-    if best > 0 and not found[1] >= first:
-        found = climbed(starts[0], lower, upper, max_steps, tolerance, movement)
-    return found
+    result = climbed(starts[best], lower, upper, max_steps, tolerance, movement)
+    if best > 0 and not result[1] >= first:
+        result = climbed(starts[0], lower, upper, max_steps, tolerance, movement)
+    return result
 
 
 @compiled
@@ -257,10 +257,10 @@ def information_at(u: Floats, gradient: Floats, movement: Movement) -> Floats:
     n_components = len(u)
     hessian = np.empty((n_components, n_components))
     for p in range(n_components):
-        beside = u.copy()
-        beside[p] += WIDTH
-        _, found, _ = expectation_at(beside, movement)
-        hessian[p] = (gradient - found) / WIDTH
+        shifted = u.copy()
+        shifted[p] += WIDTH
+        _, shifted_gradient, _ = expectation_at(shifted, movement)
+        hessian[p] = (gradient - shifted_gradient) / WIDTH
     return 0.5 * (hessian + hessian.T)
 
 
@@ -268,39 +268,39 @@ def information_at(u: Floats, gradient: Floats, movement: Movement) -> Floats:
 def nearest(
     starts: Floats, bound: float, exponents: Ints, right: Floats, triangle: Floats, max_steps: int
 ) -> tuple[Floats, Floats]:
-    """The place u within +-bound with the least |right - triangle phi(u)|^2, and triangle dphi/du there.
+    """The u within +-bound with the minimum |right - triangle phi(u)|^2, and triangle dphi/du there.
 
-    Gauss-Newton with shorter steps where a whole one leads up, from the best of the starts (S, P).
+    Gauss-Newton with shorter steps where a full one increases it, from the best of the starts (S, P).
     """
     n_features, n_components = exponents.shape
     features, slopes = np.empty(n_features), np.empty((n_features, n_components))
-    place, misfit = starts[0].copy(), np.inf
+    u, misfit = starts[0].copy(), np.inf
     for s in range(len(starts)):
         monomials_at(starts[s], exponents, features, slopes)
-        found = ((right - triangle @ features) ** 2).sum()
-        if found < misfit:
-            place, misfit = starts[s].copy(), found
+        start_misfit = ((right - triangle @ features) ** 2).sum()
+        if start_misfit < misfit:
+            u, misfit = starts[s].copy(), start_misfit
     for _ in range(max_steps):
-        monomials_at(place, exponents, features, slopes)
+        monomials_at(u, exponents, features, slopes)
         moved = triangle @ slopes
         matrix = moved.T @ moved
         matrix += 1e-9 * (np.trace(matrix) + 1e-300) * np.eye(n_components)
         step = np.linalg.solve(matrix, moved.T @ (right - triangle @ features))
-        share, gained = 1.0, -1.0
+        fraction, gained = 1.0, -1.0
         for _ in range(5):
-            candidate = np.minimum(np.maximum(place + share * step, -bound), bound)
+            candidate = np.minimum(np.maximum(u + fraction * step, -bound), bound)
             monomials_at(candidate, exponents, features, slopes)
             gained = misfit - ((right - triangle @ features) ** 2).sum()
             if gained > 0.0:
                 break
-            share *= 0.4
+            fraction *= 0.4
         if gained <= 0.0:
             break
-        place, misfit = candidate, misfit - gained
+        u, misfit = candidate, misfit - gained
         if gained < 1e-9 * (1.0 + misfit):
             break
-    monomials_at(place, exponents, features, slopes)
-    return place, triangle @ slopes
+    monomials_at(u, exponents, features, slopes)
+    return u, triangle @ slopes
 
 
 @compiled
@@ -310,19 +310,19 @@ def aligned_parts(
 ) -> Floats:  # fmt: skip
     """Averages of the parts of a movement and its last frame, ((parts + 1) D,).
 
-    States are found at the first of the starts, and then at the place where the averages say that theta is.
+    States are aligned at the first of the starts, and then at the theta that follows from the averages.
 
     Args:
-        sequence: the frames, (T, D). begins: first state of each part. alignments: how often states are found.
-        starts, bound, triangle, max_steps: of `nearest`; projector: makes its `right` of the averages.
+        sequence: the frames, (T, D). begins: first state of each part. alignments: number of alignments.
+        starts, bound, triangle, max_steps: of `nearest`; projector: maps the averages to its `right`.
     """
-    parts, place = np.empty((len(begins) + 1, sequence.shape[1])), starts[0]
+    parts, u = np.empty((len(begins) + 1, sequence.shape[1])), starts[0]
     parts[-1] = sequence[-1]
     for alignment in range(alignments):
         if alignment > 0:
             right = np.dot(projector, parts.ravel())
-            place = nearest(starts, bound, movement.exponents, right, triangle, max_steps)[0]
-        gamma = responsibilities_at(place, movement)
+            u = nearest(starts, bound, movement.exponents, right, triangle, max_steps)[0]
+        gamma = responsibilities_at(u, movement)
         parts[:-1] = 0.0
         for part in range(len(begins)):
             end = begins[part + 1] if part + 1 < len(begins) else len(gamma)

@@ -19,7 +19,7 @@ MAX_BYTES = 256 * 2**20
 MAX_ARRAYS = 500
 """Every modelled beginning has seven; of movements of a minute there are 25."""
 MAX_LETTERS = 100_000
-"""Of the header; that of a model with a description has 1 000."""
+"""Maximum of the header; that of a model with a description has 1 000."""
 
 
 class ModelFileError(InputError):
@@ -39,7 +39,7 @@ class ModelRecord:
 def write_record(path: Path, record: ModelRecord) -> None:
     """Write a record. The header is text in an array; numbers are plain arrays, so no reader needs pickle.
 
-    The file appears when it is complete, so a process that is killed meanwhile leaves no half of one.
+    The file appears when it is complete, so a process that is killed leaves no partial file.
     """
     header = {
         "class": record.class_name,
@@ -56,8 +56,8 @@ def read_record(path: Path) -> ModelRecord:
     content = read_arrays(path, "model file (.npz)", ModelFileError, max_bytes=MAX_BYTES, max_arrays=MAX_ARRAYS)
     missing = sorted({"format_version", "header"} - set(content))
     if missing:
-        found = ", ".join(sorted(content)) or "nothing"
-        raise ModelFileError(f"{path}: expected a model file, which has {' and '.join(missing)}; found {found:.200}")
+        names = ", ".join(sorted(content)) or "nothing"
+        raise ModelFileError(f"{path}: expected a model file, which has {' and '.join(missing)}; found {names:.200}")
     _check_version(path, content["format_version"])
     arrays = {name.removeprefix("learned_"): value for name, value in content.items() if name.startswith("learned_")}
     for name, value in arrays.items():
@@ -66,7 +66,7 @@ def read_record(path: Path) -> ModelRecord:
     try:
         if content["header"].dtype.itemsize > 4 * MAX_LETTERS:
             raise ValueError(f"it has more than {MAX_LETTERS} characters")
-        header = json.loads(str(content["header"]), parse_constant=_refuse_constant)
+        header = json.loads(str(content["header"]), parse_constant=_reject_constant)
         parameters = {name: _rich(name, value) for name, value in header["parameters"].items()}
         training = _summary(header["training"])
         return ModelRecord(str(header["class"]), parameters, training, arrays)
@@ -83,7 +83,7 @@ def _check_version(path: Path, found: NDArray[Any]) -> None:
         )
 
 
-def _refuse_constant(name: str) -> NoReturn:
+def _reject_constant(name: str) -> NoReturn:
     raise ValueError(f"expected finite numbers, found {name}")
 
 

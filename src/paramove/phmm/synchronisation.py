@@ -23,9 +23,9 @@ def synchronised(
 ) -> list[Parameters]:
     """One local model per group of sequences, aligned by the global model.
 
-    The first E-step uses the global model's responsibilities and gives the means (3.7), which then stay; further steps
-    refine covariances and durations. Each covariance is shrunk to the mean of its state over all groups (few frames per
-    state make a full covariance singular).
+    The first E-step uses the global model's responsibilities and gives the means (3.7), which are then fixed; further
+    steps refine covariances and durations. Each covariance is shrunk to the mean of its state over all groups (few
+    frames per state make a full covariance singular).
     """
     first = [Statistics.gathered(global_parameters, group) for group in groups]
     means = [statistics.means() for statistics in first]  # Equation (3.7)

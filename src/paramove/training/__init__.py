@@ -1,4 +1,4 @@
-"""Movement models trained from demonstration sets, checked by leaving out, drawn, compared and asked."""
+"""Movement models trained from demonstration sets, cross-validated, drawn, compared and applied."""
 
 import lazy_loader
 

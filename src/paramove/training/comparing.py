@@ -1,4 +1,4 @@
-"""Models side by side: what they were told, how far apart their movements are, which explains a set better."""
+"""Comparison of models: distances between their movements, and which explains a set better."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from paramove.demonstrations import DemonstrationError, DemonstrationSet
 from paramove.documents import InputError
 from paramove.phmm import MovementClassifier, ParametricHMM
-from paramove.training.drawing import bounds, dimension, parameter_names, point_names, raster
+from paramove.training.drawing import bounds, dimension, grid, parameter_names, point_names
 from paramove.training.examining import Examiner
 from paramove.training.leaving_out import covers, synthesis_error
 
@@ -18,15 +18,15 @@ FRAMES = 100
 
 
 def distance_between(first: ParametricHMM, second: ParametricHMM) -> dict[str, float]:
-    """How far apart the movements of two models are: over a raster of the theta that both were trained for.
+    """Distances between the movements of two models, over a grid of the theta that both were trained for.
 
     Root mean square over body points, frames and theta, and the largest distance of a body point, m.
 
-    Raises InputError if they have other points or parameters, or no theta in common.
+    Raises InputError if their points or parameters differ, or they have no theta in common.
     """
     if point_names(first) != point_names(second) or parameter_names(first) != parameter_names(second):
         raise InputError(
-            "movements of models with other points or parameters cannot be compared: "
+            "the models differ in points or parameters and cannot be compared: "
             f"{', '.join(point_names(first))} ({', '.join(parameter_names(first))}) and "
             f"{', '.join(point_names(second))} ({', '.join(parameter_names(second))})"
         )
@@ -34,37 +34,37 @@ def distance_between(first: ParametricHMM, second: ParametricHMM) -> dict[str, f
         np.maximum(bounds(first)[0], bounds(second)[0]), np.minimum(bounds(first)[1], bounds(second)[1])
     ])  # fmt: skip
     if (shared[0] > shared[1]).any():
-        raise InputError("the models were trained for other parameters: their bounds have nothing in common")
+        raise InputError("the models were trained for different parameters: their bounds do not overlap")
     distances = []
-    for theta in raster(shared):
+    for theta in grid(shared):
         difference = first.synthesize(theta, FRAMES) - second.synthesize(theta, FRAMES)
         distances.append(np.linalg.norm(difference.reshape(FRAMES, -1, 3), axis=2))
     values = np.array(distances)
     return {"rms_m": float(np.sqrt((values**2).mean())), "greatest_m": float(values.max())}
 
 
-def on_set(model: ParametricHMM, shown: DemonstrationSet) -> dict[str, Any]:
+def on_set(model: ParametricHMM, demonstrations: DemonstrationSet) -> dict[str, Any]:
     """How well a model explains the movements of its action in a set.
 
     Raises DemonstrationError if the set has no movement of the action, or other parameters.
     """
-    action = model.description.action if model.description else shown.actions[0]
+    action = model.description.action if model.description else demonstrations.actions[0]
     examiner = Examiner(MovementClassifier.from_models({action: model}))
     names = parameter_names(model)
     errors, inside, likelihoods, synthesis = [], [], [], []
-    for movement in shown.select(action):
-        found = examiner.examine(movement)
-        if found.labelled is None:
+    for movement in demonstrations.select(action):
+        recognition = examiner.examine(movement)
+        if recognition.labelled is None:
             raise DemonstrationError(
                 f"{movement.source}: the model has the parameters {', '.join(names)}, the set has "
-                f"{', '.join(shown.parameter_names) or 'none'}"
+                f"{', '.join(demonstrations.parameter_names) or 'none'}"
             )
-        frames = found.movement.frames
-        errors.append(found.estimate.theta - found.labelled)
-        inside.append(covers(found.estimate.theta, found.estimate.covariance, found.labelled))
+        frames = recognition.movement.frames
+        errors.append(recognition.estimate.theta - recognition.labelled)
+        inside.append(covers(recognition.estimate.theta, recognition.estimate.covariance, recognition.labelled))
         count = model.resampled_frames or len(frames)
-        likelihoods.append(model.log_likelihood(frames, found.labelled) / count)
-        synthesis.append(synthesis_error(model, found.labelled, frames, dimension(model) // 3))
+        likelihoods.append(model.log_likelihood(frames, recognition.labelled) / count)
+        synthesis.append(synthesis_error(model, recognition.labelled, frames, dimension(model) // 3))
     rms = np.sqrt((np.array(errors) ** 2).mean(axis=0))
     return {
         "movements": len(errors),

@@ -1,4 +1,4 @@
-"""Parts of the pictures of models: axes, paths in space, ellipses, rasters of theta."""
+"""Parts of the pictures of models: axes, paths in space, ellipses, grids of theta."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ COLOURS = "viridis"
 INK, FAINT, WARN = "#1d2530", "#aab3bd", "#b3372b"
 ACTION_COLOURS = ("#3367d6", "#2f9e57", "#d9722b", "#8a4fbf", "#c2375b", "#6b7480", "#a08a00", "#1f9aa8")
 LINES = {1: 9, 2: 5, 3: 3}
-"""How many values of each parameter a raster has, by the number of parameters."""
+"""How many values of each parameter a grid has, by the number of parameters."""
 
 
-class Shown(NamedTuple):
+class DrawnPoint(NamedTuple):
     """The body point of a model that is drawn.
 
     Attributes:
@@ -37,27 +37,27 @@ class Shown(NamedTuple):
     columns: slice
 
 
-def shown_point(model: ParametricHMM, name: str | None = None) -> Shown:
+def drawn_point(model: ParametricHMM, name: str | None = None) -> DrawnPoint:
     """The named point, else the fingertip where there is one, else the last.
 
-    Raises InputError for a name that the model does not have, or a model whose frames are not places of points.
+    Raises InputError for a name that the model does not have, or a model whose frames are not positions of points.
     """
     names = point_names(model)
     if name is not None and name not in names:
         raise InputError(f"there is no point '{name}' in the model; {nearest(name, names)}")
-    chosen = name or next((one for one in POINTS_FIRST if one in names), names[-1])
-    first = 3 * names.index(chosen)
-    return Shown(chosen, slice(first, first + 3))
+    point = name or next((one for one in POINTS_FIRST if one in names), names[-1])
+    first = 3 * names.index(point)
+    return DrawnPoint(point, slice(first, first + 3))
 
 
 def point_names(model: ParametricHMM) -> tuple[str, ...]:
-    """Names of the body points, as described or else numbered. Raises InputError if frames are not places."""
+    """Names of the body points, as described or else numbered. Raises InputError if frames are not positions."""
     described = model.description.point_names if model.description else ()
     dim = dimension(model)
     if described and 3 * len(described) == dim:
         return described
     if dim % 3:
-        raise InputError(f"the frames of this model have {dim} components, which are no places of points: no picture")
+        raise InputError(f"cannot draw this model: expected frames of 3D positions, found {dim} components")
     return tuple(f"point_{number}" for number in range(1, dim // 3 + 1))
 
 
@@ -67,7 +67,7 @@ def dimension(model: ParametricHMM) -> int:
 
 
 def bounds(model: ParametricHMM) -> Floats:
-    """Minimum and maximum theta of the training. Shape (2, P). Raises InputError for a model without."""
+    """Minimum and maximum theta of the training. Shape (2, P). Raises InputError for an untrained model."""
     if model.parameter_bounds_ is None:
         raise InputError("this model is not trained yet")
     return model.parameter_bounds_
@@ -81,12 +81,12 @@ def parameter_names(model: ParametricHMM) -> tuple[str, ...]:
 
 
 def with_unit(name: str) -> str:
-    """A parameter's name for an axis: a place is in metres."""
+    """A parameter's name for an axis: a coordinate of a position is in metres."""
     return f"{name}, m" if is_place(name) else name
 
 
-def raster(low_high: Floats) -> Floats:
-    """Theta of a raster between bounds (2, P). Shape (M, P)."""
+def grid(low_high: Floats) -> Floats:
+    """Theta of a grid between bounds (2, P). Shape (M, P)."""
     count = LINES.get(low_high.shape[1], 2)
     lines = [np.unique(np.linspace(low, high, count)) for low, high in low_high.T]
     return np.array(list(itertools.product(*lines)))
@@ -102,9 +102,9 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def space_axes(figure: Figure, place: Any, paths: Sequence[Floats], title: str) -> Any:
+def space_axes(figure: Figure, cell: Any, paths: Sequence[Floats], title: str) -> Any:
     """Axes in 3D with equal scales that hold the paths (T, 3)."""
-    axes: Any = figure.add_subplot(place, projection="3d")
+    axes: Any = figure.add_subplot(cell, projection="3d")
     low = np.min([path.min(axis=0) for path in paths], axis=0)
     high = np.max([path.max(axis=0) for path in paths], axis=0)
     middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
@@ -116,11 +116,13 @@ def space_axes(figure: Figure, place: Any, paths: Sequence[Floats], title: str) 
     return axes
 
 
-def add_ellipse(axes: Axes, centre: Floats, covariance: Floats, colour: Any, share: float = 0.95, **look: Any) -> None:
-    """The region of a normal distribution in the plane that holds a share of it."""
+def add_ellipse(
+    axes: Axes, centre: Floats, covariance: Floats, colour: Any, fraction: float = 0.95, **style: Any
+) -> None:
+    """The region of a normal distribution in the plane that holds this fraction of it."""
     from matplotlib.patches import Ellipse
 
     values, vectors = np.linalg.eigh(covariance)
-    lengths = 2.0 * np.sqrt(np.maximum(values, 0.0) * chdtri(2, 1.0 - share))
+    lengths = 2.0 * np.sqrt(np.maximum(values, 0.0) * chdtri(2, 1.0 - fraction))
     angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-    axes.add_patch(Ellipse((centre[0], centre[1]), lengths[1], lengths[0], angle=angle, color=colour, **look))
+    axes.add_patch(Ellipse((centre[0], centre[1]), lengths[1], lengths[0], angle=angle, color=colour, **style))

@@ -1,4 +1,4 @@
-"""Movements shown to trained models: which action, which parameters and how surely, and whether any of the known."""
+"""Recognition of movements by trained models: action, parameters with their uncertainty, or rejection."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from paramove.training.leaving_out import REGION, covers
 SIGNIFICANCE_LEVEL = 0.01
 """A movement with a smaller p-value is rejected as none of the known actions."""
 UNKNOWN_FRAMES = ("", "laboratory", "unspecified")
-"""Names of frames that files of motion capture get, which say nothing."""
+"""Names of frames in files of motion capture that carry no information."""
 
 
 @dataclass(frozen=True)
 class Recognition:
-    """What one movement was taken for.
+    """How one movement was recognised.
 
     Attributes:
-        movement: as it was asked, in the frame and at the rate of the models.
+        movement: as classified, in the frame and at the rate of the models.
         action: the most probable one.
         known: whether the movement is one of the known actions, by its p-value.
         posterior: probability of each action.
         estimate: of the action's parameters.
         parameter_names: of the components of theta.
-        p_value: probability that a genuine movement has at least this outlier score; None from models that have none.
-        outside: names of the parameters that are estimated outside the bounds of the training.
+        p_value: probability that a genuine movement has at least this outlier score; None from models without p-values.
+        outside: names of the parameters whose estimates are outside the bounds of the training.
         labelled: theta of the label, as far as the model has its parameters; None without a label.
     """
 
@@ -52,7 +52,7 @@ class Recognition:
 
     @property
     def half_widths(self) -> Floats:
-        """From theta to the edges of the box around the region that holds it in 95 % of the cases. Shape (P,)."""
+        """Half widths of the box around the 95 % confidence region of theta. Shape (P,)."""
         size = float(np.sqrt(chdtri(len(self.estimate.theta), 1.0 - REGION)))
         result: Floats = size * np.sqrt(np.diagonal(self.estimate.covariance))
         return result
@@ -70,7 +70,7 @@ class Recognition:
             "theta_covariance": self.estimate.covariance.tolist(),
             "theta_outside_bounds": list(self.outside),
             "p_value": self.p_value,
-            "typicality": self.p_value,  # as it was called before; the next release has p_value only
+            "typicality": self.p_value,  # the old name, for one release
             "log_likelihood": self.estimate.log_likelihood,
         }
         if self.movement.action:
@@ -82,12 +82,12 @@ class Recognition:
 
 
 class Examiner:
-    """Trained models that are asked about movements.
+    """Recognises movements with trained models.
 
     Args:
         classifier: of the actions; of a single model `MovementClassifier.from_models`.
 
-    Raises InputError for models that do not fit together: other points, frames or rates.
+    Raises InputError for models with different points, frames or rates.
     """
 
     def __init__(self, classifier: MovementClassifier) -> None:
@@ -99,20 +99,20 @@ class Examiner:
                 one, other = getattr(self._about[0], what), getattr(about, what)
                 if one != other:
                     raise InputError(
-                        f"models that compete have the same {what.replace('_', ' ')}: {self._about[0].action} has "
+                        f"competing models need the same {what.replace('_', ' ')}: {self._about[0].action} has "
                         f"{one}, {about.action} has {other}; train them from one set"
                     )
         scored = {_scored_by(model) for model in self.models.values()}
         if len(scored) > 1:
             raise InputError(
-                "models that compete are of one kind: all with correlated residuals, or all with the same states and "
+                "competing models need the same kind: all with correlated residuals, or all with the same states and "
                 f"frames; found {'; '.join(sorted(kind_of(model) for model in self.models.values()))}"
             )
 
     def prepared(self, movement: Movement) -> Movement:
         """The movement with the points of the models, in their frame and at their rate.
 
-        Raises DemonstrationError if a point is missing or the frame is another one.
+        Raises DemonstrationError if a point is missing or the frame differs.
         """
         about = self._about[0]
         if about.frame == BODY and movement.frame != BODY:
@@ -121,19 +121,18 @@ class Examiner:
         elif about.frame != movement.frame and movement.frame not in UNKNOWN_FRAMES:
             raise DemonstrationError(
                 f"{movement.source}: its points are in the frame '{movement.frame}', those of the model in "
-                f"'{about.frame}'; train with --body, which asks every movement from the person"
+                f"'{about.frame}'; train with --body, which transforms every movement into the person's frame"
             )
         movement = _with_points(movement, about.point_names)
         return resampled(movement, about.rate_hz) if about.rate_hz else movement
 
     def examine(self, movement: Movement, *, finished: bool = True) -> Recognition:
-        """What a movement is, or what its beginning will be. Raises InputError with the reason if nobody can tell."""
-        asked = self.prepared(movement)
+        """Recognises a movement, or its beginning. Raises InputError with the reason if that is impossible."""
+        prepared = self.prepared(movement)
         try:
-            found = self._classified(asked, finished)
+            action, posterior, estimate, p_value = self._classified(prepared, finished)
         except ValueError as error:
             raise DemonstrationError(f"{movement.source}: {error}") from error
-        action, posterior, estimate, p_value = found
         model = self.models[action]
         names = parameter_names(model)
         low, high = bounds(model)
@@ -143,49 +142,50 @@ class Examiner:
             if not minimum <= value <= maximum
         )
         known = p_value is None or p_value >= SIGNIFICANCE_LEVEL
-        return Recognition(asked, action, known, posterior, estimate, names, p_value, outside, _labelled(asked, names))
+        labelled = _labelled(prepared, names)
+        return Recognition(prepared, action, known, posterior, estimate, names, p_value, outside, labelled)
 
     def _classified(
-        self, asked: Movement, finished: bool
+        self, movement: Movement, finished: bool
     ) -> tuple[str, dict[str, float], ParameterEstimate, float | None]:
-        knows = {action: has_p_values(model) for action, model in self.models.items()}
+        with_p_values = {action: has_p_values(model) for action, model in self.models.items()}
         if len(self.models) == 1 and not finished:  # no other action whose beginning it could be
             ((action, model),) = self.models.items()
-            if not knows[action]:
-                return action, {action: 1.0}, model.estimate(asked.frames, finished=False), None
-            seen = model.examine(asked.frames, finished=False)  # type: ignore[attr-defined]
-            return action, {action: 1.0}, seen.estimate, seen.p_value
-        found = self.classifier.classify(asked.frames, finished=finished)
-        p_value = found.p_value if knows[found.action] else None
-        return found.action, found.posterior, found.estimates[found.action], p_value
+            if not with_p_values[action]:
+                return action, {action: 1.0}, model.estimate(movement.frames, finished=False), None
+            examination = model.examine(movement.frames, finished=False)  # type: ignore[attr-defined]
+            return action, {action: 1.0}, examination.estimate, examination.p_value
+        result = self.classifier.classify(movement.frames, finished=finished)
+        p_value = result.p_value if with_p_values[result.action] else None
+        return result.action, result.posterior, result.estimates[result.action], p_value
 
 
 def has_p_values(model: ParametricHMM) -> bool:
-    """Whether a model knows how demonstrations vary, and so which movements are outliers."""
+    """Whether a model describes how demonstrations vary, and so which movements are outliers."""
     return getattr(model, "performances_", None) is not None
 
 
 def _scored_by(model: ParametricHMM) -> tuple[object, ...]:
-    """What has to be the same for the scores of two models to be comparable."""
+    """Models whose scores are comparable have the same of these."""
     return ("p_value",) if has_p_values(model) else (model.n_states, model.resampled_frames)
 
 
-def percent(share: float) -> str:
-    """A probability in words that claim no more than is known: "> 99.9 %" instead of "100 %"."""
-    value = 100.0 * share
+def percent(probability: float) -> str:
+    """A probability as text, without false certainty: "> 99.9 %" instead of "100 %"."""
+    value = 100.0 * probability
     if value > 99.9:
         return "> 99.9 %"
     return f"{value:.1f} %" if value >= 0.1 else "< 0.1 %"
 
 
-def confusion(found: Sequence[Recognition]) -> dict[str, dict[str, int]]:
-    """Labelled action -> what it was taken for -> how often; "none" where it was rejected."""
+def confusion(recognitions: Sequence[Recognition]) -> dict[str, dict[str, int]]:
+    """Labelled action -> recognised action -> count; "none" where the movement was rejected."""
     table: dict[str, dict[str, int]] = {}
-    for one in found:
+    for one in recognitions:
         if one.movement.action:
             row = table.setdefault(one.movement.action, {})
-            taken = one.action if one.known else "none"
-            row[taken] = row.get(taken, 0) + 1
+            recognised = one.action if one.known else "none"
+            row[recognised] = row.get(recognised, 0) + 1
     return table
 
 
@@ -195,8 +195,8 @@ def _with_points(movement: Movement, names: tuple[str, ...]) -> Movement:
     missing = [name for name in names if name not in movement.point_names]
     if missing:
         raise DemonstrationError(
-            f"{movement.source}: the model knows {', '.join(names)}; missing are {', '.join(missing)}. The file has "
-            f"{', '.join(movement.point_names)}: say which is which with --mapping or --point"
+            f"{movement.source}: the model needs {', '.join(names)}; missing are {', '.join(missing)}. The file has "
+            f"{', '.join(movement.point_names)}: assign them with --mapping or --point"
         )
     order = [movement.point_names.index(name) for name in names]
     return replace(movement, positions=movement.positions[:, order], point_names=names)

@@ -1,4 +1,4 @@
-"""What a demonstration set gives to a model: sequences at one frame rate, the parameters that vary, a description."""
+"""Training data from a demonstration set: sequences at one frame rate, the parameters that vary, a description."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from paramove.phmm import MovementDescription
 from paramove.robots import ARM_BASE
 
 VARIES = 0.1
-"""A coordinate of a place whose range is a smaller share of the widest coordinate's is taken for constant."""
+"""A coordinate of a position whose range is a smaller fraction of the widest coordinate's counts as constant."""
 ARM_FLOOR_M = 5e-4
-"""How exactly a servo arm's points are known: of a hand 0.3 m from a joint to a step of its encoder of 4096 a turn. The
-arm's base does not move at all, and without a floor nothing could be learned of a point that never moves."""
+"""Accuracy of a servo arm's points: one step of an encoder with 4096 steps a turn moves a hand 0.3 m from the joint by
+this much. The arm's base does not move at all; without a floor, points that never move could not be learned."""
 PERSONS_FOR_GROUPS = 3
-"""From so many persons on, what training chooses by leaving out is chosen by leaving out persons."""
+"""With at least this many persons, the cross-validation of training leaves out whole persons."""
 
 
 @dataclass(frozen=True)
 class Examples:
-    """Movements as a model learns them.
+    """Movements to train a model with.
 
     Attributes:
         sequences: stacked positions, each (T_k, D), m, at `rate_hz`.
@@ -35,7 +35,7 @@ class Examples:
         frame: coordinate frame.
         rate_hz: frames a second.
         source: where the movements come from.
-        remarks: what was left out, for people.
+        remarks: for people, on what was left out.
     """
 
     sequences: list[Floats]
@@ -59,7 +59,7 @@ class Examples:
 
     @property
     def floor_deviation(self) -> float:
-        """How exactly the points are known at best, m; 0 where their variation tells."""
+        """Best accuracy of the points, m; 0: estimated from their variation."""
         return ARM_FLOOR_M if self.frame == ARM_BASE else 0.0
 
     @property
@@ -68,7 +68,7 @@ class Examples:
         return self.subjects if len(set(self.subjects)) >= PERSONS_FOR_GROUPS else None
 
     def of(self, numbers: Sequence[int]) -> Examples:
-        """Those movements alone."""
+        """Only those movements."""
         return replace(
             self,
             sequences=[self.sequences[number] for number in numbers],
@@ -82,7 +82,7 @@ class Examples:
         return self.of([number for number, label in enumerate(self.labels) if label == action])
 
     def description(self, action: str) -> MovementDescription:
-        """What a model of one action keeps of these examples."""
+        """The description that is stored with a model of one action."""
         seconds = [(len(x) - 1) / self.rate_hz for x, label in zip(self.sequences, self.labels, strict=True)
                    if label == action]  # fmt: skip
         return MovementDescription(
@@ -93,63 +93,64 @@ class Examples:
 
 
 def examples_of(
-    shown: DemonstrationSet, *, action: str | None = None, parameters: Sequence[str] | None = None,
+    demonstrations: DemonstrationSet, *, action: str | None = None, parameters: Sequence[str] | None = None,
     body: bool = False, source: str = ""
 ) -> Examples:  # fmt: skip
     """The movements of a set, or of one action of it.
 
     Args:
-        shown: the set.
+        demonstrations: the set.
         action: only this one.
         parameters: names of those that are learned; None: all that vary.
-        body: everything seen from the person, left arms as right ones.
+        body: transform everything into the person's frame, left arms as right ones.
         source: of the set, for the description.
 
     Raises DemonstrationError if there is no such action or parameter, or if no parameter varies.
     """
-    chosen = shown.select(action)
+    chosen = demonstrations.select(action)
     if body:
         chosen = chosen.in_body_frame().with_right_arms()
     rate_hz = float(f"{np.median([movement.rate_hz for movement in chosen]):.4g}")
     chosen = chosen.resampled(rate_hz)
-    found = chosen.sequences()
-    columns, remarks = _learned(found.theta, chosen.parameter_names, parameters)
+    arrays = chosen.sequences()
+    columns, remarks = _learned(arrays.theta, chosen.parameter_names, parameters)
     return Examples(
-        sequences=found.sequences, theta=found.theta[:, columns], labels=found.labels, subjects=found.subjects,
+        sequences=arrays.sequences, theta=arrays.theta[:, columns], labels=arrays.labels, subjects=arrays.subjects,
         parameter_names=tuple(chosen.parameter_names[column] for column in columns), point_names=chosen.point_names,
-        frame=chosen.frame, rate_hz=rate_hz, source=shown.description or source, remarks=(*shown.remarks, *remarks),
+        frame=chosen.frame, rate_hz=rate_hz, source=demonstrations.description or source,
+        remarks=(*demonstrations.remarks, *remarks),
     )  # fmt: skip
 
 
-def _learned(theta: Floats, names: tuple[str, ...], wanted: Sequence[str] | None) -> tuple[list[int], list[str]]:
-    """Which components of theta are learned, and what is said about the others."""
-    for name in wanted or ():
+def _learned(theta: Floats, names: tuple[str, ...], requested: Sequence[str] | None) -> tuple[list[int], list[str]]:
+    """Which components of theta are learned, and remarks on the others."""
+    for name in requested or ():
         if name not in names:
             raise DemonstrationError(f"there is no parameter '{name}' in the set; {nearest(name, names)}")
-    if wanted:
-        return [names.index(name) for name in wanted], []
-    spread = np.ptp(theta, axis=0)
-    places = [is_place(name) for name in names]
-    widest = max((float(width) for width, place in zip(spread, places, strict=True) if place), default=0.0)
+    if requested:
+        return [names.index(name) for name in requested], []
+    ranges = np.ptp(theta, axis=0)
+    is_position = [is_place(name) for name in names]
+    widest = max((float(width) for width, position in zip(ranges, is_position, strict=True) if position), default=0.0)
     columns, remarks = [], []
-    for number, (name, width, place) in enumerate(zip(names, spread.tolist(), places, strict=True)):
-        if width > (VARIES * widest if place else 0.0):
+    for number, (name, width, position) in enumerate(zip(names, ranges.tolist(), is_position, strict=True)):
+        if width > (VARIES * widest if position else 0.0):
             columns.append(number)
         elif width > 0.0:
             remarks.append(
-                f"{name} varies by only {width:.2g} m, little beside {widest:.2g} m: it is left out; "
-                "--parameters names those that are learned"
+                f"{name} varies by only {width:.2g} m, little compared with {widest:.2g} m: it is left out; "
+                "--parameters selects the ones to learn"
             )
         else:
             remarks.append(f"{name} is {theta[0, number]:g} in all movements: it is left out")
     if not columns:
         raise DemonstrationError(
             f"all {len(theta)} movements have the same parameters ({', '.join(names) or 'none'}); a parametric model "
-            "learns how a movement changes with them: give movements of different theta"
+            "learns how a movement changes with them: use movements of different theta"
         )
     return columns, remarks
 
 
 def is_place(name: str) -> bool:
-    """Whether a parameter is a coordinate of a place, in metres: its name ends in _x, _y or _z."""
+    """Whether a parameter is a coordinate of a position, in metres: its name ends in _x, _y or _z."""
     return name.endswith(AXIS_ENDINGS)

@@ -17,7 +17,7 @@ CLASSES = {
     "neural": "NeuralPHMM",
     "interpolative": "InterpolativePHMM",
 }
-"""Name -> class. "best" is what is recommended now: quadratic means with correlated residuals."""
+"""Name -> class. "best" is the current recommendation: quadratic means with correlated residuals."""
 DEFAULT_STATES = 20
 
 
@@ -36,18 +36,18 @@ def untrained(
 
     Args:
         kind: its name.
-        description: what it is about.
+        description: of the action.
         n_states: number of states.
         d_min, d_max: frames in a state; None: one less and one more than the mean, `frames / n_states`.
-        frames: every movement is brought to so many.
-        floor_deviation: how exactly points are known at best, m; 0: their variation tells.
+        frames: every movement is resampled to this many.
+        floor_deviation: best accuracy of the points, m; 0: estimated from their variation.
         residuals: "correlated" or "independent" of polynomial models; None: their default.
 
     Raises ValueError for a kind that is unknown or has no such residuals, and for states that do not fit the frames.
     """
     if kind not in CLASSES or not hasattr(phmm, CLASSES[kind]):
-        there = [name for name, one in CLASSES.items() if hasattr(phmm, one)]
-        raise ValueError(f"there is no model '{kind}'; there are {', '.join(there)}")
+        available = [name for name, one in CLASSES.items() if hasattr(phmm, one)]
+        raise ValueError(f"there is no model '{kind}'; there are {', '.join(available)}")
     mean = frames / n_states
     if mean < 1.0:
         raise ValueError(f"{frames} frames are fewer than {n_states} states: give more --frames or fewer --states")
@@ -59,22 +59,22 @@ def untrained(
             f"{maximum}: the mean lies between them"
         )
     kind_class: Any = getattr(phmm, CLASSES[kind])
-    more: dict[str, Any] = {} if residuals is None else {"residuals": residuals}
-    if more and "residuals" not in kind_class._parameter_names():
-        raise ValueError(f"a model '{kind}' has no choice of residuals; linear, quadratic and cubic ones have")
+    arguments: dict[str, Any] = {} if residuals is None else {"residuals": residuals}
+    if arguments and "residuals" not in kind_class._parameter_names():
+        raise ValueError(f"a model '{kind}' has no choice of residuals; only linear, quadratic and cubic ones have")
     if floor_deviation:
-        more["options"] = TrainingOptions(floor_deviation=floor_deviation)
-    made: ParametricHMM = kind_class(
-        n_states, minimum, maximum, resampled_frames=frames, description=description, **more
+        arguments["options"] = TrainingOptions(floor_deviation=floor_deviation)
+    model: ParametricHMM = kind_class(
+        n_states, minimum, maximum, resampled_frames=frames, description=description, **arguments
     )
-    return made
+    return model
 
 
 def kind_of(model: ParametricHMM) -> str:
     """The model in words: class and, where it has them, degree and residuals."""
-    words = [type(model).__name__]
+    parts = [type(model).__name__]
     if hasattr(model, "degree"):
-        words.append(f"degree {model.degree}")
+        parts.append(f"degree {model.degree}")
     if hasattr(model, "residuals"):
-        words.append(f"{model.residuals} residuals")
-    return ", ".join(words)
+        parts.append(f"{model.residuals} residuals")
+    return ", ".join(parts)

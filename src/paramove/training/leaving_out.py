@@ -1,4 +1,4 @@
-"""How well a kind of model does on movements it has not seen: whole parameters or persons are left out."""
+"""Cross-validation of a kind of model: whole parameters or persons are left out."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LeftOutBy = Literal["theta", "subject", "repetition"]
 MAX_FOLDS = 10
 HULL_DIMENSIONS = 4
 FRAMES = 100
-"""Movements are compared at so many frames."""
+"""Movements are compared after resampling to this many frames."""
 REGION = 0.95
-"""Share of true parameters that a region promises to hold."""
+"""Confidence level of the regions of theta."""
 
 
 class LeftOut(NamedTuple):
-    """One movement, seen by a model that was trained without its group.
+    """Result for one movement, from a model that was trained without its group.
 
     Attributes:
         number: of the movement in the examples.
@@ -50,7 +50,7 @@ class LeftOut(NamedTuple):
 
 @dataclass(frozen=True)
 class LeaveOutResult:
-    """All movements, each seen by a model that does not know its group.
+    """Results for all movements, each from a model that was trained without its group.
 
     Attributes:
         by: what a group is.
@@ -65,7 +65,7 @@ class LeaveOutResult:
     parameter_names: tuple[str, ...]
 
     def summary(self) -> dict[str, Any]:
-        """Numbers for people and JSON: errors of theta and synthesis, share of regions that hold the label."""
+        """Numbers for people and JSON: errors of theta and synthesis, fraction of regions that hold the label."""
         errors = np.stack([one.estimated - one.theta for one in self.movements])
         by_name = zip(self.parameter_names, np.sqrt((errors**2).mean(axis=0)).tolist(), strict=True)
         synthesis = np.array([one.synthesis for one in self.movements])
@@ -92,14 +92,14 @@ def leave_out(
     by: LeftOutBy = "theta",
     finished: Callable[[int, int], None] | None = None,
 ) -> LeaveOutResult:
-    """Train again without each group of movements, and ask these models about it.
+    """Train again without each group of movements, and test these models on it.
 
     Args:
         examples: of one action.
         make: gives the untrained model.
         by: what is left out together: all movements of one theta, of one person, or each n-th movement of every theta.
-            An InterpolativePHMM needs every theta: of it repetitions are left out.
-        finished: is told after each fold how many are done, and how many there are.
+            An InterpolativePHMM needs every theta: for it repetitions are left out.
+        finished: called after each fold with the number of finished folds and of all folds.
 
     Raises ValueError if there is only one group, or if a fold cannot be trained.
     """
@@ -108,14 +108,14 @@ def leave_out(
     folds = _folds(examples, by)
     if len(folds) < 2:
         raise ValueError(f"there is only one {by}: nothing can be left out")
-    found: list[LeftOut] = []
+    results: list[LeftOut] = []
     for number, tested in enumerate(folds):
         rest = examples.of([one for one in range(len(examples)) if one not in tested])
         model = make().fit(rest.sequences, rest.theta, rest.groups)
-        found += [_seen(model, examples, one, rest) for one in tested]
+        results += [_tested(model, examples, one, rest) for one in tested]
         if finished is not None:
             finished(number + 1, len(folds))
-    return LeaveOutResult(by, len(folds), tuple(sorted(found, key=lambda one: one.number)), examples.parameter_names)
+    return LeaveOutResult(by, len(folds), tuple(sorted(results, key=lambda one: one.number)), examples.parameter_names)
 
 
 def covers(estimated: Floats, covariance: Floats, theta: Floats) -> bool:
@@ -129,11 +129,11 @@ def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
     """Numbers of the movements that are left out together; groups share folds where there are many."""
     theta = groups_of(None, examples.theta)
     if by == "repetition":
-        seen: dict[int, int] = {}
+        repetitions: dict[int, int] = {}
         groups = []
         for cell in theta.tolist():
-            seen[cell] = seen.get(cell, -1) + 1
-            groups.append(seen[cell])
+            repetitions[cell] = repetitions.get(cell, -1) + 1
+            groups.append(repetitions[cell])
     else:
         names = examples.subjects if by == "subject" else None
         groups = groups_of(names, examples.theta).tolist()
@@ -141,7 +141,7 @@ def _folds(examples: Examples, by: LeftOutBy) -> list[list[int]]:
     return [[one for one, group in enumerate(groups) if group % count == fold] for fold in range(count)]
 
 
-def _seen(model: ParametricHMM, examples: Examples, number: int, rest: Examples) -> LeftOut:
+def _tested(model: ParametricHMM, examples: Examples, number: int, rest: Examples) -> LeftOut:
     sequence, theta = examples.sequences[number], examples.theta[number]
     estimate = model.estimate(sequence)
     return LeftOut(
@@ -156,7 +156,7 @@ def _seen(model: ParametricHMM, examples: Examples, number: int, rest: Examples)
 
 
 def is_outside(theta: Floats, trained: Floats) -> bool:
-    """Whether theta (P,) lies outside the convex hull of trained ones (K, P); of many or flat ones, their bounds."""
+    """Whether theta (P,) lies outside the convex hull of trained ones (K, P); or their bounds, if many or flat."""
     low, high = trained.min(axis=0), trained.max(axis=0)
     slack = 1e-6 * np.maximum(high - low, 1e-9)
     if ((theta < low - slack) | (theta > high + slack)).any():
@@ -171,11 +171,11 @@ def is_outside(theta: Floats, trained: Floats) -> bool:
 
 
 def synthesis_error(model: ParametricHMM, theta: Floats, sequence: Floats, n_points: int) -> float:
-    """Root mean square distance of body points between what a model makes for theta and a recording (T, D), warped."""
-    made = model.synthesize(theta, FRAMES)
-    return movement_distance(made, resample(sequence, FRAMES), n_points=n_points, cut=0.0)
+    """Root mean square distance of body points between the synthesis for theta and a recording (T, D), warped."""
+    synthesised = model.synthesize(theta, FRAMES)
+    return movement_distance(synthesised, resample(sequence, FRAMES), n_points=n_points, cut=0.0)
 
 
 def worst(result: LeaveOutResult, count: int) -> Sequence[LeftOut]:
-    """The movements whose synthesis is farthest off, worst first."""
+    """The movements with the largest errors of synthesis, worst first."""
     return sorted(result.movements, key=lambda one: -one.synthesis)[:count]

@@ -1,4 +1,4 @@
-"""Synthesised movements written to files that the importers and recordings' readers read again."""
+"""Synthesised movements written to files that the importers and the readers of recordings can read."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Made:
         frames: stacked positions, shape (T, D), m.
         point_names: of the D / 3 points.
         frame: coordinate frame.
-        theta: for which it was made, shape (P,).
+        theta: of the synthesis, shape (P,).
     """
 
     time: Floats
@@ -37,24 +37,24 @@ class Made:
 
     @classmethod
     def by(cls, model: ParametricHMM, theta: Floats, time: Floats) -> Made:
-        """What a model makes for theta (P,) at the times (T,), s. Raises InputError if it has no body points."""
-        about = model.description or MovementDescription()
-        return cls(time, model.synthesize(theta, len(time)), point_names(model), about.frame, theta)
+        """The synthesis of a model for theta (P,) at the times (T,), s. Raises InputError if it has no body points."""
+        description = model.description or MovementDescription()
+        return cls(time, model.synthesize(theta, len(time)), point_names(model), description.frame, theta)
 
 
 def as_csv(made: Made) -> str:
     """Lines of `time` and `<point>_x`, `<point>_y`, `<point>_z`, m, after a header."""
     text = io.StringIO()
     text.write(",".join(["time", *(f"{name}_{axis}" for name in made.point_names for axis in "xyz")]) + "\n")
-    for at, row in zip(made.time.tolist(), made.frames.tolist(), strict=True):
-        text.write(",".join([f"{at:.6f}", *(f"{value:.6f}" for value in row)]) + "\n")
+    for time_s, row in zip(made.time.tolist(), made.frames.tolist(), strict=True):
+        text.write(",".join([f"{time_s:.6f}", *(f"{value:.6f}" for value in row)]) + "\n")
     return text.getvalue()
 
 
 def write_movement(made: Made, path: Path) -> None:
     """Write CSV or NPZ as `paramove demos import` reads it, or a recording.
 
-    Raises RecordingExistsError for a recording that is there already.
+    Raises RecordingExistsError for a recording that exists already.
     """
     if path.suffix == ".csv":
         with replacing(path) as unfinished:

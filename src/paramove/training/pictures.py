@@ -20,14 +20,14 @@ from paramove.training.drawing import (
     FAINT,
     INK,
     WARN,
-    Shown,
+    DrawnPoint,
     add_ellipse,
     bounds,
+    drawn_point,
+    grid,
     new_figure,
     parameter_names,
     point_names,
-    raster,
-    shown_point,
     space_axes,
     with_unit,
 )
@@ -36,81 +36,81 @@ from paramove.training.kinds import kind_of
 STEP = 1e-3
 """Of the training's range: for derivatives with respect to theta."""
 CHAINS = 7
-"""In so many moments the arm is drawn."""
+"""The arm is drawn at this many times."""
 
 
 def plot_model(model: ParametricHMM, point: str | None = None) -> Figure:
-    """What a model has learned.
+    """Draws what a model has learned.
 
-    Above: the state means of one body point over a raster of theta as paths in space, and from above and from the side
+    Above: the state means of one body point over a grid of theta as paths in space, and from above and from the side
     with the regions that hold 95 % of the frames of each state. Below: how long each state lasts, and by how many
     standard deviations the pose of a state changes over the range of each parameter.
 
     Raises InputError for a point that the model does not have.
     """
-    shown = shown_point(model, point)
+    drawn = drawn_point(model, point)
     low_high = bounds(model)
-    thetas = raster(low_high)
+    thetas = grid(low_high)
     wide = int(np.ptp(low_high, axis=0).argmax())
     norm = Normalize(float(low_high[0, wide]), float(max(low_high[1, wide], low_high[0, wide] + 1e-9)))
-    paths = model.state_means(thetas)[..., shown.columns]
+    paths = model.state_means(thetas)[..., drawn.columns]
     figure = new_figure(13.5, 8.6)
-    grid = figure.add_gridspec(2, 12, height_ratios=[1.5, 1.0])
-    space = space_axes(figure, grid[0, :4], list(paths), f"states of {shown.name}, frame '{_frame(model)}'")
+    layout = figure.add_gridspec(2, 12, height_ratios=[1.5, 1.0])
+    space = space_axes(figure, layout[0, :4], list(paths), f"states of {drawn.name}, frame '{_frame(model)}'")
     for path, theta in zip(paths, thetas, strict=True):
         space.plot(*path.T, ".-", color=colormaps[COLOURS](norm(theta[wide])), linewidth=0.8, markersize=2.5)
-    above, side = figure.add_subplot(grid[0, 4:8]), figure.add_subplot(grid[0, 8:])
+    above, side = figure.add_subplot(layout[0, 4:8]), figure.add_subplot(layout[0, 8:])
     across = int(np.ptp(paths[..., :2].reshape(-1, 2), axis=0).argmax())
-    _regions(above, model, shown, (1, 0), wide, norm)
+    _regions(above, model, drawn, (1, 0), wide, norm)
     above.invert_xaxis()  # y is to the left
-    _regions(side, model, shown, (across, 2), wide, norm)
+    _regions(side, model, drawn, (across, 2), wide, norm)
     name = with_unit(parameter_names(model)[wide])
     figure.colorbar(ScalarMappable(norm, COLOURS), ax=side, label=name, pad=0.01, shrink=0.8)
-    _durations(figure.add_subplot(grid[1, :5]), model)
-    _visibility(figure.add_subplot(grid[1, 5:]), model, thetas)
+    _durations(figure.add_subplot(layout[1, :5]), model)
+    _visibility(figure.add_subplot(layout[1, 5:]), model, thetas)
     figure.suptitle(title_of(model), fontsize=11)
     return figure
 
 
 def plot_synthesis(model: ParametricHMM, theta: Floats, time: Floats, frames: Floats, point: str | None = None) -> Any:
-    """A synthesised movement.
+    """Draws a synthesised movement.
 
     Args:
-        model: which made it.
-        theta: for which, (P,).
+        model: that synthesised it.
+        theta: (P,).
         time: (T,), s. frames: (T, D), m.
         point: drawn over time; None: the fingertip where there is one.
 
-    Left the path of the point and the arm in some moments, among the movements of the training's range; right the
+    Left the path of the point and the arm at some times, among the movements of the training's range; right the
     point's coordinates, with the band that holds 95 % of demonstrations of this theta.
     """
-    shown = shown_point(model, point)
-    path = frames[:, shown.columns]
-    around = model.state_means(raster(bounds(model)))[..., shown.columns]
+    drawn = drawn_point(model, point)
+    path = frames[:, drawn.columns]
+    around = model.state_means(grid(bounds(model)))[..., drawn.columns]
     figure = new_figure(13.0, 6.4)
-    grid = figure.add_gridspec(3, 2, width_ratios=[1.1, 1.0])
+    layout = figure.add_gridspec(3, 2, width_ratios=[1.1, 1.0])
     arms = frames.reshape(len(frames), -1, 3)
-    space = space_axes(figure, grid[:, 0], [*around, *arms], f"path of {shown.name}, and the arm in {CHAINS} moments")
+    space = space_axes(figure, layout[:, 0], [*around, *arms], f"path of {drawn.name}, and the arm at {CHAINS} times")
     for other in around:
         space.plot(*other.T, color=FAINT, linewidth=0.6, alpha=0.6)
-    moments = np.linspace(0, len(frames) - 1, CHAINS).round().astype(int)
-    for number, moment in enumerate(moments.tolist()):
-        space.plot(*arms[moment].T, "o-", color=ACTION_COLOURS[0], alpha=0.25 + 0.1 * number, markersize=2.5, lw=1.2)
+    samples = np.linspace(0, len(frames) - 1, CHAINS).round().astype(int)
+    for number, sample in enumerate(samples.tolist()):
+        space.plot(*arms[sample].T, "o-", color=ACTION_COLOURS[0], alpha=0.25 + 0.1 * number, markersize=2.5, lw=1.2)
     space.plot(*path.T, color=INK, linewidth=1.8)
     progress = np.linspace(0.0, 1.0, len(frames))
-    spread = np.stack([
-        np.sqrt(np.diagonal(model.progress_covariance(theta, float(tau)))[shown.columns]) for tau in progress
+    deviation = np.stack([
+        np.sqrt(np.diagonal(model.progress_covariance(theta, float(tau)))[drawn.columns]) for tau in progress
     ])  # fmt: skip
     for axis, letter in enumerate("xyz"):
-        axes = figure.add_subplot(grid[axis, 1])
-        band = path[:, axis] - 1.96 * spread[:, axis], path[:, axis] + 1.96 * spread[:, axis]
+        axes = figure.add_subplot(layout[axis, 1])
+        band = path[:, axis] - 1.96 * deviation[:, axis], path[:, axis] + 1.96 * deviation[:, axis]
         axes.fill_between(time, *band, color=ACTION_COLOURS[0], alpha=0.18, linewidth=0)
         axes.plot(time, path[:, axis], color=INK, linewidth=1.4)
-        axes.set_ylabel(f"{shown.name} {letter}, m")
+        axes.set_ylabel(f"{drawn.name} {letter}, m")
         axes.grid(alpha=0.3)
     axes.set_xlabel("time, s")
-    told = ", ".join(f"{name} {value:g}" for name, value in zip(parameter_names(model), theta, strict=True))
-    figure.suptitle(f"{title_of(model)} · {told}", fontsize=11)
+    values = ", ".join(f"{name} {value:g}" for name, value in zip(parameter_names(model), theta, strict=True))
+    figure.suptitle(f"{title_of(model)} · {values}", fontsize=11)
     return figure
 
 
@@ -155,11 +155,11 @@ def _frame(model: ParametricHMM) -> str:
 
 
 def _regions(
-    axes: Axes, model: ParametricHMM, shown: Shown, plane: tuple[int, int], wide: int, norm: Normalize
+    axes: Axes, model: ParametricHMM, drawn: DrawnPoint, plane: tuple[int, int], wide: int, norm: Normalize
 ) -> None:
     """Means and 95 % regions of all states for three values of the widest parameter, the others in the middle."""
     low_high = bounds(model)
-    columns = [shown.columns.start + one for one in plane]
+    columns = [drawn.columns.start + one for one in plane]
     for value in np.linspace(low_high[0, wide], low_high[1, wide], 3).tolist():
         theta = low_high.mean(axis=0)
         theta[wide] = value
@@ -184,11 +184,11 @@ def _durations(axes: Axes, model: ParametricHMM) -> None:
 
 
 def _visibility(axes: Axes, model: ParametricHMM, thetas: Floats) -> None:
-    seen = visibility(model, thetas)
+    changes = visibility(model, thetas)
     mean, _, _ = state_seconds(model, bounds(model).mean(axis=0))
     middle = 100.0 * (np.cumsum(mean) - 0.5 * mean) / mean.sum()
     for number, name in enumerate(parameter_names(model)):
-        axes.plot(middle, seen[:, number], "o-", color=ACTION_COLOURS[number % 8], markersize=3, lw=1.4, label=name)
+        axes.plot(middle, changes[:, number], "o-", color=ACTION_COLOURS[number % 8], markersize=3, lw=1.4, label=name)
     axes.axhline(2.0, color=WARN, linewidth=0.8, linestyle=":")
     axes.set(xlabel="progress of the movement, %", ylabel="change over the range,\nstandard deviations", xlim=(0, 100))
     axes.set_yscale("log")

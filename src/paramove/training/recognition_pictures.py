@@ -1,4 +1,4 @@
-"""Pictures of what movements were taken for."""
+"""Pictures of recognised movements."""
 
 from __future__ import annotations
 
@@ -18,73 +18,75 @@ from paramove.training.drawing import (
     WARN,
     add_ellipse,
     bounds,
+    drawn_point,
+    grid,
     new_figure,
-    raster,
-    shown_point,
     space_axes,
     with_unit,
 )
 from paramove.training.examining import SIGNIFICANCE_LEVEL, Recognition, confusion, percent
 
 
-def plot_recognition(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:
-    """One movement with what the model makes of it, or all estimates and the confusion of many."""
-    if len(found) == 1:
-        return _plot_one(models, found[0])
-    return _plot_many(models, found)
+def plot_recognition(models: Mapping[str, ParametricHMM], recognitions: Sequence[Recognition]) -> Figure:
+    """One movement with the model's synthesis, or all estimates and the confusion matrix of many."""
+    if len(recognitions) == 1:
+        return _plot_one(models, recognitions[0])
+    return _plot_many(models, recognitions)
 
 
-def _plot_one(models: Mapping[str, ParametricHMM], found: Recognition) -> Figure:
-    """Left the recorded path beside the synthesised one, in the middle theta, right the actions."""
-    model = models[found.action]
-    shown = shown_point(model)
-    recorded = found.movement.frames[:, shown.columns]
-    made = model.synthesize(found.estimate.theta, 100)[:, shown.columns]
-    around = model.state_means(raster(bounds(model)))[..., shown.columns]
+def _plot_one(models: Mapping[str, ParametricHMM], recognition: Recognition) -> Figure:
+    """Left the recorded path and the synthesised one, in the middle theta, right the actions."""
+    model = models[recognition.action]
+    drawn = drawn_point(model)
+    recorded = recognition.movement.frames[:, drawn.columns]
+    synthesised = model.synthesize(recognition.estimate.theta, 100)[:, drawn.columns]
+    around = model.state_means(grid(bounds(model)))[..., drawn.columns]
     figure = new_figure(13.0, 5.2)
-    grid = figure.add_gridspec(1, 3, width_ratios=[1.2, 1.1, 0.7])
-    space = space_axes(figure, grid[0], [*around, recorded], f"path of {shown.name}")
+    layout = figure.add_gridspec(1, 3, width_ratios=[1.2, 1.1, 0.7])
+    space = space_axes(figure, layout[0], [*around, recorded], f"path of {drawn.name}")
     for other in around:
         space.plot(*other.T, color=FAINT, linewidth=0.6, alpha=0.6)
     space.plot(*recorded.T, color=INK, linewidth=1.8, label="recorded")
-    space.plot(*made.T, "--", color=ACTION_COLOURS[0], linewidth=1.4, label="the model's, for the estimated theta")
+    space.plot(
+        *synthesised.T, "--", color=ACTION_COLOURS[0], linewidth=1.4, label="the model's, for the estimated theta"
+    )
     space.legend(loc="upper left", fontsize=8, frameon=False)
-    axes = figure.add_subplot(grid[1])
-    _plane(axes, models, [found])
+    axes = figure.add_subplot(layout[1])
+    _plane(axes, models, [recognition])
     axes.set_title("theta, its 95 % region, and the bounds of the training", fontsize=10)
-    _posterior(figure.add_subplot(grid[2]), found)
-    figure.suptitle(f"{found.movement.source}", fontsize=10)
+    _posterior(figure.add_subplot(layout[2]), recognition)
+    figure.suptitle(f"{recognition.movement.source}", fontsize=10)
     return figure
 
 
-def _plot_many(models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> Figure:
-    """Left all estimates of theta with their labels, right what was taken for what."""
-    table = confusion(found)
+def _plot_many(models: Mapping[str, ParametricHMM], recognitions: Sequence[Recognition]) -> Figure:
+    """Left all estimates of theta with their labels, right the confusion matrix."""
+    table = confusion(recognitions)
     figure = new_figure(13.0, 5.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.4, 1.0])
-    _plane(left, models, found)
+    _plane(left, models, recognitions)
     left.set_title("theta with 95 % regions; crosses: labels; red: rejected", fontsize=10)
     if len(table) > 1:
         _matrix(right, table, [*models, "none"])
     else:
-        _counts(right, found)
-    figure.suptitle(f"{len(found)} movements", fontsize=11)
+        _counts(right, recognitions)
+    figure.suptitle(f"{len(recognitions)} movements", fontsize=11)
     return figure
 
 
-def _plane(axes: Axes, models: Mapping[str, ParametricHMM], found: Sequence[Recognition]) -> None:
-    """Estimates in the plane of the two parameters that vary most; of a single parameter one below the other."""
-    first = models[found[0].action]
+def _plane(axes: Axes, models: Mapping[str, ParametricHMM], recognitions: Sequence[Recognition]) -> None:
+    """Estimates in the plane of the two parameters that vary most; for a single parameter one below the other."""
+    first = models[recognitions[0].action]
     span = np.ptp(bounds(first), axis=0)
     chosen = sorted(np.argsort(-span)[:2].tolist())
     colours = {action: ACTION_COLOURS[number % 8] for number, action in enumerate(models)}
-    for number, one in enumerate(found):
+    for number, one in enumerate(recognitions):
         colour = colours[one.action] if one.known else WARN
         if len(chosen) == 2:
-            _place(axes, one, chosen, colour, alpha=min(0.18, 6.0 / len(found)))
+            _point(axes, one, chosen, colour, alpha=min(0.18, 6.0 / len(recognitions)))
         else:
             _interval(axes, one, number, colour)
-    names = found[0].parameter_names
+    names = recognitions[0].parameter_names
     axes.set_xlabel(with_unit(names[chosen[0]]))
     axes.set_ylabel(with_unit(names[chosen[1]]) if len(chosen) == 2 else "movement")
     for action, model in models.items():
@@ -101,14 +103,14 @@ def _plane(axes: Axes, models: Mapping[str, ParametricHMM], found: Sequence[Reco
     axes.grid(alpha=0.3)
 
 
-def _place(axes: Axes, one: Recognition, chosen: list[int], colour: Any, alpha: float) -> None:
-    place = one.estimate.theta[chosen]
-    add_ellipse(axes, place, one.estimate.covariance[np.ix_(chosen, chosen)], colour, alpha=alpha, lw=0)
-    axes.plot(*place, "o", color=colour, markersize=4)
+def _point(axes: Axes, one: Recognition, chosen: list[int], colour: Any, alpha: float) -> None:
+    position = one.estimate.theta[chosen]
+    add_ellipse(axes, position, one.estimate.covariance[np.ix_(chosen, chosen)], colour, alpha=alpha, lw=0)
+    axes.plot(*position, "o", color=colour, markersize=4)
     if one.labelled is not None:
         label = one.labelled[chosen]
         axes.plot(*label, "x", color=INK, markersize=6)
-        axes.plot(*zip(place, label, strict=True), color=colour, linewidth=0.7)
+        axes.plot(*zip(position, label, strict=True), color=colour, linewidth=0.7)
 
 
 def _interval(axes: Axes, one: Recognition, number: int, colour: Any) -> None:
@@ -117,41 +119,43 @@ def _interval(axes: Axes, one: Recognition, number: int, colour: Any) -> None:
         axes.plot(one.labelled[0], number, "x", color=INK, markersize=6)
 
 
-def _posterior(axes: Axes, found: Recognition) -> None:
-    names = list(found.posterior)
+def _posterior(axes: Axes, recognition: Recognition) -> None:
+    names = list(recognition.posterior)
     height = min(0.8, 0.2 * len(names))
-    axes.barh(range(len(names)), [100.0 * found.posterior[name] for name in names], height, color=ACTION_COLOURS[0])
+    axes.barh(
+        range(len(names)), [100.0 * recognition.posterior[name] for name in names], height, color=ACTION_COLOURS[0]
+    )
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.set(xlim=(0, 100), xlabel="probability, %")
     axes.invert_yaxis()
-    if found.p_value is None:
-        told, colour = "no p-value from this model", INK
+    if recognition.p_value is None:
+        title, colour = "no p-value from this model", INK
     else:
-        told = f"p-value {percent(found.p_value)}" + ("" if found.known else ": none of the known")
-        colour = INK if found.p_value >= SIGNIFICANCE_LEVEL else WARN
-    axes.set_title(told, fontsize=10, color=colour)
+        title = f"p-value {percent(recognition.p_value)}" + ("" if recognition.known else ": rejected")
+        colour = INK if recognition.p_value >= SIGNIFICANCE_LEVEL else WARN
+    axes.set_title(title, fontsize=10, color=colour)
 
 
 def _matrix(axes: Axes, table: dict[str, dict[str, int]], columns: Sequence[str]) -> None:
     rows = sorted(table)
     counts = np.array([[table[row].get(column, 0) for column in columns] for row in rows])
-    shares = counts / counts.sum(axis=1, keepdims=True)
-    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    fractions = counts / counts.sum(axis=1, keepdims=True)
+    axes.imshow(fractions, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     for (row, column), count in np.ndenumerate(counts):
         axes.text(
-            column, row, str(count), ha="center", va="center", color="white" if shares[row, column] > 0.6 else INK
+            column, row, str(count), ha="center", va="center", color="white" if fractions[row, column] > 0.6 else INK
         )
     axes.set_xticks(range(len(columns)), columns)
     axes.set_yticks(range(len(rows)), rows)
-    axes.set(xlabel="taken for", ylabel="labelled")
+    axes.set(xlabel="recognised", ylabel="labelled")
     axes.set_title("confusion", fontsize=10)
 
 
-def _counts(axes: Axes, found: Sequence[Recognition]) -> None:
-    taken = [one.action if one.known else "none" for one in found]
-    names = sorted(set(taken))
-    axes.barh(range(len(names)), [taken.count(name) for name in names], color=ACTION_COLOURS[0], alpha=0.75)
+def _counts(axes: Axes, recognitions: Sequence[Recognition]) -> None:
+    recognised = [one.action if one.known else "none" for one in recognitions]
+    names = sorted(set(recognised))
+    axes.barh(range(len(names)), [recognised.count(name) for name in names], color=ACTION_COLOURS[0], alpha=0.75)
     axes.set_yticks(range(len(names)), names)
     axes.set_xlabel("movements")
-    axes.set_title("taken for", fontsize=10)
+    axes.set_title("recognised", fontsize=10)

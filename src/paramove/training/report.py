@@ -1,4 +1,4 @@
-"""The report of a training: one HTML file that needs no other."""
+"""The report of a training: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WORST = 8
 
 
 def write_training_report(trained: Sequence[Trained], path: Path, remarks: Sequence[str] = ()) -> None:
-    """Write what was trained, how it went, what the models know, and how well they do on what they have not seen."""
+    """Write what was trained, how training went, what the models have learned, and their cross-validation."""
     title = "Trained: " + ", ".join(one.action for one in trained)
     about = f"{sum(len(one.examples) for one in trained)} movements of {trained[0].examples.source or 'a set'}"
     parts = [
@@ -34,7 +34,7 @@ def write_training_report(trained: Sequence[Trained], path: Path, remarks: Seque
 
 
 def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    """What training did, as names and values for people."""
+    """Result of training, as names and values for people."""
     low_high = [f"{with_unit(name)}: {low:.3g} to {high:.3g}" for name, (low, high) in facts["bounds"].items()]
     persons = f" of {len(facts['persons'])} persons" if len(facts["persons"]) > 1 else ""
     rows = [
@@ -43,7 +43,7 @@ def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
                       f"{facts['rate_hz']:g} Hz"),
         ("theta", "; ".join(low_high)),
         ("states", f"{facts['states']} of {facts['frames_per_state'][0]} to {facts['frames_per_state'][1]} frames; "
-                   f"every movement brought to {facts['resampled_frames']} frames"),
+                   f"every movement resampled to {facts['resampled_frames']} frames"),
     ]  # fmt: skip
     if "iterations" in facts:
         how = "converged" if facts["converged"] else "not yet converged"
@@ -60,7 +60,7 @@ def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def left_out_sentences(left: dict[str, Any]) -> list[tuple[str, str]]:
-    """How well models do on movements they have not seen, as names and values for people."""
+    """Result of cross-validation, as names and values for people."""
     group = {"theta": "each theta", "subject": "each person", "repetition": "each repetition"}[left["left_out"]]
     if "theta_median_m" in left:
         theta = f"median {100 * left['theta_median_m']:.2g} cm, 95 % below {100 * left['theta_p95_m']:.2g} cm"
@@ -68,7 +68,7 @@ def left_out_sentences(left: dict[str, Any]) -> list[tuple[str, str]]:
         theta = ", ".join(f"{name}: {value:.3g} RMS" for name, value in left["theta_rms"].items())
     outside = left["outside_the_training"]
     return [
-        (f"without {group}", f"{left['folds']} trainings, {left['movements']} movements asked"
+        (f"without {group}", f"{left['folds']} trainings, {left['movements']} movements tested"
          + (f", {outside} of them outside the other thetas" if outside else "")),
         ("  error of theta", f"{theta}; {100 * left['theta_covered']:.0f} % of the 95 % regions hold the label"),
         ("  error of synthesis", f"median {100 * left['synthesis_median_m']:.2g} cm, 95 % below "
@@ -81,13 +81,13 @@ def _section(trained: Trained) -> str:
         f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in sentences(trained.facts())
     )
     parts = [f"<section><h2>{escape(trained.action)}</h2><table>{rows}</table></section>"]
-    parts.append(_picture("What the model knows", "State means over a raster of theta, their scatter, how long states "
-                          "last, and where in the movement theta is visible.", plot_model(trained.model)))  # fmt: skip
+    parts.append(_picture("What the model has learned", "State means over a grid of theta, their scatter, how long "
+                          "states last, and where theta is visible.", plot_model(trained.model)))  # fmt: skip
     parts.append(_picture("How training went", "Log-likelihood per frame after each iteration.", _curve(trained)))
     if trained.left_out is not None:
         parts.append(_picture(
-            "Movements it has not seen", "Left the estimates of theta (dots) and the labels (crosses); right the error "
-            "of synthesis of each movement. Red: outside the other thetas, extrapolated.",
+            "Movements that were left out", "Left the estimates of theta (dots) and the labels (crosses); right the "
+            "error of synthesis of each movement. Red: outside the other thetas, extrapolated.",
             _left_out(trained, trained.left_out),
         ))  # fmt: skip
         parts.append(_worst(trained, trained.left_out))
@@ -97,8 +97,8 @@ def _section(trained: Trained) -> str:
 def _picture(title: str, why: str, figure: Figure) -> str:
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=DPI)
-    shown = image(file.getvalue(), title)
-    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{shown}</section>"
+    tag = image(file.getvalue(), title)
+    return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p>{tag}</section>"
 
 
 def _curve(trained: Trained) -> Figure:
@@ -149,10 +149,10 @@ def _worst(trained: Trained, result: LeaveOutResult) -> str:
             for true, estimated in zip(one.theta, one.estimated, strict=True)
         )
         person = escape(trained.examples.subjects[one.number]) or "–"
-        where = "outside" if one.outside else "inside"
+        region = "outside" if one.outside else "inside"
         lines.append(
             f"<tr><td>{one.number}</td><td>{person}</td>{cells}<td class=n>{100 * one.synthesis:.2f}</td>"
-            f"<td>{where}</td></tr>"
+            f"<td>{region}</td></tr>"
         )
     return (
         "<section><h2>The worst of them</h2><p class=why>Labelled → estimated theta.</p><div class=scroll><table>"

@@ -1,4 +1,4 @@
-"""Models trained from examples, written to files, with what is worth telling about them."""
+"""Models trained from examples and written to files, with facts about their training."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from paramove.training.leaving_out import LeaveOutResult, LeftOutBy, leave_out
 
 Make = Callable[[], ParametricHMM]
 FACTS_ENDING = ".training.json"
-"""Of the file beside a model that tells how it was trained and how well such models do on what they have not seen."""
+"""Of the file next to a model with facts about its training and cross-validation."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Trained:
     Attributes:
         model: trained.
         examples: what it was trained with.
-        seconds: how long that took.
+        seconds: duration of the training.
         file: where it was written.
-        left_out: how well such models do on what they have not seen; None if that was not asked.
+        left_out: result of the cross-validation; None if there was none.
     """
 
     model: ParametricHMM
@@ -76,7 +76,7 @@ class Trained:
 
 
 def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) -> list[Trained]:
-    """Train and write: of one action a model file, of several a folder with the classifier of all.
+    """Train and write: for one action a model file, for several a folder with the classifier of all.
 
     Args:
         examples: of all actions.
@@ -103,23 +103,23 @@ def train_and_write(examples: Examples, make: Mapping[str, Make], goal: Path) ->
             Trained(model, examples.of_action(action), seconds, files[action])
             for action, model in classifier.models_.items()
         ]
-    for told in trained:
-        _write_facts(told)
+    for one_trained in trained:
+        _write_facts(one_trained)
     return trained
 
 
 def with_check(trained: Trained, make: Make, by: LeftOutBy, finished: Callable[[int, int], None]) -> Trained:
-    """The same, with what models that do not know a group of movements make of it (`leave_out`); also written."""
+    """The same with the result of the cross-validation (`leave_out`), which is also written."""
     checked = replace(trained, left_out=leave_out(trained.examples, make, by, finished))
     _write_facts(checked)
     return checked
 
 
 def told_of(file: Path) -> dict[str, Any] | None:
-    """What was written when the model in a file was trained; None if that is not known, or is of another file."""
-    beside = file.with_suffix(FACTS_ENDING)
+    """Facts that were written when the model in a file was trained; None if they are missing or of another file."""
+    facts_file = file.with_suffix(FACTS_ENDING)
     try:
-        facts = json.loads(beside.read_text(encoding="utf-8"))
+        facts = json.loads(facts_file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     if not isinstance(facts, dict) or facts.get("sha256") != checksum(file):
@@ -134,6 +134,6 @@ def checksum(file: Path) -> str:
 
 def _write_facts(trained: Trained) -> None:
     facts = trained.facts() | {"sha256": checksum(trained.file)}
-    beside = trained.file.with_suffix(FACTS_ENDING)
-    with replacing(beside) as unfinished:
+    facts_file = trained.file.with_suffix(FACTS_ENDING)
+    with replacing(facts_file) as unfinished:
         unfinished.write_text(json.dumps(facts, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

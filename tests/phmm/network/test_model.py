@@ -57,7 +57,7 @@ def test_no_other_outer_weights_make_q_greater(seed: int, dimension: int, alike:
 
     def loss(networks: StateNetworks) -> float:
         missed = targets.rotated - np.einsum(
-            "nde,kne->knd", targets.rotation, networks.means(targets.places, targets.features)
+            "nde,kne->knd", targets.rotation, networks.means(targets.positions, targets.features)
         )
         columns = targets.rotation @ np.concatenate([networks.skip, networks.outer], axis=2)
         total = (targets.weights[:, :, None] * targets.precision * missed**2).sum() + (targets.ridge * columns**2).sum()

@@ -1,4 +1,4 @@
-"""How many hidden units the networks of a NeuralPHMM need, and how strongly they are held back: by cross validation.
+"""Number of hidden units and weight decay of the networks of a NeuralPHMM, chosen by cross-validation.
 
 Groups of movements are left out (thesis 3.3.2.1), while the alignment of frames and states stays that of all.
 """
@@ -15,11 +15,11 @@ from paramove.phmm.network.networks import StateNetworks, StateTargets, drawn_in
 
 NUMBERS_OF_UNITS = (1, 2, 4, 8)
 DECAYS = (1e-4, 1e-2)
-"""Ridge of the outer weights, as a share of the number of movements."""
+"""Ridge of the outer weights, as a fraction of the number of movements."""
 MAX_FOLDS = 5
 STEPS = 40
 WORTH = 0.05
-"""More units must miss left-out movements by so much less, as a share: noise would choose some as well."""
+"""More units must reduce the error of left-out movements by this fraction; otherwise noise would choose some."""
 
 
 @dataclass(frozen=True)
@@ -37,26 +37,26 @@ def chosen_units(
     """The best number of units, or the best start for a given one.
 
     Args:
-        targets: with the ridge of the skip's columns alone. groups: number of the group of each target, (K,).
-        units: their number, or None and the fewest that there may be.
+        targets: with the ridge of the skip's columns only. groups: number of the group of each target, (K,).
+        units: their number, or None and the minimum.
     """
-    n_hidden, fewest = units
+    n_hidden, minimum = units
     targets, groups = _condensed(targets, groups)
     rng = np.random.default_rng(seed)
     n_groups = len(np.unique(groups))
-    shape = targets.weights.shape[1], targets.places.shape[1]
+    shape = targets.weights.shape[1], targets.positions.shape[1]
     if n_hidden is None and n_groups < 4:
-        n_hidden = fewest  # nothing says that the rest is not noise
+        n_hidden = minimum  # the rest may be noise
     numbers = NUMBERS_OF_UNITS if n_hidden is None else (n_hidden,)
     best = Choice(0, DECAYS[0], np.zeros((shape[0], 0, shape[1] + 1)))
-    known = _left_out_errors(targets, groups, best) if n_hidden is None and fewest == 0 else None
+    known = _left_out_errors(targets, groups, best) if n_hidden is None and minimum == 0 else None
     for number in numbers if n_hidden != 0 else ():
         if n_hidden is None and number > 2 * max(1, best.n_hidden):
-            break  # half as many were not worth it
+            break  # half as many did not help
         starts = [drawn_inner(shape[0], number, shape[1], rng) for _ in range(max(1, n_restarts))]
         for decay in DECAYS:
             choice, start = _trained(targets, Choice(number, decay, starts[0]), starts)
-            # Left-out groups must not be known to the start either, so it is the drawn one again.
+            # The start must not depend on left-out groups either, so it is the drawn one again.
             again = replace(choice, inner=start)
             errors = _left_out_errors(targets, groups, again) if n_groups > 1 else np.array([-decay])
             if known is None or _better(errors, known, more=number > best.n_hidden):
@@ -66,13 +66,13 @@ def chosen_units(
 
 def with_decay(targets: StateTargets, choice: Choice) -> StateTargets:
     """The targets with the ridge of the outer weights too."""
-    held = np.full(choice.n_hidden, choice.decay * float(targets.weights.sum(axis=0).mean()))
-    return replace(targets, ridge=np.concatenate([targets.ridge, held]))
+    decay = np.full(choice.n_hidden, choice.decay * float(targets.weights.sum(axis=0).mean()))
+    return replace(targets, ridge=np.concatenate([targets.ridge, decay]))
 
 
 def _condensed(targets: StateTargets, groups: Ints) -> tuple[StateTargets, Ints]:
-    """The same targets with those of one theta and group made one: Q changes by a constant."""
-    kinds = np.column_stack([np.round(targets.places, 9), groups])
+    """The same targets with those of one theta and group merged: Q changes by a constant."""
+    kinds = np.column_stack([np.round(targets.positions, 9), groups])
     _, first, number = np.unique(kinds, axis=0, return_index=True, return_inverse=True)
     chosen = np.zeros((len(first), len(groups)))
     chosen[number.reshape(-1), np.arange(len(groups))] = 1.0
@@ -80,13 +80,13 @@ def _condensed(targets: StateTargets, groups: Ints) -> tuple[StateTargets, Ints]
     total = np.einsum("mk,kn,knd->mnd", chosen, targets.weights, targets.rotated, optimize=True)
     rotated = total / np.maximum(weights, 1e-300)[:, :, None]
     together = replace(
-        targets, places=targets.places[first], features=targets.features[first], weights=weights, rotated=rotated
+        targets, positions=targets.positions[first], features=targets.features[first], weights=weights, rotated=rotated
     )
     return together, groups[first]
 
 
 def _trained(targets: StateTargets, choice: Choice, starts: list[Floats]) -> tuple[Choice, Floats]:
-    """The choice with the best of what is reached from the starts, and that start."""
+    """The choice with the best result from the starts, and that start."""
     whole = with_decay(targets, choice)
     reached = [whole.improved(start, STEPS) for start in starts]
     losses = [whole.loss_and_gradient(inner)[0] for inner in reached]
@@ -110,20 +110,20 @@ def _better(errors: Floats, known: Floats, more: bool) -> bool:
 def _left_out_errors(targets: StateTargets, groups: Ints, choice: Choice) -> Floats:
     """Mean over states and dimensions of the logarithm of squared misses, of each left-out fold and of all together.
 
-    Dimensions are those of the movements: which way the targets are turned is arbitrary where covariances are alike.
+    Dimensions are those of the movements: the rotation of the targets is arbitrary where covariances are equal.
     """
     different = np.unique(groups)
     folds = np.searchsorted(different, groups) % MAX_FOLDS
     whole, back = with_decay(targets, choice), np.linalg.inv(targets.rotation)
     missed = []
     for fold in np.unique(folds):
-        seen, tested = folds != fold, folds == fold
-        if not seen.any():
+        training, tested = folds != fold, folds == fold
+        if not training.any():
             continue
-        part = _part(whole, seen)
-        found = part.networks(part.improved(choice.inner, STEPS))
-        turned = targets.rotated[tested] - _rotated_means(found, _part(whole, tested))
-        squared = np.einsum("nde,kne->knd", back, turned) ** 2
+        part = _part(whole, training)
+        networks = part.networks(part.improved(choice.inner, STEPS))
+        rotated_errors = targets.rotated[tested] - _rotated_means(networks, _part(whole, tested))
+        squared = np.einsum("nde,kne->knd", back, rotated_errors) ** 2
         missed.append((squared * targets.weights[tested][:, :, None]).sum(axis=0))
     everything = np.stack([*missed, np.sum(missed, axis=0)])
     return np.asarray(np.log(everything + 1e-300).mean(axis=(1, 2)))
@@ -132,7 +132,7 @@ def _left_out_errors(targets: StateTargets, groups: Ints, choice: Choice) -> Flo
 def _part(targets: StateTargets, chosen: NDArray[np.bool_]) -> StateTargets:
     return replace(
         targets,
-        places=targets.places[chosen],
+        positions=targets.positions[chosen],
         features=targets.features[chosen],
         weights=targets.weights[chosen],
         rotated=targets.rotated[chosen],
@@ -140,6 +140,6 @@ def _part(targets: StateTargets, chosen: NDArray[np.bool_]) -> StateTargets:
 
 
 def _rotated_means(networks: StateNetworks, targets: StateTargets) -> Floats:
-    means = networks.means(targets.places, targets.features)
+    means = networks.means(targets.positions, targets.features)
     result: Floats = np.einsum("nde,kne->knd", targets.rotation, means)
     return result

@@ -43,22 +43,22 @@ REALIGNMENTS = 2
 class NeuralPHMM(ParametricHMM):
     """Means mu_i = Z_i phi(theta) + W2_i sigma(W1_i theta + b1_i); covariances do not depend on theta.
 
-    The polynomial Z_i phi(theta) beside the network of (3.5) takes what is nearly straight; the network learns the
-    rest. Where movements left out are not predicted better with hidden units, there are none.
+    The polynomial Z_i phi(theta), added to the network of (3.5), models the nearly linear part; the network learns the
+    rest. If hidden units do not improve the prediction of left-out movements, there are none.
 
     Args:
         n_states, d_min, d_max, options, resampled_frames, description: as in `ParametricHMM`.
-        n_hidden: hidden units of each state's network; None: by cross validation over groups (thesis 3.3.2.1).
+        n_hidden: hidden units of each state's network; None: by cross-validation over groups (thesis 3.3.2.1).
         skip_degree: of the polynomial; 0 is the network of the thesis alone.
-        gradient_steps: most steps of the networks in an iteration of generalised EM.
-        n_restarts: drawn starts of the networks, of which the best is kept. seed: of the draws.
-        search_margin: how far outside the training's bounds `estimate` looks, as a share of their width.
+        gradient_steps: maximum number of steps of the networks in an iteration of generalised EM.
+        n_restarts: drawn starts of the networks, of which the best is used. seed: of the draws.
+        search_margin: how far outside the training's bounds `estimate` searches, as a fraction of their width.
 
     Attributes:
         networks_: the StateNetworks; of scaled theta.
         n_hidden_: hidden units of each state.
         covariances_: shape (N, D, D). durations_: p_i(d) in column d - 1, shape (N, d_max).
-        performances_: how whole training performances vary.
+        performances_: distribution of whole training executions.
     """
 
     def __init__(
@@ -100,36 +100,36 @@ class NeuralPHMM(ParametricHMM):
         options = self._training_options()
         aligned, polynomial = self._aligned(data, options)
         monomials = _monomials(self.skip_degree, data.theta)
-        places, features = (data.theta - monomials.centre) / monomials.scale, monomials.at(data.theta)
+        positions, features = (data.theta - monomials.centre) / monomials.scale, monomials.at(data.theta)
         begin = NetworkParameters(
             StateNetworks(np.zeros((0, 0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0))),
             aligned.covariances, aligned.durations, self.d_min,
         )  # fmt: skip
         means = np.einsum("ndf,kf->knd", aligned.coefficients, polynomial.at(data.theta))
-        found = SequenceMoments.gathered(begin, data.sequences, means)
-        metric = found.squared.sum(axis=0) / found.weights.sum()
+        moments = SequenceMoments.gathered(begin, data.sequences, means)
+        metric = moments.squared.sum(axis=0) / moments.weights.sum()
         metric = metric + 1e-6 * np.trace(metric) / len(metric) * np.eye(len(metric))
-        frames = float(found.weights.sum(axis=0).mean())
+        frames = float(moments.weights.sum(axis=0).mean())
         ridge = np.zeros(len(monomials))
         if self.skip_degree > 0:
-            flat = found.averages.reshape(len(places), -1)
+            flat = moments.averages.reshape(len(positions), -1)
             strengths = np.array([0.0, *chosen_ridge(flat, features, monomials.degrees, data.groups)])
             ridge = frames * strengths[monomials.degrees]
-        alike = np.broadcast_to(metric, aligned.covariances.shape)
-        targets = NetworkPrior(metric, ridge).targets(places, features, found, alike)
-        fewest = 1 if self.skip_degree == 0 else 0
-        choice = chosen_units(targets, data.groups, (self.n_hidden, fewest), self.n_restarts, self.seed)
+        same = np.broadcast_to(metric, aligned.covariances.shape)
+        targets = NetworkPrior(metric, ridge).targets(positions, features, moments, same)
+        minimum = 1 if self.skip_degree == 0 else 0
+        choice = chosen_units(targets, data.groups, (self.n_hidden, minimum), self.n_restarts, self.seed)
         targets = with_decay(targets, choice)
         begin = NetworkParameters(targets.networks(choice.inner), aligned.covariances, aligned.durations, self.d_min)
         prior = NetworkPrior(metric, targets.ridge)
         trained, self.training_ = train_networks(
-            begin, prior, data.sequences, places, features, options, self.gradient_steps
+            begin, prior, data.sequences, positions, features, options, self.gradient_steps
         )
         self._set_learned(monomials, trained.networks, trained.covariances, trained.durations)
-        self.performances_ = self._performances(data, places, features, prior.ridge)
+        self.performances_ = self._performances(data, positions, features, prior.ridge)
 
     def _aligned(self, data: TrainingData, options: TrainingOptions) -> tuple[RegressedParameters, Monomials]:
-        """A polynomial model that says which frames belong to which states."""
+        """A polynomial model that aligns frames and states."""
         monomials = _monomials(max(1, self.skip_degree), data.theta)
         begin = equal_segments(data.sequences, self.n_states, self.d_min, self.d_max, options)
         coefficients = np.zeros((*begin.means.shape, len(monomials)))
@@ -139,19 +139,21 @@ class NeuralPHMM(ParametricHMM):
         trained, _ = train_regressed(initial, data.sequences, features, monomials.degrees, options, SMOOTHNESS)
         return trained, monomials
 
-    def _performances(self, data: TrainingData, places: Floats, features: Floats, ridge: Floats) -> NetworkPerformances:
+    def _performances(
+        self, data: TrainingData, positions: Floats, features: Floats, ridge: Floats
+    ) -> NetworkPerformances:
         learned = NetworkParameters(self.networks_, self.covariances_, self.durations_, self.d_min)
-        found = SequenceMoments.gathered(learned, data.sequences, self.networks_.means(places, features))
-        jacobians = np.stack([self._jacobian(place) for place in places])
-        averages = np.concatenate([found.averages, [sequence[-1:] for sequence in data.sequences]], axis=1)
-        shown = StateAverages(places, features, jacobians, averages, found.weights, ridge, data.groups)
-        return NetworkPerformances.fitted(shown, self.networks_.inner)
+        moments = SequenceMoments.gathered(learned, data.sequences, self.networks_.means(positions, features))
+        jacobians = np.stack([self._jacobian(position) for position in positions])
+        averages = np.concatenate([moments.averages, [sequence[-1:] for sequence in data.sequences]], axis=1)
+        observed = StateAverages(positions, features, jacobians, averages, moments.weights, ridge, data.groups)
+        return NetworkPerformances.fitted(observed, self.networks_.inner)
 
     def _set_learned(
         self, monomials: Monomials, networks: StateNetworks, covariances: Floats, durations: Floats
     ) -> None:
         self.monomials_ = monomials
-        # Contiguous, as a file gives them back: sums in another order differ in the last bits.
+        # Contiguous, as after reading a file: sums in another order differ in the last bits.
         arrays = (np.ascontiguousarray(one) for one in (networks.skip, networks.outer, networks.inner))
         self.networks_ = StateNetworks(*arrays)
         self.n_hidden_ = networks.inner.shape[1]
@@ -180,10 +182,10 @@ class NeuralPHMM(ParametricHMM):
     def estimate(self, sequence: ArrayLike, *, finished: bool = True) -> ParameterEstimate:
         """Theta of a complete movement and its covariance.
 
-        Maximum likelihood by generalised EM from several starts (thesis 3.3.2.2) tells where the states are; theta then
-        follows from their averages, by how whole training performances differ from their means.
+        Maximum likelihood by generalised EM from several starts (thesis 3.3.2.2) aligns the states; theta then follows
+        from their averages, by the distribution of whole training executions about their means.
 
-        Raises ValueError for `finished=False`: networks of complete movements know nothing of beginnings.
+        Raises ValueError for `finished=False`: networks of complete movements do not model beginnings.
         """
         if not finished:
             raise ValueError("a NeuralPHMM estimates theta of complete movements; a QuadraticPHMM also of beginnings")
@@ -198,22 +200,22 @@ class NeuralPHMM(ParametricHMM):
         theta = self.monomials_.centre + scale * best
         return ParameterEstimate(theta, covariance * np.outer(scale, scale), self._value(best, prepared))
 
-    def _refined(self, place: Floats, checked: Floats) -> tuple[Floats, Floats]:
-        """Scaled theta by whole performances, beginning with the likeliest, and its covariance."""
+    def _refined(self, position: Floats, checked: Floats) -> tuple[Floats, Floats]:
+        """Scaled theta from the distribution of whole executions, starting from the likeliest, and its covariance."""
         for _ in range(REALIGNMENTS):
-            evaluator = replace(self._common(), means=self._means_and_slopes(place)[0])
+            evaluator = replace(self._common(), means=self._means_and_slopes(position)[0])
             averages, weights = state_averages(evaluator.expectation(checked)[1].T, checked)
             observed = parts_of(np.concatenate([averages, checked[-1:]]), weights)
             missed = partial(self._missed, observed, weights)
-            place, covariance = self.performances_.nearest(place, self._widest, missed)
-        return place, covariance
+            position, covariance = self.performances_.nearest(position, self._widest, missed)
+        return position, covariance
 
-    def _missed(self, observed: Floats, weights: Floats, place: Floats) -> tuple[Floats, Floats]:
-        """Parts of a movement (n,) minus those of the networks at a place, and the slopes of the latter (n, P)."""
-        last, jacobian = self.performances_.last, self._jacobian(place)
-        means, slopes = self._means_and_slopes(place)
-        end = last.means(place[None], self._features(place)[None])[0]
-        slopes = np.concatenate([slopes, last.slopes(place, jacobian)])
+    def _missed(self, observed: Floats, weights: Floats, position: Floats) -> tuple[Floats, Floats]:
+        """Parts of a movement (n,) minus those of the networks at a position, and the slopes of the latter (n, P)."""
+        last, jacobian = self.performances_.last, self._jacobian(position)
+        means, slopes = self._means_and_slopes(position)
+        end = last.means(position[None], self._features(position)[None])[0]
+        slopes = np.concatenate([slopes, last.slopes(position, jacobian)])
         wide = np.stack([parts_of(one, weights) for one in np.moveaxis(slopes, 2, 0)], axis=1)
         return observed - parts_of(np.concatenate([means, end]), weights), wide
 
@@ -222,65 +224,65 @@ class NeuralPHMM(ParametricHMM):
         return 1.0 + 2.0 * self.search_margin
 
     def _starts(self) -> Floats:
-        """A raster over the bounds of the training, finer where theta has few components. Shape (S, P)."""
+        """A grid over the bounds of the training, finer where theta has few components. Shape (S, P)."""
         dimension = len(self.monomials_.centre)
         lines = max(2, int(MAX_STARTS ** (1.0 / dimension) + 1e-9))
         line = np.linspace(-1.0, 1.0, 2 * lines + 1)[1::2]
         return np.array(list(itertools.product(line, repeat=dimension)) if dimension < 6 else [np.zeros(dimension)])
 
-    def _climbed(self, place: Floats, prepared: search_kernels.Movement) -> tuple[Floats, float]:
+    def _climbed(self, position: Floats, prepared: search_kernels.Movement) -> tuple[Floats, float]:
         """Gauss-Newton steps with exact gradients, shortened while the likelihood would fall, within the bounds."""
-        bounds = np.full(len(place), self._widest)
-        value, gradient, information = self._expectation(place, prepared)
+        bounds = np.full(len(position), self._widest)
+        value, gradient, information = self._expectation(position, prepared)
         for _ in range(MAX_STEPS):
-            step = search_kernels.bounded_step(place, gradient, information, -bounds, bounds)
-            for share in 0.4 ** np.arange(8):
-                candidate = np.clip(place + share * step, -bounds, bounds)
-                found = self._expectation(candidate, prepared)
-                if found[0] >= value:
+            step = search_kernels.bounded_step(position, gradient, information, -bounds, bounds)
+            for fraction in 0.4 ** np.arange(8):
+                candidate = np.clip(position + fraction * step, -bounds, bounds)
+                candidate_result = self._expectation(candidate, prepared)
+                if candidate_result[0] >= value:
                     break
             else:
                 break
-            gain, place = found[0] - value, candidate
-            value, gradient, information = found
+            gain, position = candidate_result[0] - value, candidate
+            value, gradient, information = candidate_result
             if gain < TOLERANCE:
                 break
-        return place, value
+        return position, value
 
-    def _expectation(self, place: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
-        """ln p, its gradient and the information of the means in scaled theta, at one place.
+    def _expectation(self, position: Floats, prepared: search_kernels.Movement) -> tuple[float, Floats, Floats]:
+        """ln p, its gradient and the information of the means in scaled theta, at one position.
 
-        At a place the means and their slopes are those of a linear model, and so are value and derivatives.
+        At one position the means and their slopes are those of a linear model, and so are value and derivatives.
         """
-        means, slopes = self._means_and_slopes(place)
-        linear = np.concatenate([(means - slopes @ place)[..., None], slopes], axis=2)
-        exponents = np.concatenate([np.zeros((1, len(place)), np.int64), np.eye(len(place), dtype=np.int64)])
+        means, slopes = self._means_and_slopes(position)
+        linear = np.concatenate([(means - slopes @ position)[..., None], slopes], axis=2)
+        exponents = np.concatenate([np.zeros((1, len(position)), np.int64), np.eye(len(position), dtype=np.int64)])
         own = prepared._replace(white=np.ascontiguousarray(prepared.white @ linear), exponents=exponents)
-        value, gradient, information = search_kernels.expectation_at(place, own)
+        value, gradient, information = search_kernels.expectation_at(position, own)
         return float(value), gradient, information
 
-    def _value(self, place: Floats, prepared: search_kernels.Movement) -> float:
-        means = self.networks_.means(place[None], self._features(place)[None])[0]
+    def _value(self, position: Floats, prepared: search_kernels.Movement) -> float:
+        means = self.networks_.means(position[None], self._features(position)[None])[0]
         own = prepared._replace(
             white=np.ascontiguousarray(prepared.white @ means[..., None]),
-            exponents=np.zeros((1, len(place)), np.int64),
+            exponents=np.zeros((1, len(position)), np.int64),
         )
-        return float(search_kernels.log_likelihood_at(place, own))
+        return float(search_kernels.log_likelihood_at(position, own))
 
-    def _means_and_slopes(self, place: Floats) -> tuple[Floats, Floats]:
-        means = self.networks_.means(place[None], self._features(place)[None])[0]
-        return means, self.networks_.slopes(place, self._jacobian(place))
+    def _means_and_slopes(self, position: Floats) -> tuple[Floats, Floats]:
+        means = self.networks_.means(position[None], self._features(position)[None])[0]
+        return means, self.networks_.slopes(position, self._jacobian(position))
 
-    def _jacobian(self, place: Floats) -> Floats:
+    def _jacobian(self, position: Floats) -> Floats:
         """Slopes of the monomials in scaled theta. Shape (F, P)."""
-        theta = self.monomials_.centre + self.monomials_.scale * place
+        theta = self.monomials_.centre + self.monomials_.scale * position
         return self.monomials_.jacobian(theta) * self.monomials_.scale
 
-    def _features(self, place: Floats) -> Floats:
-        return self.monomials_.at(self.monomials_.centre + self.monomials_.scale * place)
+    def _features(self, position: Floats) -> Floats:
+        return self.monomials_.at(self.monomials_.centre + self.monomials_.scale * position)
 
     def _prepared(self, sequence: Floats) -> search_kernels.Movement:
-        """What the kernels need beside a place; `white` holds the whitening, and exponents those of no place."""
+        """Input of the kernels except theta; `white` holds the whitening, exponents are empty."""
         evaluator = self._common()
         ends = evaluator.ends(len(sequence))
         frames, rows = search_kernels.whitened_frames(np.ascontiguousarray(sequence.T), evaluator.whitening, ends)

@@ -1,7 +1,7 @@
-"""How whole performances lie about the means of networks, and theta by that: what a NeuralPHMM estimates with.
+"""Distribution of whole executions about the means of networks, by which a NeuralPHMM estimates theta.
 
 As `CorrelatedRegression` for polynomials: a movement is one vector, the averages of its parts and its last frame, about
-what the networks say of them at theta, with a covariance that knows that frames are not independent.
+the predictions of the networks at theta, with a covariance that models dependent frames.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ Missed = Callable[[Floats], tuple[Floats, Floats]]
 
 PARTS = 10
 MAX_STEPS, TOLERANCE = 20, 1e-8
-SHARES = (1.0, 0.4, 0.16, 0.06)
+STEP_FRACTIONS = (1.0, 0.4, 0.16, 0.06)
 
 
 @dataclass(frozen=True)
 class StateAverages:
-    """What training movements show of each state, the last frame as one state more.
+    """Averages of training movements in each state; the last frame counts as a further state.
 
     Attributes:
-        places: scaled theta, (K, P). features: monomials there, (K, F); jacobians: their slopes, (K, F, P).
+        positions: scaled theta, (K, P). features: monomials there, (K, F); jacobians: their slopes, (K, F, P).
         averages: shape (K, N + 1, D). weights: frames in each state, (K, N).
         ridge: of each column of Z and W2, in frames, (F + H,).
         groups: number of the group of each movement, (K,).
     """
 
-    places: Floats
+    positions: Floats
     features: Floats
     jacobians: Floats
     averages: Floats
@@ -54,21 +54,21 @@ class StateAverages:
     def chosen(self, own: Ints) -> StateAverages:
         """Some of the movements."""
         return StateAverages(
-            self.places[own], self.features[own], self.jacobians[own], self.averages[own], self.weights[own],
+            self.positions[own], self.features[own], self.jacobians[own], self.averages[own], self.weights[own],
             self.ridge, self.groups[own],
         )  # fmt: skip
 
     def networks(self, inner: Floats) -> StateNetworks:
-        """Those with these hidden units (N + 1, H, P + 1) that come nearest."""
+        """The best fit with these hidden units (N + 1, H, P + 1)."""
         columns = []
         for i, design in enumerate(self._designs(inner)):
             squares = design.T @ design + self._penalty(i)
             columns.append(np.linalg.solve(squares, design.T @ self.averages[:, i]).T)
-        found, n_features = np.stack(columns), self.features.shape[1]
-        return StateNetworks(found[..., :n_features], found[..., n_features:], inner)
+        weights, n_features = np.stack(columns), self.features.shape[1]
+        return StateNetworks(weights[..., :n_features], weights[..., n_features:], inner)
 
-    def missed_left_out(self, inner: Floats) -> Floats:
-        """Parts of what networks that have not seen a movement's group miss of it. Shape (K, n)."""
+    def residuals_left_out_of_groups(self, inner: Floats) -> Floats:
+        """Parts of the residuals of each movement from networks without its group. Shape (K, n)."""
         missed = np.stack(
             [
                 residuals_left_out(self.averages[:, i], design, self._penalty(i), self.groups)
@@ -88,7 +88,7 @@ class StateAverages:
         return np.diag(self.ridge / frames + 1e-9)
 
     def _designs(self, inner: Floats) -> list[Floats]:
-        hidden = hidden_units(inner, self.places)
+        hidden = hidden_units(inner, self.positions)
         return [np.concatenate([self.features, hidden[:, i]], axis=1) for i in range(len(inner))]
 
 
@@ -99,7 +99,7 @@ class NetworkPerformances:
     Attributes:
         last: network of the last frame, as of one state.
         root: lower triangular L with C = L L', shape (n, n).
-        inflation: factor on covariances of theta that makes regions hold what they promise.
+        inflation: factor on covariances of theta that gives regions their nominal coverage.
     """
 
     last: StateNetworks
@@ -107,49 +107,49 @@ class NetworkPerformances:
     inflation: float
 
     @classmethod
-    def fitted(cls, shown: StateAverages, inner: Floats) -> NetworkPerformances:
+    def fitted(cls, observed: StateAverages, inner: Floats) -> NetworkPerformances:
         """Of networks with these hidden units (N, H, P + 1); the last frame has those of the last state."""
         inner = np.concatenate([inner, inner[-1:]])
-        missed = shown.missed_left_out(inner)
+        missed = observed.residuals_left_out_of_groups(inner)
         deviation = deviations_of(missed)
         folds = [
-            _fold(shown.chosen(others), shown.chosen(tested), tested, inner, deviation)
-            for tested, others in folds_of(shown.groups)
+            _fold(observed.chosen(others), observed.chosen(tested), tested, inner, deviation)
+            for tested, others in folds_of(observed.groups)
         ]
         shrinkage, excess, _, _ = chosen_shrinkage(folds, SHRINKAGES)
-        inflation = inflation_of(excess, shown.places.shape[1], len(np.unique(shown.groups)), minimum=1e-6)
+        inflation = inflation_of(excess, observed.positions.shape[1], len(np.unique(observed.groups)), minimum=1e-6)
         triangle = np.linalg.cholesky(shrunk(missed / deviation, shrinkage))
-        whole = shown.networks(inner)
+        whole = observed.networks(inner)
         last = StateNetworks(*(np.ascontiguousarray(one[-1:]) for one in (whole.skip, whole.outer, whole.inner)))
         return cls(last, np.ascontiguousarray(deviation[:, None] * triangle), inflation)
 
-    def nearest(self, place: Floats, bound: float, missed: Missed) -> tuple[Floats, Floats]:
+    def nearest(self, position: Floats, bound: float, missed: Missed) -> tuple[Floats, Floats]:
         """Scaled theta (P,) whose networks come nearest to a movement, and its widened covariance, both scaled.
 
-        Gauss-Newton steps from `place` within +-`bound`, shortened while the distance would grow.
+        Gauss-Newton steps from `position` within +-`bound`, shortened while the distance would grow.
 
         Args:
-            missed: parts of the movement minus those of the networks at a place, (n,), and slopes of the latter (n, P).
+            missed: parts of the movement minus those of the networks at a position, (n,), and their slopes (n, P).
         """
-        right, wide = self._white(missed(place))
+        right, wide = self._white(missed(position))
         for _ in range(MAX_STEPS):
-            step = np.linalg.solve(wide.T @ wide + np.eye(len(place)) / bound**2, wide.T @ right)
-            for share in SHARES:
-                candidate = np.clip(place + share * step, -bound, bound)
-                found = self._white(missed(candidate))
-                gain = float(right @ right - found[0] @ found[0])
+            step = np.linalg.solve(wide.T @ wide + np.eye(len(position)) / bound**2, wide.T @ right)
+            for fraction in STEP_FRACTIONS:
+                candidate = np.clip(position + fraction * step, -bound, bound)
+                candidate_white = self._white(missed(candidate))
+                gain = float(right @ right - candidate_white[0] @ candidate_white[0])
                 if gain >= 0.0:
                     break
             else:
                 break
-            place, (right, wide) = candidate, found
+            position, (right, wide) = candidate, candidate_white
             if gain < TOLERANCE:
                 break
-        covariance = self.inflation * np.linalg.inv(wide.T @ wide + np.eye(len(place)) / bound**2)
-        return place, covariance.astype(np.float64)
+        covariance = self.inflation * np.linalg.inv(wide.T @ wide + np.eye(len(position)) / bound**2)
+        return position, covariance.astype(np.float64)
 
-    def _white(self, found: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        white: Floats = solve_triangular(self.root, np.column_stack(found), lower=True, check_finite=False)
+    def _white(self, values: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        white: Floats = solve_triangular(self.root, np.column_stack(values), lower=True, check_finite=False)
         return white[:, 0], white[:, 1:]
 
     def arrays(self) -> dict[str, Floats]:
@@ -163,7 +163,7 @@ class NetworkPerformances:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, Floats], networks: StateNetworks) -> NetworkPerformances:
-        """From what `arrays` gave. Raises ValueError for shapes or values that do not fit."""
+        """From the result of `arrays`. Raises ValueError for shapes or values that do not fit."""
         last = StateNetworks(arrays["last_skip"], arrays["last_outer"], networks.inner[-1:])
         root, inflation = arrays["performance_root"], arrays["performance_inflation"]
         n_states, dim, _ = networks.skip.shape
@@ -187,9 +187,11 @@ def parts_of(states: Floats, weights: Floats) -> Floats:
 
 def _fold(others: StateAverages, tested: StateAverages, members: Ints, inner: Floats, deviation: Floats) -> LeftOutFold:
     networks = others.networks(inner)
-    missed = tested.parts(tested.averages - networks.means(tested.places, tested.features))
+    missed = tested.parts(tested.averages - networks.means(tested.positions, tested.features))
     slopes = []
-    for place, jacobian, weights in zip(tested.places, tested.jacobians, tested.weights, strict=True):
-        of_states = np.moveaxis(networks.slopes(place, jacobian), 2, 0)
+    for position, jacobian, weights in zip(tested.positions, tested.jacobians, tested.weights, strict=True):
+        of_states = np.moveaxis(networks.slopes(position, jacobian), 2, 0)
         slopes.append(np.stack([parts_of(one, weights) for one in of_states], axis=1) / deviation[:, None])
-    return LeftOutFold(members, others.missed_left_out(inner) / deviation, missed / deviation, np.stack(slopes))
+    return LeftOutFold(
+        members, others.residuals_left_out_of_groups(inner) / deviation, missed / deviation, np.stack(slopes)
+    )

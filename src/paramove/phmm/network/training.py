@@ -97,7 +97,7 @@ class SequenceMoments:
 
 @dataclass(frozen=True)
 class NetworkPrior:
-    """How strongly Z and W2 are held back, in a metric (D, D) that does not change while covariances do.
+    """Regularisation of Z and W2, in a metric (D, D) that does not change while covariances do.
 
     Attributes:
         metric: a covariance; ridge: of each column of Z and W2, (F + H,).
@@ -110,54 +110,56 @@ class NetworkPrior:
         """Up to a constant."""
         columns = np.concatenate([networks.skip, networks.outer], axis=2)
         pulled = np.linalg.solve(self.metric, columns)
-        held = float((self.ridge * (columns * pulled).sum(axis=(0, 1))).sum())
-        return -0.5 * held - 0.5 * float((networks.inner**2).sum()) / INNER_DEVIATION**2
+        penalty_of_columns = float((self.ridge * (columns * pulled).sum(axis=(0, 1))).sum())
+        return -0.5 * penalty_of_columns - 0.5 * float((networks.inner**2).sum()) / INNER_DEVIATION**2
 
-    def targets(self, places: Floats, features: Floats, found: SequenceMoments, covariances: Floats) -> StateTargets:
-        """What an M-step of the networks has to meet: dimensions turned so that metric and covariance are diagonal."""
+    def targets(
+        self, positions: Floats, features: Floats, moments: SequenceMoments, covariances: Floats
+    ) -> StateTargets:
+        """Targets of an M-step of the networks: dimensions rotated so that metric and covariance are diagonal."""
         rotation, precision = np.empty_like(covariances), np.empty(covariances.shape[:2])
         for i, covariance in enumerate(covariances):
             values, vectors = eigh(covariance, self.metric)  # vectors' metric vectors = 1
             rotation[i], precision[i] = vectors.T, 1.0 / values
-        rotated = np.einsum("nde,kne->knd", rotation, found.averages, optimize=True)
-        return StateTargets(places, features, found.weights, rotated, rotation, precision, self.ridge)
+        rotated = np.einsum("nde,kne->knd", rotation, moments.averages, optimize=True)
+        return StateTargets(positions, features, moments.weights, rotated, rotation, precision, self.ridge)
 
 
 def train_networks(
     initial: NetworkParameters,
     prior: NetworkPrior,
     sequences: Sequence[Floats],
-    places: Floats,
+    positions: Floats,
     features: Floats,
     options: TrainingOptions,
     gradient_steps: int,
 ) -> tuple[NetworkParameters, TrainingSummary]:
-    """Iterate until the objective converges: few gradient steps in each iteration, which raise it but not to the top.
+    """Iterate until the objective converges: few gradient steps in each iteration raise it without maximising it.
 
     Args:
-        initial: whose covariances need no annealing any more.
-        places: scaled theta, (K, P). features: monomials, (K, F).
+        initial: with covariances that need no more annealing.
+        positions: scaled theta, (K, P). features: monomials, (K, F).
     """
     monitor = ConvergenceMonitor(options.tolerance, sum(len(sequence) for sequence in sequences))
     scale = root_mean_deviation(sequences)
     parameters, target = initial, None
     for _ in range(options.max_iterations):
-        found = SequenceMoments.gathered(parameters, sequences, parameters.networks.means(places, features))
+        moments = SequenceMoments.gathered(parameters, sequences, parameters.networks.means(positions, features))
         if target is None:
-            target = pooled_covariance(found.scatter(found.means), found.weights.sum(axis=0))
+            target = pooled_covariance(moments.scatter(moments.means), moments.weights.sum(axis=0))
         regularisation = regularisation_at(AFTER_ANNEALING, options, scale, target)
-        objective = found.log_likelihood + prior.log_density(parameters.networks)
-        objective += penalty(parameters.with_means(found.means[0]), regularisation)
-        monitor.add(found.log_likelihood, objective)
+        objective = moments.log_likelihood + prior.log_density(parameters.networks)
+        objective += penalty(parameters.with_means(moments.means[0]), regularisation)
+        monitor.add(moments.log_likelihood, objective)
         if monitor.converged:
             break
-        targets = prior.targets(places, features, found, parameters.covariances)
+        targets = prior.targets(positions, features, moments, parameters.covariances)
         networks = targets.networks(targets.improved(parameters.networks.inner, gradient_steps))
-        scatter = found.scatter(networks.means(places, features))
+        scatter = moments.scatter(networks.means(positions, features))
         parameters = NetworkParameters(
             networks,
-            covariances_of(scatter, found.weights.sum(axis=0), regularisation),
-            durations_of(found.durations, parameters.d_min, options.duration_pseudocount),
+            covariances_of(scatter, moments.weights.sum(axis=0), regularisation),
+            durations_of(moments.durations, parameters.d_min, options.duration_pseudocount),
             parameters.d_min,
         )
     return parameters, monitor.summary(len(sequences))
