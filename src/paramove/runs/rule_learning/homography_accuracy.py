@@ -13,7 +13,7 @@ from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects import PlaneHomography
 from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.spread import spread
+from paramove.runs.summary_statistics import summary_statistics
 
 GRID_X = (0.135, 0.190)
 GRID_Y = (-0.100, 0.076)
@@ -82,7 +82,7 @@ def grid_error(run: RecordedRun) -> MappedPoints | None:
 
 def calibration_of(run: RecordedRun) -> PlaneHomography | None:
     """The latest homography that the robot published."""
-    said = run.heard(topics.CALIBRATION_PLANE)
+    said = run.received(topics.CALIBRATION_PLANE)
     return PlaneHomography.from_message(said[-1].message) if said else None
 
 
@@ -90,7 +90,7 @@ def seen_at_rest(run: RecordedRun) -> list[SeenAtRest]:
     """Objects said to have appeared or come to rest that truly stood upright on the surface then."""
     truth = run.truth
     found = []
-    for recorded in run.heard(topics.GESTURES):
+    for recorded in run.received(topics.GESTURES):
         gesture = recorded.message
         if gesture.kind not in _AT_REST or not gesture.located or gesture.object not in truth.objects:
             continue
@@ -112,8 +112,8 @@ def accuracy_of(run: RecordedRun) -> dict[str, Any]:
     return {
         "seed": int(run.truth.layout.seed),
         "run_folder": str(run.folder),
-        "grid_mm": spread(grid_mm) | {"p95": p95},
-        "seen_at_rest_mm": spread(item.error_mm for item in seen),
+        "grid_mm": summary_statistics(grid_mm) | {"p95": p95},
+        "seen_at_rest_mm": summary_statistics(item.error_mm for item in seen),
         "seen_at_rest": [
             {
                 "time_s": item.time_s,

@@ -13,7 +13,7 @@ from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import RecordedRun, Truth
 from paramove.runs.relocations import Relocation, stages_of
-from paramove.runs.spread import spread
+from paramove.runs.summary_statistics import summary_statistics
 
 POINTS_AT = "points at "
 """What the instructor does then, before the object's name, in the recorded truth."""
@@ -67,11 +67,11 @@ def pointed_places(run: RecordedRun) -> list[PointedPlace]:
 
     Without tracking in action space there is nothing.
     """
-    if not run.heard(topics.ACTION_ESTIMATE):
+    if not run.received(topics.ACTION_ESTIMATE):
         return []
     said = [
         recorded.message
-        for recorded in run.heard(topics.GESTURES)
+        for recorded in run.received(topics.GESTURES)
         if recorded.message.kind == Gesture.KIND_POINTED_AT and recorded.message.located and not recorded.message.object
     ]
     found = []
@@ -104,8 +104,8 @@ def pointing_summary(places: list[PointedPlace], unasked: Sequence[Relocation]) 
         "pointings_right": sum(place.right for place in pointings),
         "pointings_by_nobody": len(places) - len(pointings),
         "unasked_fetches": [{"time_s": goal.begun_s, "object": goal.goal.object} for goal in unasked],
-        "pointing_error_mm": spread(place.error_mm for place in pointings if place.error_mm is not None),
-        "pointing_error_of_spacing": spread(
+        "pointing_error_mm": summary_statistics(place.error_mm for place in pointings if place.error_mm is not None),
+        "pointing_error_of_spacing": summary_statistics(
             place.error_of_spacing for place in pointings if place.error_of_spacing is not None
         ),
         "pointing_list": [

@@ -20,8 +20,8 @@ from paramove.runs.relocations import Motion, Relocation, motions_of, relocation
 from paramove.runs.rule_learning.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
 from paramove.runs.rule_learning.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
 from paramove.runs.rule_learning.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
-from paramove.runs.spread import spread
-from paramove.runs.traffic import speakers
+from paramove.runs.summary_statistics import summary_statistics
+from paramove.runs.traffic import publishers_of
 from paramove.workspace import Workspace
 
 WHERE = ("inside", "outside")
@@ -86,7 +86,7 @@ class RunEvaluation:
     @cached_property
     def rules(self) -> list[dict[str, Any]]:
         """What the robot believes in the end, beside the truth; one entry for each object that has an opening."""
-        said = self.run.heard(topics.RULES)
+        said = self.run.received(topics.RULES)
         believed = {rule.object: rule for rule in said[-1].message.rules} if said else {}
         truth = self.run.truth
         radius = min((float(o.radius) for o in truth.layout.openings), default=0.0)
@@ -124,11 +124,11 @@ class RunEvaluation:
             "contact_list": unwanted_contacts(run),
             "deepest_penetration_mm": float(truth.penetration_mm[-1]),
             **self._pointing(),
-            "homography_error_mm": spread(self.grid.errors_mm if self.grid is not None else ()),
-            "seen_at_rest_error_mm": spread(item.error_mm for item in self.seen),
+            "homography_error_mm": summary_statistics(self.grid.errors_mm if self.grid is not None else ()),
+            "seen_at_rest_error_mm": summary_statistics(item.error_mm for item in self.seen),
             "gripper_error_commanded_mm": self._gripper_error("commanded_error_mm"),
             "gripper_error_physical_mm": self._gripper_error("physical_error_mm")
-            | {"overall": spread(1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1))},
+            | {"overall": summary_statistics(1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1))},
             "simulated_s": run.end_s,
             "stages": stages_of(run),
             "rules": self.rules,
@@ -138,9 +138,9 @@ class RunEvaluation:
                     "request": Speech.Request.Name(recorded.message.request).removeprefix("REQUEST_").lower(),
                     "sentence": recorded.message.sentence,
                 }
-                for recorded in run.heard(topics.SPEECH)
+                for recorded in run.received(topics.SPEECH)
             ],
-            "topic_rates": run.traffic.rates(speakers(run.folder / "launch.yaml", self.workspace)),
+            "topic_rates": run.traffic.rates(publishers_of(run.folder / "launch.yaml", self.workspace)),
             "loss": run.traffic.loss(),
             "gaps": [{"recording": g.recording, "begin_s": g.begin_s, "end_s": g.end_s} for g in run.gaps],
             "versions": _versions(run.facts),
@@ -176,7 +176,7 @@ class RunEvaluation:
 
     def _gripper_error(self, which: str) -> dict[str, Any]:
         return {
-            kind: spread(getattr(moment, which) for moment in self.moments if moment.kind in kinds)
+            kind: summary_statistics(getattr(moment, which) for moment in self.moments if moment.kind in kinds)
             for kind, kinds in {"grasp": ("grasp",), "place": ("place",), "both": ("grasp", "place")}.items()
         }
 
@@ -211,7 +211,9 @@ class RunEvaluation:
 
     def _wall(self) -> dict[str, Any]:
         facts, verdict = self.run.facts, self.run.verdict
-        latest = {name: messages[-1].message for name, messages in self.run.said.items() if name.startswith("status/")}
+        latest = {
+            name: messages[-1].message for name, messages in self.run.messages.items() if name.startswith("status/")
+        }
         return {
             "realtime_factor": verdict.get("realtime_factor"),
             "seconds": verdict.get("wall_s"),
