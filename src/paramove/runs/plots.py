@@ -124,7 +124,7 @@ def plan(evaluation: RunEvaluation, figure: Figure) -> None:
         if rule["believed"] is not None:
             bx, by = rule["believed"]
             axes.plot(100 * by, 100 * bx, "x", c=colour, ms=9, mew=2.2)
-    for item in evaluation.seen:
+    for item in evaluation.detections:
         colour = COLOURS.get(item.object, OTHER)
         axes.add_patch(Circle((100 * item.true[1], 100 * item.true[0]), 1.0, fill=False, ec=colour, lw=0.8, alpha=0.7))
         axes.plot(100 * item.estimated[1], 100 * item.estimated[0], ".", c=colour, ms=5)
@@ -186,9 +186,9 @@ def motion(evaluation: RunEvaluation, figure: Figure) -> None:
     error = 1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1)
     below.plot(time_s, error[::THINNING], c="#3a4a5e", lw=0.8, label="in the world to commanded")
     for kind, mark in (("grasp", "v"), ("place", "^")):
-        moments = [moment for moment in evaluation.moments if moment.kind == kind]
+        samples = [sample for sample in evaluation.samples if sample.kind == kind]
         below.plot(
-            [m.time_s for m in moments], [m.commanded_error_mm for m in moments], mark, ms=5, label=f"{kind}: to target"
+            [s.time_s for s in samples], [s.commanded_error_mm for s in samples], mark, ms=5, label=f"{kind}: to target"
         )
     below.set_ylabel("gripper\nerror, mm")
     below.set_xlabel("simulated time, s")
