@@ -23,28 +23,28 @@ class Config(NodeConfig, TrackingSetup):
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes. An image that cannot be used is left out and told."""
+    """Loop until the bus closes. An image that cannot be used is skipped and reported."""
     tracker = config.video_tracker(bus.run_folder)
     names, place = tracker.parameter_names, config.table_place
     sentence = f"tracking {', '.join(names)} with {', '.join(tracker.cameras)}"
     bus.ready(sentence)
-    told = tracker.kind_of_trouble
+    reported = tracker.kind_of_trouble
     for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
             tracker.tick(event.now_ns)
         elif (camera := event.topic.name.removesuffix("/image")) in tracker.cameras:
             try:
-                for moment in tracker.see(camera, event.captured_ns, decode(event.message)):
-                    at = moment.captured_ns
-                    bus.publish(topics.ACTION_ESTIMATE, estimate_message(moment, names, config.particles, place), at)
-                    bus.publish(topics.HUMAN_ARM_POSE, arm_pose_message(moment), at)
-                    bus.publish(topics.ACTION_OUTLINE, outline_message(moment), at)
-                    bus.publish(topics.ACTION_SCENE, scene_message(moment, place), at)
+                for estimate in tracker.see(camera, event.captured_ns, decode(event.message)):
+                    at = estimate.captured_ns
+                    bus.publish(topics.ACTION_ESTIMATE, estimate_message(estimate, names, config.particles, place), at)
+                    bus.publish(topics.HUMAN_ARM_POSE, arm_pose_message(estimate), at)
+                    bus.publish(topics.ACTION_OUTLINE, outline_message(estimate), at)
+                    bus.publish(topics.ACTION_SCENE, scene_message(estimate, place), at)
             except FrameError as error:
                 tracker.cannot_see(camera, event.captured_ns, str(error))
         trouble = tracker.trouble()
-        if tracker.kind_of_trouble != told:
-            told = tracker.kind_of_trouble
+        if tracker.kind_of_trouble != reported:
+            reported = tracker.kind_of_trouble
             bus.degraded(trouble) if trouble else bus.ready(sentence)
 
 

@@ -1,4 +1,4 @@
-"""Arm driver: plays trajectories on HOAP-3 through the safety gate, and says where its joints are.
+"""Arm driver: plays trajectories on HOAP-3 through the safety gate, and reports its joints.
 
 Subscribes  arm/trajectory         JointTrajectory        events
             operator/arm           ArmRequest             events, latched

@@ -22,25 +22,25 @@ class Config(NodeConfig, BodyTrackingSetup):
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes. An image that cannot be used is left out and told."""
+    """Loop until the bus closes. An image that cannot be used is skipped and reported."""
     tracking = config.body_tracking(bus.run_folder)
     first = tracking.cameras["camera_1"]
     sentence = f"looking for {', '.join(tracking.point_names)} with {', '.join(tracking.cameras)}"
     bus.ready(sentence)
-    told = ""
+    reported = ""
     for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
             tracking.tick(event.now_ns)
         elif (camera := event.topic.name.removesuffix("/image")) in tracking.cameras:
             try:
-                for moment in tracking.see(camera, event.captured_ns, decode(event.message)):
-                    messages = (arm_pose_message(moment), outline_message(moment, first), scene_message(moment))
+                for pose in tracking.see(camera, event.captured_ns, decode(event.message)):
+                    messages = (arm_pose_message(pose), outline_message(pose, first), scene_message(pose))
                     for topic, message in zip(PUBLISHES, messages, strict=True):
-                        bus.publish(topic, message, moment.captured_ns)
+                        bus.publish(topic, message, pose.captured_ns)
             except FrameError as error:
                 tracking.cannot_see(camera, event.captured_ns, str(error))
-        if (trouble := tracking.trouble()) != told:
-            told = trouble
+        if (trouble := tracking.trouble()) != reported:
+            reported = trouble
             bus.degraded(trouble) if trouble else bus.ready(sentence)
 
 

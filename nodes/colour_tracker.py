@@ -17,20 +17,20 @@ class Config(NodeConfig):
 
 
 def run(bus: Bus, config: Config) -> None:
-    """Loop until the bus closes. An image that cannot be decoded is left out."""
+    """Loop until the bus closes. An image that cannot be decoded is skipped."""
     tracker = ColourTracker(config.colours)
     sentence = f"tracking {', '.join(colour.name for colour in config.colours)}"
     bus.ready(sentence)
     well = True
-    for heard in bus.latest(topics.CAMERA_IMAGE):
+    for received in bus.latest(topics.CAMERA_IMAGE):
         try:
-            image = decode(heard.message)
+            image = decode(received.message)
         except FrameError as error:
             if well:
                 well = False
                 bus.degraded(str(error))
             continue
-        bus.publish(topics.OBJECTS_TRACKED, tracker.update(image, heard.captured_ns), heard.captured_ns)
+        bus.publish(topics.OBJECTS_TRACKED, tracker.update(image, received.captured_ns), received.captured_ns)
         if not well:
             well = True
             bus.ready(sentence)

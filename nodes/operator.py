@@ -32,8 +32,8 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
     operator = Operator(config.arms_at_start, config.arms_at_start and started_before(bus.run_folder, bus.node))
     bus.ready(operator.sentence)
-    for heard in bus.latest(topics.ARM_SAFETY):
-        request = operator.update(heard.message, bus.now_ns)
+    for received in bus.latest(topics.ARM_SAFETY):
+        request = operator.update(received.message, bus.now_ns)
         if request is not None:
             bus.publish(topics.OPERATOR_ARM_AT_START, request)
 

@@ -1,4 +1,4 @@
-"""Recognizer: tells what happens on the table, from tracked objects, and where a tracked arm points.
+"""Recognizer: recognises events on the table, from tracked objects, and where a tracked arm points.
 
 Subscribes  objects/tracked     TrackedObjects     15 Hz   image plane, pixels
             calibration/plane   PlaneCalibration   event   right_shoulder
@@ -37,22 +37,22 @@ def run(bus: Bus, config: Config) -> None:
     pointing = config.pointing_source(bus.run_folder)
     calibration: PlaneCalibration | None = None
     bus.ready("watching objects and hand, not calibrated yet")
-    for heard in bus.events(*SUBSCRIBES):
-        for topic, message in pointing.handle(heard.topic, heard.message):
-            bus.publish(topic, message, heard.captured_ns)
-        if heard.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
+    for received in bus.events(*SUBSCRIBES):
+        for topic, message in pointing.handle(received.topic, received.message):
+            bus.publish(topic, message, received.captured_ns)
+        if received.topic.name in (topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name):
             continue
-        if heard.topic.name == topics.CALIBRATION_PLANE.name:
+        if received.topic.name == topics.CALIBRATION_PLANE.name:
             try:
-                PlaneHomography.from_message(heard.message)
+                PlaneHomography.from_message(received.message)
             except HomographyError as error:
-                bus.degraded(f"calibration refused: {error}")
+                bus.degraded(f"calibration rejected: {error}")
                 continue
-            calibration = heard.message
+            calibration = received.message
             bus.ready("watching objects and hand on the calibrated plane")
             continue
-        for gesture in recognizer.update(heard.message, calibration):
-            bus.publish(topics.GESTURES, gesture, heard.captured_ns)
+        for gesture in recognizer.update(received.message, calibration):
+            bus.publish(topics.GESTURES, gesture, received.captured_ns)
 
 
 if __name__ == "__main__":

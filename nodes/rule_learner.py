@@ -18,7 +18,7 @@ PUBLISHES = (topics.RELOCATION_GOAL, topics.CALIBRATION_PLANE, topics.RULES, top
 
 
 class Config(NodeConfig):
-    """Places in the right shoulder's frame, m; the rest: see `RuleLearnerOptions`."""
+    """Positions in the right shoulder's frame, m; the rest: see `RuleLearnerOptions`."""
 
     old_names = (("arm_patience_s", "arming_timeout_s"),)
 
@@ -35,8 +35,8 @@ class Config(NodeConfig):
 
 def run(bus: Bus, config: Config) -> None:
     """Loop until all objects are put away, the arm is not armed any more, or the bus closes."""
-    places = config.model_dump(exclude={"surface_x", "surface_y"})
-    options = RuleLearnerOptions(**places, surface=Surface(config.surface_x, config.surface_y))
+    positions = config.model_dump(exclude={"surface_x", "surface_y"})
+    options = RuleLearnerOptions(**positions, surface=Surface(config.surface_x, config.surface_y))
     learner = RuleLearner(options, f"goal-{bus.now_ns}")
     handle = (learner.on_gesture, learner.on_goal_status, learner.on_safety)
     bus.ready("waiting for the arm")

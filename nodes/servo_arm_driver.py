@@ -1,4 +1,4 @@
-"""Servo arm driver: plays trajectories on an arm of Dynamixel servos through the safety gate, and says how it fares.
+"""Servo arm driver: plays trajectories on an arm of Dynamixel servos through the safety gate, and reports its status.
 
 Subscribes  arm/trajectory          JointTrajectory        events
             operator/arm            ArmRequest             events, latched
@@ -29,7 +29,7 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes; the arm then comes to rest."""
     launch = ThisLaunch.of(bus.settings, bus.run_folder, bus.node)
     with config.driven_arm(bus.run_folder, launch) as arm:
-        bus.when_readable(arm.readable, lambda: say(bus, arm))
+        bus.when_readable(arm.readable, lambda: publish_all(bus, arm))
         handle = {
             topics.ARM_TRAJECTORY: arm.on_trajectory,
             **dict.fromkeys(topics.ARMINGS, arm.on_arm_request),
@@ -41,8 +41,8 @@ def run(bus: Bus, config: Config) -> None:
             bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.sentence)
 
 
-def say(bus: Bus, arm: DrivenArm) -> None:
-    """Everything that the arm's loop has to say."""
+def publish_all(bus: Bus, arm: DrivenArm) -> None:
+    """Publish all pending messages of the arm's loop."""
     for topic, message, captured_ns in arm.said():
         bus.publish(topic, message, captured_ns)
 

@@ -32,7 +32,7 @@ RENDERED_PX = (WIDTH_PX + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX)
 HEIGHT_OF_SCENE = 0.04
 """Of the human frame's origin over the working plane, about."""
 BOARD_SHIFT, BOARD_TURN = 0.001, 0.003
-"""Greatest errors, m and rad, with which the calibration board was laid on the table; all cameras share them."""
+"""Maximum errors, m and rad, with which the calibration board was laid on the table; all cameras share them."""
 
 
 def draw_arm_cameras(draw: np.random.Generator) -> tuple[CalibratedCamera, ...]:
@@ -49,12 +49,12 @@ def calibrated(cameras: tuple[CalibratedCamera, ...], draw: np.random.Generator)
     table_from_board = np.eye(4)
     table_from_board[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
     table_from_board[:2, 3] = shift
-    found = []
+    calibrated = []
     for camera in cameras:
         one = as_calibrated(camera, draw)
         pose = one.camera_from_world @ table_from_board
-        found.append(CalibratedCamera(one.name, one.width_px, one.height_px, one.matrix, one.distortion, pose))
-    return tuple(found)
+        calibrated.append(CalibratedCamera(one.name, one.width_px, one.height_px, one.matrix, one.distortion, pose))
+    return tuple(calibrated)
 
 
 def add_arm_cameras(spec: mujoco.MjSpec, world_from_shoulder: Floats, cameras: tuple[CalibratedCamera, ...]) -> None:
@@ -96,24 +96,24 @@ class ArmCameras:
 
     def images(self, data: mujoco.MjData) -> list[Image]:
         """One RGB image [240, 320, 3] of each camera."""
-        found = []
+        images = []
         for camera, lens in zip(self._cameras, self._lenses, strict=True):
             image = lens.image(self._eye.look(data, camera.name))
             noise = self._draw.normal(0.0, self._noise, image.shape).round().astype(np.int8)
-            found.append(np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8))
-        return found
+            images.append(np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), dtype=np.uint8))
+        return images
 
     def images_raw(self, data: mujoco.MjData, now_ns: int) -> list[RawImage]:
         """The same as messages."""
-        found = []
+        messages = []
         for camera, image in zip(self._cameras, self.images(data), strict=True):
             message = RawImage(
                 frame_id=camera.name, width=WIDTH_PX, height=HEIGHT_PX, encoding="rgb8", step=3 * WIDTH_PX,
                 data=np.ascontiguousarray(image).tobytes(),
             )  # fmt: skip
             message.timestamp.FromNanoseconds(now_ns)
-            found.append(message)
-        return found
+            messages.append(message)
+        return messages
 
     def close(self) -> None:
         """Gives the graphics context back."""

@@ -1,4 +1,4 @@
-"""An instructor with a whole arm, who points as people do: from the arm's base pose to the place and back."""
+"""An instructor with a whole arm, who points as people do: from the arm's base pose to the target and back."""
 
 from __future__ import annotations
 
@@ -60,15 +60,15 @@ class ArmInstructor(Instructor):
         return self.person.holding(self._fingertip, self._backward, self._elbow_towards)
 
     def handle(self, request: int, name: str = "") -> None:
-        """See `Instructor.hear`. Who is asked to point again while withdrawing the arm points again."""
+        """See `Instructor.handle`. A request that comes while the arm withdraws is answered by pointing again."""
         again = (request, name)
         if self._has_pointed and request == Speech.REQUEST_POINT_AT_OBJECT and again not in self._waiting:
             self._waiting.append(again)
         super().handle(request, name)
 
-    def _point(self, wanted: str) -> Script:
+    def _point(self, requested: str) -> Script:
         self._has_pointed = False
-        yield from super()._point(wanted)
+        yield from super()._point(requested)
         self._has_pointed = False
 
     def point_at_place(self, place: ArrayLike) -> Script:
@@ -104,12 +104,12 @@ class ArmInstructor(Instructor):
 
         def during(time_s: float) -> None:
             reach.during(time_s)
-            share = minimum_jerk(time_s / reach.duration_s)
+            fraction = minimum_jerk(time_s / reach.duration_s)
             held = self.person.holding(self._fingertip, self._backward, before)
             usual = held[ELBOW] - 0.5 * (held[SHOULDER] + held[WRIST])
-            towards = (1.0 - share) * usual + share * bend
+            towards = (1.0 - fraction) * usual + fraction * bend
             held = self.person.holding(self._fingertip, self._backward, towards)
-            self._posture = held + share**4 * (posture - held)
+            self._posture = held + fraction**4 * (posture - held)
 
         yield Step(reach.duration_s, during)
         yield Step(float(self._draw.uniform(*RESTS_BEFORE_S)), during=lambda _: self._take(posture))

@@ -1,4 +1,4 @@
-"""One run of the simulated world whose instructor is a whole arm, seen by calibrated cameras as well."""
+"""One run of the simulated world whose instructor is a whole arm, with calibrated cameras."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class ArmSimulation(Simulation):
         return images_raw
 
     def place_arm(self) -> None:
-        """Brings the arm that is seen into the instructor's posture."""
+        """Brings the rendered arm into the instructor's posture."""
         posture = self._arm_instructor.posture + self.world.world_from_shoulder
         pose = posture[[SHOULDER, ELBOW, TIP]].ravel()
         place_arm(self.world.model, self.world.data, pose, posture[WRIST], PREFIX)
@@ -95,8 +95,8 @@ class ArmSimulation(Simulation):
         """How the arm really is and where it points, in the table frame."""
         instructor = self._arm_instructor
         message = TruthArm(time_ns=self.now_ns)
-        shown = table_from_shoulder(instructor.posture[[SHOULDER, ELBOW, TIP]])
-        for name, (x, y, z) in zip(("shoulder", "elbow", "hand"), shown, strict=True):
+        points = table_from_shoulder(instructor.posture[[SHOULDER, ELBOW, TIP]])
+        for name, (x, y, z) in zip(("shoulder", "elbow", "hand"), points, strict=True):
             message.points.add(name=name, x=x, y=y, z=z)
         if instructor.target is not None:
             message.action, message.performance = "pointing", instructor.pointings
@@ -125,7 +125,7 @@ class ArmSimulation(Simulation):
         return ArmInstructor(self.world, self.looks.rules, draws, self.person, self._stream(POINTING))
 
     def _furnish(self, spec: mujoco.MjSpec, world_from_shoulder: Floats) -> None:
-        """The arm and its cameras; the hand alone, which holds objects, is not seen any more."""
+        """The arm and its cameras; the hand alone, which holds objects, is no longer rendered."""
         for geom in spec.body("hand").geoms:
             geom.group = scene.HIDDEN_GROUP
         look = draw_look(self._stream(LOOK))

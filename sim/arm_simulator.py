@@ -10,7 +10,7 @@ Publishes   clock               Clock               15 Hz
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
             truth/arm           TruthArm            15 Hz   table; only for evaluators
-            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, on request; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`, in the table frame of
 `sim.small_person`.
@@ -57,10 +57,10 @@ def run(bus: Bus, config: Config) -> None:
 
 
 def say_of_arm(bus: Bus, simulation: Simulation, every: int = 1) -> None:
-    """What is true of the arm in this tick, and what is seen of it in every so many ticks."""
+    """The arm's ground truth in this tick, and its images in every `every`-th tick."""
     assert isinstance(simulation, ArmSimulation)
-    seen = simulation.tick % every == 0
-    for topic, image_raw in zip(topics.STEREO_IMAGES_RAW, simulation.arm_images_raw() if seen else [], strict=False):
+    renders = simulation.tick % every == 0
+    for topic, image_raw in zip(topics.STEREO_IMAGES_RAW, simulation.arm_images_raw() if renders else [], strict=False):
         bus.publish(topic, image_raw, simulation.now_ns)
     bus.publish(topics.TRUTH_ARM, simulation.truth_arm(), simulation.now_ns)
 

@@ -45,8 +45,8 @@ def muted(colours: ArrayLike) -> Floats:
     rgb = np.asarray(colours, dtype=np.float64)
     maximum = rgb.max(axis=-1, keepdims=True)
     saturation = (maximum - rgb.min(axis=-1, keepdims=True)) / np.maximum(maximum, 1e-9)
-    share = np.minimum(1.0, MAX_SATURATION / np.maximum(saturation, 1e-9))
-    return np.asarray(maximum + share * (rgb - maximum))
+    fraction = np.minimum(1.0, MAX_SATURATION / np.maximum(saturation, 1e-9))
+    return np.asarray(maximum + fraction * (rgb - maximum))
 
 
 def add_markers(spec: mujoco.MjSpec, sizes: ArmSizes, names: Iterable[str]) -> None:

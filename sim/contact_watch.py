@@ -19,7 +19,7 @@ _THUMB_SIDE = ("thumb_base", "thumb_tip")
 
 @dataclass
 class ContactRecord:
-    """What was found since the start.
+    """Contacts since the start.
 
     Attributes:
         unwanted: Contacts begun between the robot and anything but the object it handles, itself included.
@@ -94,7 +94,7 @@ class ContactWatch:
                 sides.setdefault(touched, set()).add(self._side.get(robot, "other"))
                 if -dist > record.deepest:
                     record.deepest, record.deepest_pair = -dist, self.name_of((robot, other))
-        held = [name for name, found in sides.items() if {"fingers", "thumb"} <= found]
+        held = [name for name, touching in sides.items() if {"fingers", "thumb"} <= touching]
         if held:
             self._held = held[0]
         elif self._held not in sides:

@@ -20,7 +20,7 @@ REPORT_TICKS = 75
 class Config(NodeConfig):
     """`port`: a link to the port, `control`: a socket for faults, '' for none; both in the run folder or absolute.
 
-    `scene`: a file beside the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose;
+    `scene`: a file by the robot's model; `posture_deg`: angles of joints at the start, others are in the base pose;
     `held`: whether the servos hold from the start; `servo_rules_only`: whether only what servos themselves reject is
     counted, not goals that jump.
     """

@@ -9,9 +9,9 @@ import numpy as np
 from paramove.documents import Floats
 
 
-def minimum_jerk(share: float) -> float:
-    """Share of the way after `share` 0 to 1 of the time (Flash and Hogan 1985)."""
-    s = min(1.0, max(0.0, share))
+def minimum_jerk(phase: float) -> float:
+    """Fraction of the path after the fraction `phase`, 0 to 1, of the time (Flash and Hogan 1985)."""
+    s = min(1.0, max(0.0, phase))
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
@@ -22,7 +22,7 @@ class HandPath:
     Attributes:
         start, goal: Fingertip, [3], m.
         backward_start, backward_goal: Direction from the fingertip to the wrist, [3].
-        bulge: How far the middle of the path lies beside the straight line, [3], m.
+        bulge: Offset of the middle of the path from the straight line, [3], m.
         duration_s: Of the whole path.
     """
 
@@ -35,9 +35,9 @@ class HandPath:
 
     def at(self, time_s: float) -> tuple[Floats, Floats]:
         """Fingertip [3] and backward direction [3] (not normalised) after `time_s`."""
-        share = minimum_jerk(time_s / self.duration_s)
-        fingertip = self.start + share * (self.goal - self.start) + 4 * share * (1 - share) * self.bulge
-        backward = self.backward_start + share * (self.backward_goal - self.backward_start)
+        fraction = minimum_jerk(time_s / self.duration_s)
+        fingertip = self.start + fraction * (self.goal - self.start) + 4 * fraction * (1 - fraction) * self.bulge
+        backward = self.backward_start + fraction * (self.backward_goal - self.backward_start)
         return fingertip, backward
 
 

@@ -73,7 +73,7 @@ def add_person(spec: mujoco.MjSpec, sizes: ArmSizes, look: PersonLook, shoulder:
 def add_arm(spec: mujoco.MjSpec, sizes: ArmSizes, look: PersonLook | None = None, prefix: str = "") -> None:
     """Adds the right arm alone. Its bodies have their origin at their nearer joint, z along the segment.
 
-    With a look the material "cloth" must be there. A `prefix` of the bodies' names tells them from others.
+    With a look the material "cloth" must be there. A `prefix` of the bodies' names distinguishes them from others.
     """
     cloth = {"material": "cloth"} if look is not None else {"rgba": (1.0, 1.0, 1.0, 1.0)}
     segments = (
@@ -154,7 +154,7 @@ class ArmSilhouette:
         self._eye = _SegmentEye(self._model, width_px, height_px)
 
     def mask(self, pose: ArrayLike, camera_from_world: ArrayLike, wrist: ArrayLike | None = None) -> NDArray[np.bool_]:
-        """Where the arm in a pose (9,), m, is seen by a camera with pose (4, 4), optical axes. Shape (H, W)."""
+        """Silhouette of the arm in a pose (9,), m, in a camera with pose (4, 4), optical axes. Shape (H, W)."""
         place_arm(self._model, self._data, pose, wrist)
         position, quaternion = camera_frame(camera_from_world)
         number = self._model.body("rig").mocapid[0]
@@ -200,8 +200,8 @@ def tapered_capsule(length: float, near: float, far: float) -> tuple[Floats, NDA
     radius = radius * (1.0 + (np.pi / SEGMENTS) ** 2 / 6)
     x, y = np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
     vertices = np.stack([x, y, np.repeat(height[:, None], SEGMENTS + 1, axis=1)], axis=-1).reshape(-1, 3)
-    share = (height - height[0]) / (height[-1] - height[0])
-    places = np.stack(np.meshgrid(angle / (2 * np.pi), share), axis=-1).reshape(-1, 2)
+    along = (height - height[0]) / (height[-1] - height[0])
+    places = np.stack(np.meshgrid(angle / (2 * np.pi), along), axis=-1).reshape(-1, 2)
     triangles = []
     for ring in range(len(radius) - 1):
         first = ring * (SEGMENTS + 1) + np.arange(SEGMENTS)
@@ -256,16 +256,16 @@ def add_cloth(spec: mujoco.MjSpec, look: PersonLook) -> None:
 def cloth_texture(look: PersonLook) -> NDArray[np.uint8]:
     """The pattern of shirt and sleeves, RGB [TEXTURE_PX, TEXTURE_PX, 3]."""
     row, column = np.mgrid[:TEXTURE_PX, :TEXTURE_PX]
-    share: Floats
+    weight: Floats
     if look.pattern == "stripes":
-        share = (row // 8 % 2).astype(np.float64)
+        weight = (row // 8 % 2).astype(np.float64)
     elif look.pattern == "checks":
-        share = 0.5 * ((row // 8 % 2) + (column // 8 % 2))
+        weight = 0.5 * ((row // 8 % 2) + (column // 8 % 2))
     elif look.pattern == "speckles":
-        share = np.random.default_rng(5).random((TEXTURE_PX, TEXTURE_PX)) ** 2
+        weight = np.random.default_rng(5).random((TEXTURE_PX, TEXTURE_PX)) ** 2
     else:
         raise ValueError(f"patterns with a texture are stripes, checks and speckles, found {look.pattern!r}")
-    mixed = (1.0 - share[..., None]) * np.array(look.cloth) + share[..., None] * np.array(look.second)
+    mixed = (1.0 - weight[..., None]) * np.array(look.cloth) + weight[..., None] * np.array(look.second)
     return np.asarray((255.0 * mixed).round(), dtype=np.uint8)
 
 

@@ -1,7 +1,7 @@
 """The instructor: a person who hands over objects, shows the rules and points, as the robot asks.
 
 A request is answered by a script: a list of moves, grasps and pauses, made one after the other as the person sees the
-table at that moment. The person sees the world as it is (the truth), never what the robot believes.
+table at that time. The person sees the true world, never the robot's estimates.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ class Instructor:
     """One person with one hand.
 
     Args:
-        table: What is seen and moved.
+        table: The table that the person sees and moves things on.
         rules: Colour -> name of its opening.
         draws: Generators for `places`, `order`, `paths`.
 
     Attributes:
-        doing: What the person does, in words.
+        doing: The person's action as text.
         finished: Whether the robot has said thank you.
         pointed_at: Colour that is being pointed at, or was last.
     """
@@ -89,10 +89,10 @@ class Instructor:
         return self._step is not None or bool(self._waiting)
 
     def handle(self, request: int, name: str = "") -> None:
-        """The robot says something. A request that is being answered or waits already is not taken twice.
+        """Handle a request of the robot. One that is being answered or already waits is ignored.
 
         Args:
-            request: Of `Speech.Request`; anything else is heard and acknowledges what the hand points at.
+            request: Of `Speech.Request`; any other value acknowledges what the hand points at.
             name: Colour, or "".
         """
         self._acknowledged = True
@@ -146,7 +146,7 @@ class Instructor:
             held = name or self._to_hand_over()
             self.doing = f"fetches {held}"
             yield from self._pick_up(held)
-        else:  # asked again: out of the hand and in anew, which also shows the robot that something happens
+        else:  # requested again: out of the hand and in anew, which also shows the robot that something happens
             yield self._move(_raised(self._fingertip, ABOVE), seconds=(0.6, 0.9), straight=True)
         self.doing = f"brings {held} to the robot's hand"
         yield self._move(self._into_hand(OVER_THE_ARM), seconds=(1.0, 2.4))
@@ -176,12 +176,12 @@ class Instructor:
         yield from self._turn_box()
         yield from self._show(name)
 
-    def _point(self, wanted: str) -> Script:
+    def _point(self, requested: str) -> Script:
         yield from self._empty_hand()
         if not self._arranged:
             self._arranged = True
             yield from self._arrange()
-        name = self._next_to_point(wanted)
+        name = self._next_to_point(requested)
         if name is None:
             self.doing = "sees nothing left to do"
             yield Step(1.0)
@@ -299,10 +299,10 @@ class Instructor:
         yield Step(3.2, during=lambda time_s: self._carry_box(front, time_s / 3.2))
         yield from self._withdraw()
 
-    def _carry_box(self, front: Floats, share: float) -> None:
-        away = minimum_jerk(share / 0.35) - minimum_jerk((share - 0.65) / 0.35)
-        up = minimum_jerk((share - 0.15) / 0.25) - minimum_jerk((share - 0.60) / 0.25)
-        angle = np.pi * (1 - minimum_jerk((share - 0.30) / 0.40))
+    def _carry_box(self, front: Floats, phase: float) -> None:
+        away = minimum_jerk(phase / 0.35) - minimum_jerk((phase - 0.65) / 0.35)
+        up = minimum_jerk((phase - 0.15) / 0.25) - minimum_jerk((phase - 0.60) / 0.25)
+        angle = np.pi * (1 - minimum_jerk((phase - 0.30) / 0.40))
         offset = np.array((BOX_PULLED * away, 0.0, BOX_LIFTED * up))
         self._table.move_box(offset, (np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0))
         self._fingertip = front + offset
@@ -365,13 +365,13 @@ class Instructor:
         )
         return candidates[int(self._order.integers(len(candidates)))]
 
-    def _next_to_point(self, wanted: str) -> str | None:
+    def _next_to_point(self, requested: str) -> str | None:
         left = [colour for colour in tool_box.COLOURS if not self._sees.is_done(colour)]
         self._to_point = [colour for colour in self._to_point if colour in left]
         if not self._to_point:
             self._to_point = [left[place] for place in self._order.permutation(len(left))]
-        if wanted in left:  # the robot asks for it because it stands in the way of the last one
-            self._to_point = [wanted, *(colour for colour in left if colour != wanted)]
+        if requested in left:  # the robot asks for it because it stands in the way of the last one
+            self._to_point = [requested, *(colour for colour in left if colour != requested)]
         return self._to_point.pop(0) if self._to_point else None
 
 

@@ -1,4 +1,4 @@
-"""Judge: records the truth of a simulated run and says at its end whether the robot did what it should.
+"""Judge: records the truth of a simulated run and writes at its end whether the robot succeeded.
 
 Subscribes  truth/layout   TruthLayout         once, latched   world
             truth/state    TruthState          15 Hz           world
@@ -57,9 +57,9 @@ def run(bus: Bus, config: Config) -> None:
     sentence = f"goes on after {earlier} recorded states" if earlier else "waits for the truth"
     with contextlib.ExitStack() as ending:
         recording = ending.enter_context(Recorder(bus, path, "paramove judge")) if config.record else None
-        tell = bus.ready if recording is None else recording.tell
+        report = bus.ready if recording is None else recording.tell
         ending.callback(judge.write)
-        tell(sentence)
+        report(sentence)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Received):
                 if event.topic is topics.TRUTH_LAYOUT:
@@ -69,11 +69,11 @@ def run(bus: Bus, config: Config) -> None:
                 if recording is not None:
                     view = event.topic is topics.TRUTH_VIEW
                     recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
-            tell(sentence)
+            report(sentence)
 
 
 class Judge:
-    """A verdict and the file it is kept in."""
+    """A verdict and its file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -100,14 +100,14 @@ class Judge:
             return time.monotonic()
 
     def begin(self, layout: Any) -> None:
-        """The run's layout is known. It is said once, and again to a process that was started again."""
+        """The run's layout is known. It is published once, and again after a restart."""
         if self._verdict is None:
             self._verdict = Verdict(layout)
 
     def take(self, state: Any) -> str:
-        """Take in a state; now and then write the verdict and return it as a sentence, else ""."""
+        """Take in a state; now and then write the verdict and return it as a message, else ""."""
         if self._verdict is None:
-            return ""  # this process was started late and has not been told the layout yet
+            return ""  # this process was started late and has not received the layout yet
         if self._verdict.states == 0:
             self._begun_s = time.monotonic()
         self._verdict.take(state)
@@ -119,7 +119,7 @@ class Judge:
     def write(self) -> dict[str, Any]:
         """Write the verdict as it stands; returns it."""
         if self._verdict is None:
-            summary: dict[str, Any] = {"success": False, "reason": "the simulator never said its layout"}
+            summary: dict[str, Any] = {"success": False, "reason": "the simulator published no layout"}
         else:
             summary = self._verdict.summary()
             wall_s = time.monotonic() - self._begun_s if self._verdict.states else 0.0

@@ -56,9 +56,9 @@ class Camera:
 
     def project(self, points: Floats) -> Floats:
         """Image points [n, 2], px, of points [n, 3] in the shoulder frame; NaN behind the camera."""
-        seen = (np.asarray(points, dtype=np.float64) - self.position) @ self.shoulder_from_optical
-        depth = np.where(seen[:, 2] > 1e-3, seen[:, 2], np.nan)
-        flat = seen[:, :2] / depth[:, None]
+        in_camera = (np.asarray(points, dtype=np.float64) - self.position) @ self.shoulder_from_optical
+        depth = np.where(in_camera[:, 2] > 1e-3, in_camera[:, 2], np.nan)
+        flat = in_camera[:, :2] / depth[:, None]
         bent = flat * (1 + self.k1 * (flat**2).sum(axis=1, keepdims=True))
         return np.asarray(self.focal_px * bent + np.array(self.principal_point_px))
 
@@ -113,8 +113,10 @@ def draw_camera(draw: np.random.Generator, elevation_deg: float, max_draws: int 
 
 def sees_enough(camera: Camera) -> bool:
     """Whether everything that matters is in the image, and everything that is put away is not."""
-    seen = camera.project(_must_be_seen())
-    inside = (seen > SEEN_MARGIN_PX).all() and (seen < (WIDTH_PX - SEEN_MARGIN_PX, HEIGHT_PX - SEEN_MARGIN_PX)).all()
+    pixels = camera.project(_must_be_seen())
+    inside = (pixels > SEEN_MARGIN_PX).all() and (
+        pixels < (WIDTH_PX - SEEN_MARGIN_PX, HEIGHT_PX - SEEN_MARGIN_PX)
+    ).all()
     if not inside:
         return False
     apart = camera.project(_must_not_be_seen())

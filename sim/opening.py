@@ -40,7 +40,7 @@ def wedges(radius: float, chamfer: float, depth: float, count: int = 16) -> list
 
 
 def lining(radius: float, chamfer: float, depth: float, count: int = 16) -> tuple[Floats, NDArray[np.int32]]:
-    """Visible inside of one opening: chamfer, wall, floor. Vertices [n, 3] and triangles [m, 3], seen from inside."""
+    """Visible inside of one opening: chamfer, wall, floor. Vertices [n, 3] and triangles [m, 3], facing inwards."""
     rings = np.array([_profile(2 * np.pi * k / count, radius, chamfer, depth, count) for k in range(count)])
     vertices = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, -depth]]])
     triangles = []

@@ -1,4 +1,4 @@
-"""Renders the clips of chapter 6: persons who point, pour and carry, seen by four cameras.
+"""Renders the clips of chapter 6: persons who point, pour and carry, in four cameras.
 
     python -m sim.performances                     all that are missing, into the user's cache
     python -m sim.performances --kind pouring --contact-sheet sheet.png
@@ -77,7 +77,7 @@ class Lens:
 
 @dataclass(frozen=True)
 class Frame:
-    """The body at one moment: pose (9,), wrist (3,), displacement of the torso (3,), objects (acts, 3); m."""
+    """The body at one time: pose (9,), wrist (3,), displacement of the torso (3,), objects (acts, 3); m."""
 
     pose: Floats
     wrist: Floats
@@ -122,10 +122,10 @@ class Studio:
         motion, person = self.performance.motion, self.performance.person
         position = time_s * SAMPLE_RATE_HZ
         first = min(int(position), len(motion.points) - 2)
-        share = position - first
+        fraction = position - first
 
         def between(track: Floats) -> Floats:
-            return np.asarray((1.0 - share) * track[first] + share * track[first + 1])
+            return np.asarray((1.0 - fraction) * track[first] + fraction * track[first + 1])
 
         points = between(motion.points)
         shift = points[0] - person.placement.in_world(RESTING_STERNUM)
@@ -201,13 +201,13 @@ def render(kind: Kind, number: int, root: Path, recordings: Path | None = None) 
 
 
 def contact_sheet(clips: Sequence[Clip], columns: int = SHEET_COLUMNS, all_views: bool = True) -> Image:
-    """Frames of clips, RGB: per clip one row per view, `columns` moments from the first to the last."""
+    """Frames of clips, RGB: per clip one row per view, `columns` times from the first to the last."""
     rows = []
     for clip in clips:
-        wanted = np.linspace(0, len(clip.times_s) - 1, columns).round().astype(int)
+        chosen_frames = np.linspace(0, len(clip.times_s) - 1, columns).round().astype(int)
         for view in clip.views if all_views else clip.views[:1]:
             images = list(clip.images(view))
-            rows.append(np.hstack([images[number] for number in wanted]))
+            rows.append(np.hstack([images[number] for number in chosen_frames]))
     return np.vstack(rows)
 
 
@@ -251,7 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                     skipped = f"clips of kind {kind.name} are left out: {error}"
                 progress.advance(task)
     except KeyboardInterrupt:
-        sys.stdout.write(f"interrupted; the finished clips are kept in {chosen.out}\n")
+        sys.stdout.write(f"interrupted; the finished clips are in {chosen.out}\n")
         return 130
     if skipped:
         sys.stdout.write(skipped + "\n")

@@ -211,21 +211,21 @@ def _picture(rng: np.random.Generator, kind: str, base: tuple[float, ...], secon
     row, column = np.mgrid[:TEXTURE_PX, :TEXTURE_PX]
     if kind == "boards":
         grain = np.repeat(rng.random((1, TEXTURE_PX)), TEXTURE_PX, axis=0) * 0.5 + 0.1 * np.sin(row / 9.0)
-        share = np.clip(grain, 0.0, 1.0)
+        weight = np.clip(grain, 0.0, 1.0)
     elif kind == "stripes":
-        share = (column // 8 % 2).astype(np.float64)
+        weight = (column // 8 % 2).astype(np.float64)
     elif kind == "tiles":
-        share = ((row % 32 < 2) | (column % 32 < 2)).astype(np.float64)
+        weight = ((row % 32 < 2) | (column % 32 < 2)).astype(np.float64)
     elif kind == "blots":
         coarse = rng.random((16, 16))
-        share = np.kron(coarse, np.ones((8, 8))) ** 2
+        weight = np.kron(coarse, np.ones((8, 8))) ** 2
     else:
-        share = np.zeros((TEXTURE_PX, TEXTURE_PX))
+        weight = np.zeros((TEXTURE_PX, TEXTURE_PX))
         for _ in range(14):
             x, y = rng.integers(0, TEXTURE_PX - 24, 2)
             w, h = rng.integers(8, 40, 2)
-            share[y : y + h, x : x + w] = rng.random()
-    return np.asarray((1.0 - share[..., None]) * np.array(base) + share[..., None] * np.array(second))
+            weight[y : y + h, x : x + w] = rng.random()
+    return np.asarray((1.0 - weight[..., None]) * np.array(base) + weight[..., None] * np.array(second))
 
 
 def _add_room(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""An instructor who points at free places of the robot's working area, one after the other, as the robot asks."""
+"""An instructor who points at free positions of the robot's working area, one after the other, as the robot asks."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ OBJECT = "yellow"
 START = (0.165, -0.02)
 """Marked on the table: where the object stands at first, and where the person stands it when the robot needs help."""
 AREA_X, AREA_Y = (0.130, 0.186), (-0.100, 0.065)
-"""A person points so far inside of what the robot reaches, m, shoulder frame."""
+"""Targets are this far inside the robot's working area, m, shoulder frame."""
 FREE_OF_ROBOT = 0.07
-"""Between the fingertip and the robot's gripper, seen from above, m."""
+"""Horizontal distance between the fingertip and the robot's gripper, m."""
 ANOTHER_PLACE = 0.04
-"""The next place is so far from where the object stood last, m."""
+"""Distance of the next target from the object's last position, m."""
 SAME_PLACE_AT_MOST = 2
 WITHIN_SHARE = 0.04
-"""Nobody points at the outermost part of the 80 x 30 cm of the table where people show how they point."""
+"""No target lies on the outermost part of the 80 x 30 cm of the table where people demonstrate pointing."""
 
 
 class PlaceInstructor(ArmInstructor):
-    """See `ArmInstructor`. Who is not understood points at the same place once more, then at another one."""
+    """See `ArmInstructor`. After a failed recognition points at the same target again, then at another one."""
 
     _place: Floats | None = None
     _shown = 0
     _stood = np.array(START)
 
     def handle(self, request: int, name: str = "") -> None:
-        """See `Instructor.hear`. Who is asked to point again while withdrawing the arm points again."""
+        """See `Instructor.handle`. A request that comes while the arm withdraws is answered by pointing again."""
         again = (request, name)
         if request == Speech.REQUEST_POINT_AT_PLACE and self._has_pointed and again not in self._waiting:
             self._waiting.append(again)
@@ -86,7 +86,7 @@ class PlaceInstructor(ArmInstructor):
         yield from self._hang(self._resting)
 
     def _free_place(self) -> Floats:
-        """Another place in the working area, where the person can point and the robot's hand is not."""
+        """Another target in the working area, which the person can point at and away from the robot's hand."""
         gripper = self._table.gripper()[0][:2]
         for _ in range(10_000):
             place = np.array([self._places.uniform(*AREA_X), self._places.uniform(*AREA_Y)])
@@ -106,7 +106,7 @@ class PlaceInstructor(ArmInstructor):
 
 
 def where_people_point(place: Floats) -> bool:
-    """Whether a place (2,), m, shoulder frame, lies on the part of the table where people show how they point."""
+    """Whether a position (2,), m, shoulder frame, lies on the part of the table where people demonstrate pointing."""
     x, y, _ = table_from_shoulder([*place, tool_box.SURFACE_Z]) / SCALE
     (low_x, high_y, _), (high_x, low_y, _) = table_place([[0.0, 0.0], [1.0, 1.0]])
     inside = WITHIN_SHARE * (high_x - low_x), WITHIN_SHARE * (high_y - low_y)

@@ -9,7 +9,7 @@ Publishes   clock               Clock               15 Hz
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
             truth/arm           TruthArm            15 Hz   table; only for evaluators
-            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, on request; only for evaluators
 
 Writes what people would measure beforehand into the run folder: `cameras.yaml` and `person.yaml`, in the table frame of
 `sim.small_person`.

@@ -40,7 +40,7 @@ def draw_layout(draw: np.random.Generator, count: int = 3) -> tuple[Floats, int]
 
 
 def draw_place(draw: np.random.Generator, standing: Sequence[Floats]) -> Floats:
-    """One more place [2] on the strip beside the cylinders that stand at `standing`, each [2].
+    """One more position [2] on the strip, apart from the cylinders that stand at `standing`, each [2].
 
     If the strip is too full for the open hand, the place with the largest gap of 200 draws is taken.
     """

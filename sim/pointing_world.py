@@ -1,4 +1,4 @@
-"""A person at a table who points at one place after the other, seen by calibrated cameras."""
+"""A person at a table who points at one target after the other, in the images of calibrated cameras."""
 
 from __future__ import annotations
 

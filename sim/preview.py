@@ -1,4 +1,4 @@
-"""Pictures of a seed's world at some moments of the story: what the camera sees, and the view for people.
+"""Pictures of a seed's world at some times of the story: the camera's image and the view for people.
 
     python -m sim.preview --seed 3 --out preview.png
 
@@ -28,7 +28,7 @@ ROBOT = scene.ROBOT_MODEL.parent
 
 
 def stages(world: World, instructor: Instructor) -> Iterator[str]:
-    """Lets the story run and stops at each moment worth a picture."""
+    """Lets the story run and stops at each time worth a picture."""
     description = world.description
     firmware, counts = Firmware(description), description.units.to_counts(description.base_pose)
 
@@ -74,8 +74,8 @@ def main() -> None:
     sensor = Sensor(world_looks.camera, world_looks.pixel_noise, draws["noise"])
     pairs = []
     for title in stages(world, instructor):
-        seen = sensor.expose(eye.look(world.data, "camera"))
-        pair = np.concatenate([seen, view.look(world.data, "view")], axis=1)
+        exposed = sensor.expose(eye.look(world.data, "camera"))
+        pair = np.concatenate([exposed, view.look(world.data, "view")], axis=1)
         pairs.append(_titled(pair, f"{title} {world.time_s:.1f} s"))
     rows = [np.concatenate(pairs[first : first + 2], axis=1) for first in range(0, len(pairs) - 1, 2)]
     cv2.imwrite(str(arguments.out), cv2.cvtColor(np.concatenate(rows), cv2.COLOR_RGB2BGR))

@@ -215,7 +215,7 @@ def _add_box_surfaces(spec: mujoco.MjSpec, body: Any, places_in_box: list[Floats
 def _add_surface(
     spec: mujoco.MjSpec, body: Any, name: str, vertices: Floats, triangles: NDArray[np.int32], place: Any, look: str
 ) -> None:
-    """Something that is seen and cannot be touched."""
+    """A visible body without contacts."""
     spec.add_mesh(
         name=name,
         uservert=vertices.ravel(),

@@ -96,12 +96,12 @@ class Simulation:
     def write_measures(self, folder: Path) -> None:
         """Writes what people measure before the run: nothing in this world."""
 
-    def handle(self, heard: Received) -> None:
-        """Take in a message of the stream or of what the robot says."""
-        if heard.topic is topics.WIRE_HOAP3_STREAM:
-            self.stream.offer(heard.message)
-        elif heard.topic is topics.SPEECH:
-            self.instructor.handle(heard.message.request, heard.message.object)
+    def handle(self, received: Received) -> None:
+        """Handle a message of the stream or of the robot's speech."""
+        if received.topic is topics.WIRE_HOAP3_STREAM:
+            self.stream.offer(received.message)
+        elif received.topic is topics.SPEECH:
+            self.instructor.handle(received.message.request, received.message.object)
 
     def run_to_tick(self, tick: int) -> None:
         """Let the world run up to a tick; raises SimulationError."""

@@ -7,7 +7,7 @@ Publishes   clock               Clock               15 Hz
             wire/hoap3/state    Hoap3State          15 Hz   joint units
             truth/layout        TruthLayout         once, latched   world; only for evaluators
             truth/state         TruthState          15 Hz   world; only for evaluators
-            truth/view          foxglove.RawImage   15 Hz   for people, if asked for; only for evaluators
+            truth/view          foxglove.RawImage   15 Hz   for people, on request; only for evaluators
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def run(
     kind: type[Simulation] = Simulation,
     say_more: Callable[[Bus, Simulation], None] = lambda bus, simulation: None,
 ) -> None:
-    """Loop until the bus closes or the simulated time is up. What `say_more` says belongs to the tick."""
+    """Loop until the bus closes or the simulated time is up. What `say_more` publishes belongs to the tick."""
     log_warnings_of_mujoco()
     with contextlib.ExitStack() as open_files:
         log = None
@@ -101,8 +101,8 @@ def _loop(bus: Bus, config: Config, simulation: Simulation, say_more: Callable[[
     while not bus.stopped and simulation.world.time_s < config.max_duration_s:
         _say(bus, simulation)
         say_more(bus, simulation)
-        for heard in barrier.advance(simulation.now_ns):
-            simulation.handle(heard)
+        for received in barrier.advance(simulation.now_ns):
+            simulation.handle(received)
         if bus.stopped:
             break
         simulation.run_to_tick(barrier.tick)
@@ -141,10 +141,10 @@ def _say(bus: Bus, simulation: Simulation) -> None:
 
 def _sentence(simulation: Simulation, wall_s: float) -> str:
     time_s = max(simulation.world.time_s, 1e-9)
-    share = 100 / max(wall_s, 1e-9)
+    percent = 100 / max(wall_s, 1e-9)
     return (
         f"{time_s:.0f} s simulated, {time_s / max(wall_s, 1e-9):.2f} times real time "
-        f"(physics {simulation.physics_s * share:.0f} %, rendering {simulation.rendering_s * share:.0f} %); "
+        f"(physics {simulation.physics_s * percent:.0f} %, rendering {simulation.rendering_s * percent:.0f} %); "
         f"instructor {simulation.instructor.doing}"
     )
 

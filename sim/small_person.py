@@ -1,4 +1,4 @@
-"""A person at the robot's scale: the synthetic demonstrator's table scene, smaller, beside the robot's working plane.
+"""A person at the robot's scale: the synthetic demonstrator's table scene, smaller, next to the robot's working plane.
 
 The person sits across the corner of the tool box, beyond its far edge and to the robot's right, and has an arm of about
 30 cm. Three frames, m:
@@ -29,7 +29,7 @@ SCALE = 0.42
 TABLE_IN_SHOULDER = (0.147, -0.106, np.deg2rad(140.0))
 """Origin (x, y), m, of the table frame in the shoulder frame, and the angle of its x axis there, rad."""
 POINTED_ABOVE_PLANE = 2 * tool_box.CYLINDER_HALF_HEIGHT + 0.02
-"""A person points at a place so far above the working plane: 2 cm above the middle of a standing object's top."""
+"""A person points at a target this far above the working plane: 2 cm above the middle of a standing object's top."""
 HUMAN_PLANE_Z = 0.07
 REACH_SHARE, FOLD_SHARE = 0.96, 0.40
 """Of upper arm and forearm: farthest and nearest wrist without the shoulder moving."""
@@ -85,12 +85,12 @@ class PointingMovement:
         """The posture (4, 3) at a time, between the frames by straight lines."""
         position = float(np.clip(time_s * SAMPLE_RATE_HZ, 0.0, len(self.postures) - 1))
         first = min(int(position), len(self.postures) - 2)
-        share = position - first
-        return np.asarray((1.0 - share) * self.postures[first] + share * self.postures[first + 1])
+        fraction = position - first
+        return np.asarray((1.0 - fraction) * self.postures[first] + fraction * self.postures[first + 1])
 
 
 class SmallPerson:
-    """Somebody whom nobody has seen before, with other sizes, seat, timing and habits.
+    """A new person with other sizes, seat, timing and habits.
 
     Args:
         draw: Of everything about the person.
@@ -106,7 +106,7 @@ class SmallPerson:
         self.seat = shoulder_from_table(_table_from_human(self._performer.shoulder))
 
     def write_measures(self, path: Path) -> None:
-        """What somebody measured of this person, in the table frame: up to 3 % and 2 mm wrong."""
+        """Measured sizes of this person, in the table frame: up to 3 % and 2 mm wrong."""
         shoulder = _table_from_human(self._performer.measured_shoulder)
         measures: dict[str, object] = {"shoulder": [round(float(value), 4) for value in shoulder]}
         for name in ("upper_arm", "forearm", "hand"):

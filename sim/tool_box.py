@@ -42,7 +42,7 @@ CENTRE = (sum(X_RANGE) / 2, sum(Y_RANGE) / 2, SURFACE_Z - THICKNESS / 2)
 
 @dataclass(frozen=True)
 class Measures:
-    """What may differ between worlds, and no node is told.
+    """Measures that differ between worlds; no node knows them.
 
     Attributes:
         camera_elevation_deg: Above the working plane. From above 52 degrees, a cylinder in its compartment can be seen.

@@ -67,12 +67,12 @@ class Verdict:
     def summary(self) -> dict[str, Any]:
         """Everything judged so far, ready for JSON. Positions in the world frame, m."""
         if not self._recent:
-            return {"success": False, "reason": "no state was heard", "seed": self._layout.seed}
+            return {"success": False, "reason": "no state was received", "seed": self._layout.seed}
         last = self._recent[-1]
         objects = {name: self.of_object(name) for name in self._rules}
         return {
-            "success": bool(objects) and all(found["success"] for found in objects.values()),
-            "placed": sum(found["success"] for found in objects.values()),
+            "success": bool(objects) and all(result["success"] for result in objects.values()),
+            "placed": sum(result["success"] for result in objects.values()),
             "seed": self._layout.seed,
             "objects": objects,
             "unwanted_contacts": last.unwanted_contacts,

@@ -23,7 +23,7 @@ OPENINGS_UP = (1.0, 0.0, 0.0, 0.0)
 
 
 class SimulationError(RuntimeError):
-    """The state of the world is no longer to be believed; the text names the degree of freedom."""
+    """The state of the world is no longer valid; the text names the degree of freedom."""
 
 
 class World:
@@ -167,8 +167,8 @@ class World:
         self.data.eq_active[self._weld[name]] = 1
         self.held_by_instructor = name
 
-    def straighten(self, share: float) -> None:
-        """Turn the held cylinder upright under the fingertip, by `share` 0 to 1 of the way from how it was grasped."""
+    def straighten(self, fraction: float) -> None:
+        """Turn the held cylinder upright under the fingertip, by `fraction` 0 to 1 of the rotation."""
         if self.held_by_instructor is None or self._grasped is None:
             return
         back = _conjugate(self.data.mocap_quat[self._mocap["hand"]])
@@ -178,9 +178,9 @@ class World:
         goal_offset = _rotate(back, np.array((0.0, 0.0, -tool_box.CYLINDER_HALF_HEIGHT)))
         if goal @ turn < 0:
             goal = -goal
-        between = (1 - share) * turn + share * goal
+        between = (1 - fraction) * turn + fraction * goal
         self._hold(
-            self.held_by_instructor, (1 - share) * offset + share * goal_offset, between / np.linalg.norm(between)
+            self.held_by_instructor, (1 - fraction) * offset + fraction * goal_offset, between / np.linalg.norm(between)
         )
 
     def release(self) -> None:
@@ -203,18 +203,18 @@ class World:
             mujoco.mjtWarning.mjWARN_BADQACC: "acceleration",
             mujoco.mjtWarning.mjWARN_BADCTRL: "torque",
         }
-        found = []
+        warnings = []
         for number in np.flatnonzero(self._warnings.number):
             kind = mujoco.mjtWarning(int(number))
             place = int(self._warnings.lastinfo[number])
             if kind not in kinds:
-                found.append(f"{kind.name.removeprefix('mjWARN_').lower()} ({place})")
+                warnings.append(f"{kind.name.removeprefix('mjWARN_').lower()} ({place})")
                 continue
             name = (
                 self.model.actuator(place).name if kind == mujoco.mjtWarning.mjWARN_BADCTRL else self._dof(kind, place)
             )
-            found.append(f"{kinds[kind]} of {name} is not finite or larger than 1e10")
-        return f"simulation stopped at {self.time_s:.3f} s: {'; '.join(found)}; nothing after it can be believed"
+            warnings.append(f"{kinds[kind]} of {name} is not finite or larger than 1e10")
+        return f"simulation stopped at {self.time_s:.3f} s: {'; '.join(warnings)}; later states are not valid"
 
     def _dof(self, kind: mujoco.mjtWarning, place: int) -> str:
         starts = self.model.jnt_qposadr if kind == mujoco.mjtWarning.mjWARN_BADQPOS else self.model.jnt_dofadr

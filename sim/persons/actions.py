@@ -1,4 +1,4 @@
-"""Training movements of the actions of chapter 6: what the models are shown (thesis 6.4.1, 6.7).
+"""Training movements of the actions of chapter 6: the demonstrations for the models (thesis 6.4.1, 6.7).
 
 All are made by the default demonstrator in its table frame, m. The performances that are tracked are made by other
 persons, with other timing and habits (`sim.persons.performers`), or were recorded.
@@ -49,7 +49,7 @@ FAR_ORIGIN = RESTING_SHOULDER + np.array([FAR_DISTANCE, 0.70, -0.30])
 FAR_SPAN = np.array([1.40, 0.80])
 """The plane in front of the person: 1.4 m to the right and 0.8 m up from its origin (6.7.1.3)."""
 FAR_REACH = 0.90
-"""Distance of the fingertip from the shoulder when pointing far, as a share of the arm's length."""
+"""Distance of the fingertip from the shoulder when pointing far, as a fraction of the arm's length."""
 FOLD_START, FOLD_END = 1.3, 1.7
 """Phases (1 to 2 at the place) where the first part of pointing ends, and where withdrawing begins (6.7.3)."""
 CROSSING_S, CROSSING_REST = 1.5, 0.18
@@ -100,8 +100,8 @@ def carrying_stops(first: Floats, second: Floats) -> list[Stop]:
 def pointing(seed: int = 0, *, columns: int = 5, rows: int = 3, repetitions: int = 4) -> Demonstrations:
     """Pointing at the table, theta (u, v) (6.7.1.1, 6.7.1.2). Poses (T, 9) at 60 Hz."""
     targets, places = table_targets(columns, rows)
-    shown = demonstrations_at(targets, np.random.default_rng(seed), action="pointing", repetitions=repetitions)
-    poses = [arm_poses(sequence) for sequence in shown.sequences]
+    demonstrated = demonstrations_at(targets, np.random.default_rng(seed), action="pointing", repetitions=repetitions)
+    poses = [arm_poses(sequence) for sequence in demonstrated.sequences]
     return _described("pointing", poses, np.repeat(places, repetitions, axis=0), PLACE_NAMES)
 
 
@@ -143,20 +143,20 @@ def box_to_table(seed: int = 4, *, columns: int = 5, rows: int = 3, repetitions:
 
 def point(seed: int = 5, *, columns: int = 5, rows: int = 3, repetitions: int = 4) -> Demonstrations:
     """A of 6.7.3: from the base pose until the hand has reached the place, theta (u, v): cut from pointing."""
-    shown = pointing(seed, columns=columns, rows=rows, repetitions=repetitions)
-    return _cut("point", shown, lambda share: share <= FOLD_START)
+    demonstrated = pointing(seed, columns=columns, rows=rows, repetitions=repetitions)
+    return _cut("point", demonstrated, lambda phases: phases <= FOLD_START)
 
 
 def withdraw(seed: int = 6, *, columns: int = 5, rows: int = 3, repetitions: int = 4) -> Demonstrations:
     """C of 6.7.3: from the place, theta (u, v), back to the base pose: cut from pointing."""
-    shown = pointing(seed, columns=columns, rows=rows, repetitions=repetitions)
-    return _cut("withdraw", shown, lambda share: share >= FOLD_END)
+    demonstrated = pointing(seed, columns=columns, rows=rows, repetitions=repetitions)
+    return _cut("withdraw", demonstrated, lambda phases: phases >= FOLD_END)
 
 
 def redirect(seed: int = 7, *, extra: int = 24, repetitions: int = 2) -> Demonstrations:
     """B of 6.7.3: from one place to another, theta (a, b), each (u, v): blended from two pointing movements (4.3).
 
-    Shown for all pairs of corners, for nine pairs of the 3 x 3 raster and for `extra` pairs drawn anywhere. Blending
+    For all pairs of corners, for nine pairs of the 3 x 3 grid and for `extra` pairs drawn anywhere. Blending
     shortens the arm where the places are far apart; its elbow is then moved as in 6.6.1.2.
     """
     rng = np.random.default_rng(seed)
@@ -166,8 +166,10 @@ def redirect(seed: int = 7, *, extra: int = 24, repetitions: int = 2) -> Demonst
     weight = minimum_jerk(np.linspace(0.0, 1.0, n_frames), CROSSING_REST, 1.0 - CROSSING_REST)[:, None]
     sequences = []
     for pair in theta:
-        shown = demonstrations_at(table_place(pair.reshape(2, 2)), rng, action="pointing", repetitions=1).sequences
-        first, second = (resample(_at_place(arm_poses(sequence)), n_frames) for sequence in shown)
+        demonstrated = demonstrations_at(
+            table_place(pair.reshape(2, 2)), rng, action="pointing", repetitions=1
+        ).sequences
+        first, second = (resample(_at_place(arm_poses(sequence)), n_frames) for sequence in demonstrated)
         sequences.append(fitted_poses((1.0 - weight) * first + weight * second, ArmSizes()))
     return _described("redirect", sequences, theta, PAIR_NAMES)
 
@@ -187,13 +189,13 @@ SHOWN: dict[str, Callable[[], Demonstrations]] = {
 
 def _at_place(poses: Floats) -> Floats:
     """The part of a pointing movement at its place."""
-    share = phase(poses)
-    return poses[(share >= FOLD_START - 0.2) & (share <= FOLD_END + 0.2)]
+    phases = phase(poses)
+    return poses[(phases >= FOLD_START - 0.2) & (phases <= FOLD_END + 0.2)]
 
 
-def _cut(action: str, shown: Demonstrations, wanted: Callable[[Floats], NDArray[np.bool_]]) -> Demonstrations:
-    sequences = [poses[wanted(phase(poses))] for poses in shown.sequences]
-    return _described(action, sequences, shown.theta, PLACE_NAMES)
+def _cut(action: str, demonstrated: Demonstrations, selected: Callable[[Floats], NDArray[np.bool_]]) -> Demonstrations:
+    sequences = [poses[selected(phase(poses))] for poses in demonstrated.sequences]
+    return _described(action, sequences, demonstrated.theta, PLACE_NAMES)
 
 
 def _staged_raster(
@@ -211,5 +213,5 @@ def _staged_raster(
 
 def _described(action: str, sequences: list[Floats], theta: Floats, names: tuple[str, ...]) -> Demonstrations:
     duration = float(np.mean([len(sequence) - 1 for sequence in sequences]) / SAMPLE_RATE_HZ)
-    told = MovementDescription(action, POSE_POINTS, "m", FRAME, names, duration, rate_hz=SAMPLE_RATE_HZ)
-    return Demonstrations(sequences, np.asarray(theta, dtype=np.float64), told)
+    description = MovementDescription(action, POSE_POINTS, "m", FRAME, names, duration, rate_hz=SAMPLE_RATE_HZ)
+    return Demonstrations(sequences, np.asarray(theta, dtype=np.float64), description)

@@ -1,4 +1,4 @@
-"""Rendered performances in files: what a tracker may see, and beside it, apart, what is true.
+"""Rendered performances in files: the input of a tracker and, in separate files, the ground truth.
 
 A folder of clips has one folder per clip with `seen.npz` (images, times, measured sizes), `cameras.yaml` (calibrated,
 with small errors), `truth.npz`, `true_cameras.yaml` and `code.txt` (the digest of the code that rendered it: the clips
@@ -105,9 +105,9 @@ class Clip:
         return self._noisy(unpacked(*(arrays[name] for name in names)), view)
 
     def frames(self, views: Sequence[int] | None = None) -> Iterator[tuple[Image | None, ...]]:
-        """For each time the images of all four views; None for a view that has none or is not wanted."""
-        wanted = [view for view in self.views if views is None or view in views]
-        streams = {view: self.images(view) for view in wanted}
+        """For each time the images of all four views; None for a view that has none or is not requested."""
+        requested = [view for view in self.views if views is None or view in views]
+        streams = {view: self.images(view) for view in requested}
         for _ in self.times_s:
             yield tuple(next(streams[view]) if view in streams else None for view in range(len(self.cameras)))
 
@@ -140,7 +140,7 @@ _ABOUT = ("version", "name", "kind", "number", "times_s", "views", "sizes", "sho
 
 
 def clips_folder() -> Path:
-    """Where clips are kept unless another folder is named: the user's cache."""
+    """Default folder of clips: the user's cache."""
     return user_cache_path("paramove") / "chapter6" / "clips"
 
 
@@ -159,18 +159,18 @@ def read_clip(folder: Path) -> Clip:
             f"{folder}: a clip of code {rendered_by} found, {clips_code()} expected; `python -m sim.performances` "
             "renders it again, in the clone"
         )
-    found = read_arrays(folder / SEEN, "clip", only=_ABOUT)
+    arrays = read_arrays(folder / SEEN, "clip", only=_ABOUT)
     return Clip(
         folder,
-        str(found["name"]),
-        str(found["kind"]),
-        int(found["number"]),
-        found["times_s"],
-        tuple(int(view) for view in found["views"]),
+        str(arrays["name"]),
+        str(arrays["kind"]),
+        int(arrays["number"]),
+        arrays["times_s"],
+        tuple(int(view) for view in arrays["views"]),
         read_cameras(folder / CAMERAS),
-        _sizes(found["sizes"]),
-        found["shoulder"],
-        float(found["noise"]),
+        _sizes(arrays["sizes"]),
+        arrays["shoulder"],
+        float(arrays["noise"]),
     )
 
 

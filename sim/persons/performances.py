@@ -92,7 +92,7 @@ class Act:
 
 @dataclass(frozen=True)
 class Performance:
-    """All that a renderer needs and an evaluator wants to know; frames at 60 Hz.
+    """Input of the renderer and ground truth for an evaluator; frames at 60 Hz.
 
     Attributes:
         kind, number: which one.
@@ -150,12 +150,12 @@ def perform(kind: Kind, number: int, folder: Path | None = None) -> Performance:
     person = draw_performer(rng)
     count = 2 if kind.name in ("box", "complex") else 1
     furniture = _furniture(kind, person, rng)
-    told = []
+    actions_done = []
     for turn in range(count):
         action, theta, targets, stops = _planned(kind, number, turn, person, furniture, rng)
-        told.append((action, theta, targets, _moved(kind, stops, person, rng)))
+        actions_done.append((action, theta, targets, _moved(kind, stops, person, rng)))
     rests = [float(rng.uniform(0.5, 1.1)) for _ in range(count + 1)]
-    return assembled(kind, number, person, told, rests, furniture, rng)
+    return assembled(kind, number, person, actions_done, rests, furniture, rng)
 
 
 def assembled(
@@ -210,8 +210,8 @@ def _planned(
         return "pouring", theta, targets, actions.pouring_stops(places[0], placement.in_model(furniture))
     if kind.name == "box":
         takes = BOX_ORDERS[number % 4][turn] == "A"
-        beside = np.array([0.0, 0.03 * (2 * turn - 1), 0.0])  # two objects find room on the box
-        box = placement.in_model(furniture + beside + 0.4 * actions.BOX_SPREAD * rng.standard_normal(3))
+        offset = np.array([0.0, 0.03 * (2 * turn - 1), 0.0])  # two objects find room on the box
+        box = placement.in_model(furniture + offset + 0.4 * actions.BOX_SPREAD * rng.standard_normal(3))
         ends = (places[0], box) if takes else (box, places[0])
         return ("table_to_box" if takes else "box_to_table"), theta, targets, actions.carrying_stops(*ends)
     return "pointing", theta, targets, [Stop(places[0])]

@@ -159,8 +159,8 @@ def joined(
         count = round(rest * SAMPLE_RATE_HZ)
         before = parts[number - 1].points[-1] if number else parts[0].points[0]
         after = parts[number].points[0] if number < len(parts) else parts[-1].points[-1]
-        share = minimum_jerk(np.arange(count) / max(count, 1), 0.0, 1.0)[:, None, None]
-        points.append(_keeping_lengths(before + share * (after - before), before))
+        fraction = minimum_jerk(np.arange(count) / max(count, 1), 0.0, 1.0)[:, None, None]
+        points.append(_keeping_lengths(before + fraction * (after - before), before))
         holds.append(np.zeros(count, dtype=np.bool_))
         frames += count
         if number < len(parts):
@@ -175,9 +175,9 @@ def joined(
 def _keeping_lengths(points: Floats, like: Floats) -> Floats:
     """The elbow moved along the upper arm so that this is as long as in the pose `like` (7, 3). (T, 7, 3)."""
     length = float(np.linalg.norm(like[ELBOW] - like[SHOULDER]))
-    kept = points.copy()
-    kept[:, ELBOW] = points[:, SHOULDER] + length * _unit(points[:, ELBOW] - points[:, SHOULDER])
-    return kept
+    corrected = points.copy()
+    corrected[:, ELBOW] = points[:, SHOULDER] + length * _unit(points[:, ELBOW] - points[:, SHOULDER])
+    return corrected
 
 
 def _sway(n_frames: int, rng: np.random.Generator) -> Floats:
@@ -205,7 +205,7 @@ def _variation(rng: np.random.Generator) -> Variation:
 
 
 def _timing(rng: np.random.Generator) -> Timing:
-    """Whole movements 0.75 to 1.3 times as long, arriving and leaving at other shares."""
+    """Whole movements 0.75 to 1.3 times as long, arriving and leaving at other phases."""
     usual = Timing()
     arrive = usual.arrive + float(rng.uniform(-0.045, 0.035))
     leave = usual.leave + float(rng.uniform(-0.03, 0.06))

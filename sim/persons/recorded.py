@@ -82,13 +82,13 @@ def recorded_pointing(folder: str | Path | None = None) -> tuple[RecordedPointin
     """All usable movements. Raises RecordingsError where the recordings are absent."""
     recordings = load_recordings(DATA_SET, folder, rate_hz=RATE_HZ)
     names = recordings.point_names
-    wanted = [names.index(name) for name in ("rightShoulder", "forearm", "hand", "indexFinger")]
+    marker_indices = [names.index(name) for name in ("rightShoulder", "forearm", "hand", "indexFinger")]
     arrays = read_arrays(data_folder(folder) / DATA_SET / "data.npz", only=["subject_height"])
     heights = np.asarray(arrays["subject_height"], dtype=np.float64) / USUAL_HEIGHT
     result: list[RecordedPointing] = []
     for subject in recordings.subjects:
         own = recordings.of(subject=subject)
-        markers = [one.points.reshape(len(one.points), -1, 3)[:, wanted] for one in own]
+        markers = [one.points.reshape(len(one.points), -1, 3)[:, marker_indices] for one in own]
         result.extend(_of_person(own, markers, float(heights[subject - 1])))
     return tuple(result)
 
@@ -104,18 +104,20 @@ def recorded_demonstrations(
 
     Either of all persons without one, or of one person without the movements to one target.
     """
-    shown = [
+    chosen = [
         one
         for one in recorded_pointing(folder)
         if one.subject != without_subject
         and (of_subject is None or one.subject == of_subject)
         and (without_target is None or one.target_id != without_target)
     ]
-    sequences = [np.concatenate([one.poses, one.wrist], axis=1)[slice(*one.segment)] for one in shown]
-    theta = np.array([one.theta for one in shown])
+    sequences = [np.concatenate([one.poses, one.wrist], axis=1)[slice(*one.segment)] for one in chosen]
+    theta = np.array([one.theta for one in chosen])
     duration = float(np.mean([len(sequence) - 1 for sequence in sequences]) / RATE_HZ)
-    told = MovementDescription("recorded_pointing", BENT_POSE_POINTS, "m", FRAME, ("u", "v"), duration, rate_hz=RATE_HZ)
-    return Demonstrations([resample(one, max(len(one), 40)) for one in sequences], theta, told)
+    description = MovementDescription(
+        "recorded_pointing", BENT_POSE_POINTS, "m", FRAME, ("u", "v"), duration, rate_hz=RATE_HZ
+    )
+    return Demonstrations([resample(one, max(len(one), 40)) for one in sequences], theta, description)
 
 
 def _of_person(own: tuple[RecordedMovement, ...], markers: list[Floats], height: float) -> list[RecordedPointing]:

@@ -36,7 +36,7 @@ from paramove.documents import Floats
 
 SWIVEL_AT_REST = 0.25
 USUAL_DURATION_S = 3.2
-"""Of the demonstrator's movements; the times of stops are said for it and scale with a person's own duration."""
+"""Of the demonstrator's movements; the times of stops hold for it and scale with a person's own duration."""
 
 
 @dataclass(frozen=True)
@@ -88,29 +88,29 @@ def staged(
     if not stops:
         raise ValueError("a staged movement has at least one stop, found none")
     times, travels = _timed(stops, person, rng, back_s)
-    shares = [minimum_jerk(times, start, end) for start, end in travels]
-    spread = float(np.exp(np.clip(person.variation.unevenness * 0.5 * rng.standard_normal(), -0.8, 0.8)))
+    fractions = [minimum_jerk(times, start, end) for start, end in travels]
+    unevenness = float(np.exp(np.clip(person.variation.unevenness * 0.5 * rng.standard_normal(), -0.8, 0.8)))
     reach = np.array([_reach(stop, person) for stop in stops])
     lower = person.lengths.forearm
-    posture = spread * person.variation.posture * rng.standard_normal(3)
+    posture = unevenness * person.variation.posture * rng.standard_normal(3)
     reached = [stop.place + person.variation.miss * rng.standard_normal(3) for stop in stops]
     leans = [leaning(place, person.lengths.upper_arm + lower + far) for place, far in zip(reached, reach, strict=True)]
-    lean = _through(shares, np.array([np.zeros(3), *leans, np.zeros(3)]))
+    lean = _through(fractions, np.array([np.zeros(3), *leans, np.zeros(3)]))
     shoulder = RESTING_SHOULDER + posture + lean
-    effector = kept_away(_hand_path(stops, reached, shares, person, spread, rng), shoulder, _nearest(reached))
+    effector = kept_away(_hand_path(stops, reached, fractions, person, unevenness, rng), shoulder, _nearest(reached))
     usual = person.lengths.grasp
-    along = _through(shares, np.array([usual, *reach, usual]))
+    along = _through(fractions, np.array([usual, *reach, usual]))
     shoulder = shoulder + overreach(effector - shoulder, person.lengths.upper_arm + lower + along)
-    pointing = _through(shares, np.array([0.0, *(float(stop.pointing) for stop in stops), 0.0]))
-    out_of_rest = _through(shares, np.array([0.0, *(1.0 for _ in stops), 0.0]))
+    pointing = _through(fractions, np.array([0.0, *(float(stop.pointing) for stop in stops), 0.0]))
+    out_of_rest = _through(fractions, np.array([0.0, *(1.0 for _ in stops), 0.0]))
     aperture, holds = _grip(stops, times, travels)
     swivels = [
         swivel_towards(usual_elbow(place), RESTING_SHOULDER + add, place)
         for place, add in zip(reached, leans, strict=True)
     ]
-    noise = spread * person.variation.swivel * rng.standard_normal(len(stops) + 1)
+    noise = unevenness * person.variation.swivel * rng.standard_normal(len(stops) + 1)
     rest = SWIVEL_AT_REST + noise[0]
-    swivel = _through(shares, np.array([rest, *(np.array(swivels) + noise[1:]), rest]))
+    swivel = _through(fractions, np.array([rest, *(np.array(swivels) + noise[1:]), rest]))
     sternum = RESTING_STERNUM + 0.7 * posture + 0.35 * lean
     facing = np.sqrt(np.clip(out_of_rest, 0.0, 1.0))
     points = body_points(
@@ -125,7 +125,7 @@ def staged(
 def _timed(
     stops: Sequence[Stop], person: Demonstrator, rng: np.random.Generator, back_s: float
 ) -> tuple[Floats, list[tuple[float, float]]]:
-    """Times (T,) of the frames, and beginning and end of every way in s: to each stop, and back."""
+    """Times (T,) of the frames, and beginning and end of every path in s: to each stop, and back."""
     tempo = person.timing.duration / USUAL_DURATION_S
     travels = []
     now = 0.10 * tempo
@@ -148,10 +148,10 @@ def _reach(stop: Stop, person: Demonstrator) -> float:
     return person.lengths.fingertip if stop.pointing else person.lengths.grasp
 
 
-def _through(shares: Sequence[Floats], values: Floats) -> Floats:
-    """From the first value to the last, each share leading from one to the next. (ways + 1, ...) -> (T, ...)."""
+def _through(fractions: Sequence[Floats], values: Floats) -> Floats:
+    """From the first value to the last, each fraction leading from one to the next. (paths + 1, ...) -> (T, ...)."""
     steps = np.diff(values, axis=0)
-    result: Floats = values[0] + np.tensordot(np.stack(shares, axis=1), steps, axes=1)
+    result: Floats = values[0] + np.tensordot(np.stack(fractions, axis=1), steps, axes=1)
     return result
 
 
@@ -163,23 +163,23 @@ def _nearest(places: Sequence[Floats]) -> Floats:
 def _hand_path(
     stops: Sequence[Stop],
     reached: Sequence[Floats],
-    shares: Sequence[Floats],
+    fractions: Sequence[Floats],
     person: Demonstrator,
-    spread: float,
+    unevenness: float,
     rng: np.random.Generator,
 ) -> Floats:
     """Out along the demonstrator's arc, over lower arcs from stop to stop, and back. Shape (T, 3)."""
     variation = person.variation
-    base = RESTING_HAND + spread * variation.base * np.clip(rng.standard_normal(3), -1.5, 1.5)
-    sway = spread * variation.path * rng.standard_normal((len(stops) + 2, 3))
-    path = arc(base, reached[0], sway[0], sway[1], shares[0])
+    base = RESTING_HAND + unevenness * variation.base * np.clip(rng.standard_normal(3), -1.5, 1.5)
+    sway = unevenness * variation.path * rng.standard_normal((len(stops) + 2, 3))
+    path = arc(base, reached[0], sway[0], sway[1], fractions[0])
     for number in range(1, len(stops)):
-        s = shares[number][:, None]
+        s = fractions[number][:, None]
         bump = 16.0 * s**2 * (1.0 - s) ** 2
         path = path + s * (reached[number] - reached[number - 1])
         path = path + bump * (stops[number].lift * UPWARD + 0.5 * sway[number + 1])
-    back = arc(base, reached[-1], sway[0], sway[-1], 1.0 - shares[-1])
-    return np.where((shares[-1] > 0.0)[:, None], back, path)
+    back = arc(base, reached[-1], sway[0], sway[-1], 1.0 - fractions[-1])
+    return np.where((fractions[-1] > 0.0)[:, None], back, path)
 
 
 def _grip(
@@ -197,10 +197,10 @@ def _grip(
             now = OPEN
         middle = 0.5 * (arrives + leaves)
         if stop.holds != held:
-            wanted = CLOSED if stop.holds else OPEN
-            aperture += (wanted - now) * minimum_jerk(times, arrives, middle + 0.05)
+            aperture_then = CLOSED if stop.holds else OPEN
+            aperture += (aperture_then - now) * minimum_jerk(times, arrives, middle + 0.05)
             holds[times >= middle] = stop.holds
-            now, held = wanted, stop.holds
+            now, held = aperture_then, stop.holds
     start, end = travels[-1]
     aperture += (RELAXED - now) * minimum_jerk(times, start + 0.1, end)
     return aperture, holds

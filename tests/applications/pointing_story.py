@@ -29,12 +29,12 @@ class PointingStory:
     """What happens follows from `answers`, `points` and `outcomes`, which a test may replace.
 
     Attributes:
-        events: Everything that the relocator heard, and the ticks.
+        events: Everything that the relocator received, and the ticks.
         goals: Every goal, each once.
         points: Where the person points next: (place, certainty); None: at nothing.
         offsets: How far beside the object the person seems to point, next.
         outcomes: Of the next goals of a kind: (state, reason). When they are used up, all go well.
-        trouble: Why the tracker does not see the arm; "" while it does. `silent`: it says nothing.
+        trouble: Why the tracker does not see the arm; "" while it does. `sends_nothing`: no estimates.
         hand_stays: The hand stays where it pointed.
         hand: Where it is.
     """
@@ -51,7 +51,7 @@ class PointingStory:
         self.points: list[tuple[Place, float] | None] = [(place, 0.9) for place in PLACES]
         self.outcomes: dict[int, list[tuple[int, str]]] = {}
         self.trouble = ""
-        self.silent = False
+        self.sends_nothing = False
         self.lost = True
         self.hand_stays = False
         self.hand = REST
@@ -72,18 +72,18 @@ class PointingStory:
         while self._later and self._later[0][0] <= self.now_s:
             _, _, do, arguments = heapq.heappop(self._later)
             do(*arguments)
-        if not self.silent:
+        if not self.sends_nothing:
             self._estimate()
         self._number += 1
         self.events.append(Tick(self._number, self.now_ns))
-        said = self.relocator.tick(self.now_ns * 1e-9)
-        self.stages += said.stages
-        for goal in said.goals:
+        outgoing = self.relocator.tick(self.now_ns * 1e-9)
+        self.stages += outgoing.stages
+        for goal in outgoing.goals:
             self.sent.append(goal)
             if goal.id not in {known.id for known in self.goals}:
                 self.goals.append(goal)
                 self._do(goal)
-        for speech in said.speech:
+        for speech in outgoing.speech:
             self.speech.append(speech)
             if speech.request == Speech.REQUEST_POINT_AT_PLACE and self.points:
                 self._answer(self.points.pop(0))
@@ -152,7 +152,7 @@ class PointingStory:
         self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
         on(message)
 
-    # What was said
+    # What was published
 
     def of(self, kind: RelocationGoal.Kind) -> list[RelocationGoal]:
         return [goal for goal in self.goals if goal.kind == kind]

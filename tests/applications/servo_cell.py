@@ -1,4 +1,4 @@
-"""A driver that plays any trajectory in three ticks, around a list of tasks; keeps what was heard and said."""
+"""A driver that plays any trajectory in three ticks, around a list of tasks; stores what was received and published."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class ServoCell:
     """Time goes on with `tick`.
 
     Attributes:
-        answers: States that the driver says of a trajectory, one a tick; none if it is silent.
+        answers: States that the driver says of a trajectory, one a tick; none if it does not respond.
         reason, code: It gives with them.
-        events, sent, speech: All that was heard and said.
+        events, sent, speech: All that was received and published.
     """
 
     def __init__(
@@ -60,9 +60,9 @@ class ServoCell:
             if self._waiting:
                 self._hear(topics.ARM_TRAJECTORY_STATUS, self._waiting.pop(0), self.task.on_trajectory_status)
             self.events.append(Tick(self._number, self._number * PERIOD_NS))
-            said = self.task.tick(self._number * PERIOD_NS)
-            self.speech += said.speech
-            for message in said.trajectories:
+            output = self.task.tick(self._number * PERIOD_NS)
+            self.speech += output.speech
+            for message in output.trajectories:
                 self._play(message)
         return self
 

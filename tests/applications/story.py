@@ -36,7 +36,7 @@ class Story:
     """What happens follows from `arm` and `instructor`, which a test may replace.
 
     Attributes:
-        events: Everything that the learner heard, and the ticks.
+        events: Everything that the learner received, and the ticks.
         goals: Every goal as often as it was sent.
         outcomes: Outcomes of the next relocations in stage 3: (state, reason, where the object is then; None: in its
             opening). When they are used up, all go well.
@@ -88,15 +88,15 @@ class Story:
             do(*arguments)
         self._number += 1
         self.events.append(Tick(self._number, self.now_ns))
-        said = self.learner.tick(self.now_ns * 1e-9)
-        self.calibrations += said.calibrations
-        self.calibrated |= bool(said.calibrations)
-        self.rules += said.rules
-        self.stages += said.stages
-        for goal in said.goals:
+        outgoing = self.learner.tick(self.now_ns * 1e-9)
+        self.calibrations += outgoing.calibrations
+        self.calibrated |= bool(outgoing.calibrations)
+        self.rules += outgoing.rules
+        self.stages += outgoing.stages
+        for goal in outgoing.goals:
             self.goals.append(goal)
             self._hear(goal)
-        for speech in said.speech:
+        for speech in outgoing.speech:
             self.speech.append(speech)
             self.answers.get(speech.request, lambda _: None)(speech.object)
 
@@ -199,7 +199,7 @@ class Story:
         self.later(MOTION_S, self._say, goal.id, state, reason)
 
     def forget_goals(self) -> None:
-        """The arm ends its motion and nothing is said of it any more, as after the synthesizer's restart."""
+        """The arm ends its motion and reports it no more, as after the synthesizer's restart."""
         moves = (self._say, self.vanish, self.stand)
         self._events = [event for event in self._events if event[2] not in moves]
         heapq.heapify(self._events)
@@ -212,7 +212,7 @@ class Story:
     def _heard(self, topic: topics.Topic, message: Gesture | RelocationStatus) -> None:
         self.events.append(Received(topic, message, self.now_ns, self.now_ns, len(self.events)))
 
-    # What was said
+    # What was published
 
     def requests(self) -> list[str]:
         return [

@@ -1,4 +1,4 @@
-"""Where the joints rest: only what was heard, newly, and for a while."""
+"""Joints at rest: only from recent messages over a while."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from paramove.applications.reach_task import SettledJoints
 PERIOD_NS = 66_666_667
 
 
-def said(**joints: float) -> JointStates:
+def joint_states(**joints: float) -> JointStates:
     return JointStates(joints=[JointState(name=name, position=angle) for name, angle in joints.items()])
 
 
-def heard(angles: list[float], other: float = 0.5) -> SettledJoints:
+def settled_joints(angles: list[float], other: float = 0.5) -> SettledJoints:
     settled = SettledJoints(("a", "b"))
     for number, angle in enumerate(angles):
-        settled.handle(said(b=other, a=angle, c=9.0), number * PERIOD_NS)
+        settled.handle(joint_states(b=other, a=angle, c=9.0), number * PERIOD_NS)
     return settled
 
 
 def test_tells_the_newest_angles_in_order_once_they_rest() -> None:
-    settled = heard([0.2] * 6 + [0.201])
+    settled = settled_joints([0.2] * 6 + [0.201])
     np.testing.assert_allclose(settled.settled(6 * PERIOD_NS), [0.201, 0.5], rtol=0, atol=1e-12)
 
 
 def test_tells_nothing_too_early_while_moving_or_when_stale() -> None:
-    assert heard([]).settled(0) is None
-    assert heard([0.2] * 3).settled(2 * PERIOD_NS) is None
-    assert heard(list(np.linspace(0.0, 0.1, 8))).settled(7 * PERIOD_NS) is None
-    assert heard([0.2] * 8).settled(40 * PERIOD_NS) is None
+    assert settled_joints([]).settled(0) is None
+    assert settled_joints([0.2] * 3).settled(2 * PERIOD_NS) is None
+    assert settled_joints(list(np.linspace(0.0, 0.1, 8))).settled(7 * PERIOD_NS) is None
+    assert settled_joints([0.2] * 8).settled(40 * PERIOD_NS) is None
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_what_is_no_angle_counts_for_nothing(bad: float) -> None:
-    settled = heard([0.2] * 8)
-    settled.handle(said(a=bad, b=0.5), 8 * PERIOD_NS)
-    settled.handle(said(a=0.7), 8 * PERIOD_NS)
+    settled = settled_joints([0.2] * 8)
+    settled.handle(joint_states(a=bad, b=0.5), 8 * PERIOD_NS)
+    settled.handle(joint_states(a=0.7), 8 * PERIOD_NS)
     np.testing.assert_allclose(settled.settled(8 * PERIOD_NS), [0.2, 0.5], rtol=0, atol=1e-12)

@@ -112,13 +112,13 @@ def test_while_the_arm_is_not_seen_it_waits_and_says_so_once(lost, words):
     assert story.run(30.0)
 
 
-def test_a_silent_tracker_is_told():
+def test_a_tracker_without_data_is_reported():
     story = PointingStory(places=1)
     story.points = [None]
     story.run_to("waiting")
-    story.silent = True
+    story.sends_nothing = True
     story.run(5.0)
-    assert "the tracker is silent. I wait." in story.sentences()
+    assert "the tracker sends no data" in story.sentences()
 
 
 def test_the_arm_waits_until_the_hand_has_left_and_asks_for_it():
@@ -132,16 +132,16 @@ def test_the_arm_waits_until_the_hand_has_left_and_asks_for_it():
     assert story.run(10.0)
 
 
-@pytest.mark.parametrize("what", ["lost", "silent", "another frame"])
+@pytest.mark.parametrize("what", ["lost", "no data", "another frame"])
 def test_where_the_hand_is_not_known_the_arm_does_not_go(what):
     story = PointingStory(places=1)
     story.run_to("letting_hand_leave")
     story.trouble = "the arm is lost" if what == "lost" else ""
-    story.silent = what == "silent"
+    story.sends_nothing = what == "no data"
     story.frame = "table" if what == "another frame" else story.frame
     story.run(60.0)
     assert story.of(PUT) == []
-    story.trouble, story.silent, story.frame = "", False, "right_shoulder"
+    story.trouble, story.sends_nothing, story.frame = "", False, "right_shoulder"
     assert story.run(10.0)
 
 
@@ -197,8 +197,8 @@ def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason():
 
 def test_a_goal_that_nobody_hears_is_sent_again():
     story = PointingStory()
-    said = story.relocator.tick(1.0).goals + story.relocator.tick(1.2).goals + story.relocator.tick(1.6).goals
-    assert [goal.id for goal in said] == ["run-1", "run-1"]
+    goals = story.relocator.tick(1.0).goals + story.relocator.tick(1.2).goals + story.relocator.tick(1.6).goals
+    assert [goal.id for goal in goals] == ["run-1", "run-1"]
 
 
 @pytest.mark.parametrize("wrong", [{"places": 0}, {"min_certainty": 1.5}, {"ask_again_s": 0}, {"corners": []}])

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from paramove.applications.conversation import SILENT_S
+from paramove.applications.conversation import TIMEOUT_S
 from paramove.applications.rule_learner import RuleLearner
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal
@@ -403,10 +403,10 @@ def test_a_goal_that_nobody_answers_is_given_up_and_the_failure_told() -> None:
     story.run_to(ApplicationStage.STAGE_APPLY)
     story.deaf = 10**6
     assert story.run(until=lambda: bool(story.relocations()))
-    assert story.run(SILENT_S + 5.0, until=lambda: story.goals[-1].kind == RelocationGoal.KIND_REST)
+    assert story.run(TIMEOUT_S + 5.0, until=lambda: story.goals[-1].kind == RelocationGoal.KIND_REST)
     story.deaf = 0
     assert story.run()
-    assert any("nobody has said for 30 s how goal" in speech.sentence for speech in story.speech)
+    assert any("no status of goal" in speech.sentence and "30 s" in speech.sentence for speech in story.speech)
 
 
 def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
@@ -424,13 +424,13 @@ def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
     story.run(OPTIONS.arming_timeout_s - 0.5)
     assert learner.failure == ""
     assert len(story.goals) == goals, "without an arm nothing is asked of it"
-    (told,) = [speech.sentence for speech in story.speech if "cannot go on" in speech.sentence]
+    (reported,) = [speech.sentence for speech in story.speech if "cannot go on" in speech.sentence]
     story.run(1.0)
     assert learner.failure == (
         "the arm is no longer armed (hold): the robot ran out of rows after 7 of 9 rows and stops; arm again; "
         "only a person arms it again"
     )
-    assert learner.failure in told
+    assert learner.failure in reported
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_an_emulated_run_that_failed_at_its_start_is_told_as_such(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert servo_arm.main([str(folder)]) == 66
-    assert "the run ended before anything was known of the emulated arm" in capsys.readouterr().err
+    assert "before the emulated arm published a state" in capsys.readouterr().err
     (folder / "nodes" / "judge.yaml").unlink()
     assert servo_arm.main([str(folder)]) == 66
     assert "only emulated runs, which have a node judge, write one" in capsys.readouterr().err

@@ -50,8 +50,8 @@ class FakeTable:
         self.grasps.append(name)
         self._offset = self.positions[name] - self.fingertip
 
-    def straighten(self, share: float) -> None:
-        if share >= 1:
+    def straighten(self, fraction: float) -> None:
+        if fraction >= 1:
             self._offset = np.array((0.0, 0.0, -tool_box.CYLINDER_HALF_HEIGHT))
 
     def release(self) -> None:

@@ -149,7 +149,7 @@ def test_an_interrupted_rendering_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(performances, "render", render)
     arguments = ["--kind", "pointing_50fps", "--clips", "2", "--out", str(tmp_path)]
     assert performances.main(arguments) == 130
-    assert "kept in" in capsys.readouterr().out
+    assert str(tmp_path) in capsys.readouterr().out
     assert [clip.number for clip in read_clips(tmp_path)] == [0]
     assert performances.main(arguments) == 0
     assert [clip.number for clip in read_clips(tmp_path)] == [0, 1]

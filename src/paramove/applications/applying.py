@@ -12,13 +12,13 @@ from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 
 NEAR = 0.035
-"""An object farther from the place is not meant, m; the objects stand at least 5 cm apart."""
+"""Maximum distance of the object from the target, m; the objects stand at least 5 cm apart."""
 CLEARER_BY = 0.015
 """The second nearest object must be so much farther away, m."""
 HAND_AWAY_S = 0.3
-HAND_PATIENCE_S = 6.0
+HAND_TIMEOUT_S = 6.0
 SETTLED_S = 1.0
-"""A person points at what has stood for so long: before, the hand has just put it there."""
+"""An object must have stood this long to be pointed at: before, the hand has just put it there."""
 
 
 class Applying(Stage):
@@ -41,14 +41,14 @@ class Applying(Stage):
         self._ask()
 
     def on_gesture(self, gesture: Gesture) -> None:
-        """Remember who is pointed at while waiting for that."""
+        """Store the target while waiting for one."""
         if gesture.kind != Gesture.KIND_POINTED_AT or self.state != "waiting":
             return
         if self.app.options.pointing == "nearness":
             if gesture.object or not gesture.located:
                 self._pointed_at(gesture.object)
         elif not gesture.object and gesture.captured.ToNanoseconds() * 1e-9 > self.app.now_s - self.for_s:
-            self._pointed_at_place(gesture)
+            self._pointed_at_position(gesture)
 
     def step(self) -> ApplicationStage.Stage | None:
         """One tick."""
@@ -63,7 +63,7 @@ class Applying(Stage):
         return steps[self.state]()
 
     def _ask(self) -> None:
-        self.app.tell("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
+        self.app.speak("Please point at the object that I shall put away.", Speech.REQUEST_POINT_AT_OBJECT)
         self.go("waiting")
 
     def _waiting(self) -> None:
@@ -73,31 +73,31 @@ class Applying(Stage):
     def _pointed_at(self, name: str) -> None:
         place = self.app.table.standing().get(name)
         if name not in self.app.rules or place is None:
-            self.app.tell(f"You point at {name or 'something'}, but I do not know where it stands or belongs.")
+            self.app.speak(f"You point at {name or 'something'}, but I do not know where it stands or belongs.")
             return
         self._object, self._source, self._attempt = name, place, 0
-        self.app.tell(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
+        self.app.speak(f"You point at {name} at {cm(place)}: it belongs to the opening at {cm(self.app.rules[name])}.")
         self.go("letting_hand_leave")
 
-    def _pointed_at_place(self, gesture: Gesture) -> None:
-        """The object at rest there. Beside the table, and while it is being arranged, nobody points at anything."""
+    def _pointed_at_position(self, gesture: Gesture) -> None:
+        """Take the object at rest there. Targets off the table, or while objects are being arranged, are ignored."""
         app = self.app
         if not gesture.located or gesture.frame != app.options.frame:
-            app.tell(
+            app.speak(
                 f"You point at a place in the frame {gesture.frame!r}; I only know places in {app.options.frame!r}."
             )
             return
         settled = app.table.standing(settled_s=gesture.captured.ToNanoseconds() * 1e-9 - SETTLED_S)
-        found = object_at((gesture.x, gesture.y), settled)
-        if found.name:
-            self._pointed_at(found.name)
+        result = object_at((gesture.x, gesture.y), settled)
+        if result.name:
+            self._pointed_at(result.name)
         elif app.options.surface.contains((gesture.x, gesture.y)) and set(app.rules) - app.done <= set(settled):
-            app.tell(f"{found.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
+            app.speak(f"{result.doubt} Please point again.", Speech.REQUEST_POINT_AT_OBJECT)
             self.go("waiting")
 
     def _letting_hand_leave(self) -> None:
         away = self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S
-        if away or self.for_s > HAND_PATIENCE_S:
+        if away or self.for_s > HAND_TIMEOUT_S:
             self._relocate()
 
     def _relocate(self) -> None:
@@ -122,7 +122,7 @@ class Applying(Stage):
         if outcome is None:
             return
         if outcome.state == RelocationStatus.STATE_REFUSED:
-            self._refused(outcome)
+            self._rejected(outcome)
         elif outcome.state == RelocationStatus.STATE_FAILED:
             self._failure = outcome.reason or "it failed"
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
@@ -130,14 +130,14 @@ class Applying(Stage):
         else:
             self.go("looking")
 
-    def _refused(self, outcome: RelocationStatus) -> None:
-        """No way round a standing object: that one first. Only where each stands in the other's way is help needed."""
+    def _rejected(self, outcome: RelocationStatus) -> None:
+        """No path around a standing object: that one first. Ask for help only if each blocks the other."""
         self._stuck.add(self._object)
         in_the_way = (self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided))
         other = next((name for name in in_the_way if name not in self._stuck | self.app.done), "")
         if other:
             sentence = f"{other} stands in the way of {self._object}. Please point at {other} first."
-            self.app.tell(sentence, Speech.REQUEST_POINT_AT_OBJECT, other)
+            self.app.speak(sentence, Speech.REQUEST_POINT_AT_OBJECT, other)
             self.go("waiting")
         else:
             self._ask_for_help(f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}.")
@@ -151,14 +151,14 @@ class Applying(Stage):
         """The arm has left: is the object gone, or does it stand or lie somewhere?"""
         if self.for_s < self.app.options.settle_s:
             return None
-        seen = self.app.table.objects.get(self._object)
-        if not self._failure and seen is not None and seen.kind == Gesture.KIND_VANISHED:
+        sighting = self.app.table.objects.get(self._object)
+        if not self._failure and sighting is not None and sighting.kind == Gesture.KIND_VANISHED:
             return self._put_away()
-        if seen is not None and seen.at_rest and seen.place is not None:
-            unseen = not self._failure and seen.time_s < self._began_s
-            if unseen and self.for_s < 2 * self.app.options.settle_s:
-                return None  # not seen since: the view is not settled yet
-            self._try_again(seen.place)
+        if sighting is not None and sighting.at_rest and sighting.position is not None:
+            outdated = not self._failure and sighting.time_s < self._began_s
+            if outdated and self.for_s < 2 * self.app.options.settle_s:
+                return None  # not detected since: the view is not settled yet
+            self._try_again(sighting.position)
             return None
         if self.for_s > 3 * self.app.options.settle_s:
             self._ask_for_help(f"I have lost sight of {self._object}.")
@@ -170,16 +170,16 @@ class Applying(Stage):
             self._ask_for_help(f"I tried {self._attempt} times to put {self._object} away: {reason or 'it stayed'}.")
             return
         self._source = place
-        self.app.tell(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
+        self.app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
         self._relocate()
 
     def _ask_for_help(self, sentence: str) -> None:
-        self.app.tell(f"{sentence} Please put it to another place.", Speech.REQUEST_HELP, self._object)
+        self.app.speak(f"{sentence} Please put it to another place.", Speech.REQUEST_HELP, self._object)
         self.go("helped")
 
     def _helped(self) -> None:
-        seen = self.app.table.objects.get(self._object)
-        came = seen is not None and seen.at_rest and seen.time_s > self.app.now_s - self.for_s
+        sighting = self.app.table.objects.get(self._object)
+        came = sighting is not None and sighting.at_rest and sighting.time_s > self.app.now_s - self.for_s
         if came and self.app.table.hand_away_for(self.app.now_s) > HAND_AWAY_S:
             self._stuck.clear()
             self._ask()
@@ -189,9 +189,9 @@ class Applying(Stage):
     def _put_away(self) -> ApplicationStage.Stage | None:
         self.app.done.add(self._object)
         self._stuck.clear()
-        self.app.tell(f"{self._object} is put away.")
+        self.app.speak(f"{self._object} is put away.")
         if set(self.app.options.objects) <= self.app.done:
-            self.app.tell("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
+            self.app.speak("All objects are put away. Thank you!", Speech.REQUEST_THANK_YOU)
             return ApplicationStage.STAGE_DONE
         self._ask()
         return None
@@ -199,14 +199,14 @@ class Applying(Stage):
 
 @dataclass(frozen=True)
 class PointedObject:
-    """Either the name of the object or the doubt why it cannot be told, a sentence; the other is empty."""
+    """Either the object's name or a message why it is not clear; the other is empty."""
 
     name: str = ""
     doubt: str = ""
 
 
 def object_at(place: Place, standing: Mapping[str, Place]) -> PointedObject:
-    """The object that is meant with a place, m, of those that stand at places on the same plane."""
+    """The object that a target, m, refers to, of those that stand on the same plane."""
     ordered = sorted(standing, key=lambda name: (math.dist(standing[name], place), name))
     distances = [math.dist(standing[name], place) for name in ordered]
     if not ordered or not distances[0] <= NEAR:  # NaN is not near either

@@ -1,4 +1,4 @@
-"""Whether the robot's arm is armed, as the application needs to know it: without, no goal can be done."""
+"""Whether the robot's arm is armed: an application can execute no goal while it is not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _AT_WORK = (SafetyState.STATE_ARMED, SafetyState.STATE_STOPPING)
 
 
 class ArmWatch:
-    """Follows the safety gate's state. Before the arm was armed for the first time nothing is amiss.
+    """Follows the safety gate's state. Until the arm was armed for the first time, it reports no loss.
 
     Args:
         timeout_s: How long a person may take to arm again.
@@ -22,7 +22,7 @@ class ArmWatch:
         self._why = ""
 
     def on_safety(self, message: SafetyState, now_s: float) -> None:
-        """Hear the gate's state."""
+        """Store the gate's state."""
         self._state = message.state
         self._was_armed |= message.state == SafetyState.STATE_ARMED
         if not self._was_armed or message.state in _AT_WORK:
@@ -40,11 +40,11 @@ class ArmWatch:
 
     @property
     def sentence(self) -> str:
-        """What is amiss, why, and what would help."""
+        """What happened, why, and what to do."""
         state = SafetyState.State.Name(self._state).removeprefix("STATE_").lower()
         why = f": {self._why}" if self._why else ""
         return f"the arm is no longer armed ({state}){why}; only a person arms it again"
 
     def given_up(self, now_s: float) -> bool:
-        """Whether nobody has armed it in time."""
+        """Whether the timeout expired before a person armed it again."""
         return self._lost_s is not None and now_s - self._lost_s >= self._timeout_s

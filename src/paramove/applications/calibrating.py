@@ -25,17 +25,17 @@ class Calibrating(Stage):
     def __init__(self, app: ApplicationState) -> None:
         super().__init__(app)
         self._held: str = ""
-        self._seen: list[tuple[Place, Sighting]] = []
+        self._observations: list[tuple[Place, Sighting]] = []
         self._missed = 0
 
     def enter(self) -> None:
         """Bring the arm to its base pose."""
-        self.app.tell("I do not know yet how the camera sees the table. I will place an object at four corners.")
+        self.app.speak("I do not know yet how the camera sees the table. I will place an object at four corners.")
         self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
         self.go("resting")
 
     def on_gesture(self, gesture: Gesture) -> None:
-        """Nothing: what the table keeps is enough for this stage."""
+        """Nothing: the sightings stored by the table suffice."""
 
     def step(self) -> ApplicationStage.Stage | None:
         """One tick."""
@@ -53,7 +53,7 @@ class Calibrating(Stage):
 
     @property
     def _corner(self) -> Place:
-        return self.app.options.corners[len(self._seen)]
+        return self.app.options.corners[len(self._observations)]
 
     def _resting(self) -> None:
         if self.app.goal_client.outcome is not None:
@@ -75,8 +75,8 @@ class Calibrating(Stage):
             self.go("resting")
 
     def _ask_for_help(self, sentence: str) -> None:
-        """The same goal would be refused again: only a person can change that."""
-        self.app.tell(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
+        """The same goal would be rejected again: only a person can change that."""
+        self.app.speak(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
         self.go("helped")
 
     def _helped(self) -> None:
@@ -85,15 +85,15 @@ class Calibrating(Stage):
             self.go("resting")
 
     def _ask(self) -> None:
-        self.app.tell("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
+        self.app.speak("Please put an object into my hand and hold it there.", Speech.REQUEST_HAND_ME_AN_OBJECT)
         self.go("asking")
 
     def _asking(self) -> None:
         since = self.app.now_s - self.for_s
         held_still = [
             name
-            for name, seen in self.app.table.objects.items()
-            if seen.at_rest and seen.time_s > since and self.app.now_s - seen.time_s >= HELD_STILL_S
+            for name, sighting in self.app.table.objects.items()
+            if sighting.at_rest and sighting.time_s > since and self.app.now_s - sighting.time_s >= HELD_STILL_S
         ]
         if held_still:
             self._held = max(held_still, key=lambda name: self.app.table.objects[name].time_s)
@@ -104,7 +104,7 @@ class Calibrating(Stage):
 
     def _taking(self) -> None:
         if self.app.goal_client.succeeded:
-            self.app.tell(f"I have {self._held}. Please let go.", Speech.REQUEST_LET_GO)
+            self.app.speak(f"I have {self._held}. Please let go.", Speech.REQUEST_LET_GO)
             self.go("letting_go")
         elif self.app.goal_client.outcome is not None:
             self._ask()
@@ -126,26 +126,26 @@ class Calibrating(Stage):
 
     def _start_again(self, reason: str) -> None:
         self._missed += 1
-        self.app.tell(f"That did not work: {reason}.")
+        self.app.speak(f"That did not work: {reason}.")
         self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
         self.go("resting")
 
     def _looking(self) -> ApplicationStage.Stage | None:
         """The arm has left: wait for a clear view of the object."""
-        seen = self.app.table.objects.get(self._held)
+        sighting = self.app.table.objects.get(self._held)
         if self.for_s < self.app.options.settle_s:
             return None
-        if seen is not None and seen.at_rest and seen.time_s > self.app.goal_client.started_s:
-            self._seen.append((self._corner, seen))
+        if sighting is not None and sighting.at_rest and sighting.time_s > self.app.goal_client.started_s:
+            self._observations.append((self._corner, sighting))
             return self._next_corner()
         if self.for_s > 2 * self.app.options.settle_s:
             self._start_again(f"I do not see {self._held} at {cm(self._corner)}")
         return None
 
     def _next_corner(self) -> ApplicationStage.Stage | None:
-        if len(self._seen) == len(self.app.options.corners):
+        if len(self._observations) == len(self.app.options.corners):
             return self._finish()
-        source = self.app.goals.position(self._seen[-1][0])
+        source = self.app.goals.position(self._observations[-1][0])
         target = self.app.goals.position(self._corner)
         self.app.goal_client.start(
             RelocationGoal.KIND_RELOCATE, self.app.now_s, self._held, source, target, attempt=1 + self._missed
@@ -155,14 +155,14 @@ class Calibrating(Stage):
         return None
 
     def _finish(self) -> ApplicationStage.Stage | None:
-        image = [(seen.u_px, seen.v_px) for _, seen in self._seen]
-        plane = [place for place, _ in self._seen]
+        image = [(sighting.u_px, sighting.v_px) for _, sighting in self._observations]
+        plane = [place for place, _ in self._observations]
         try:
             homography = PlaneHomography.fit(image, plane, self.app.options.grasp_z)
         except HomographyError as error:
-            self._seen = []
+            self._observations = []
             self._start_again(str(error))
             return None
         self.app.outgoing.calibrations.append(homography.to_message(round(self.app.now_s * 1e9)))
-        self.app.tell("Now I know where I see what I can reach.")
+        self.app.speak("Now I know where I see what I can reach.")
         return ApplicationStage.STAGE_LEARN

@@ -1,4 +1,4 @@
-"""What an application says: goals to the arm, requests to the person, and its beliefs."""
+"""What an application publishes: goals for the arm, requests to the person, and its estimates."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 
 RESEND_S = 0.5
-ASK_AGAIN_S = 5.0  # a goal under way of which nothing was heard for so long is asked for
-SILENT_S = 30.0  # and given up when nobody answers for so long
+QUERY_S = 5.0  # the status of an acknowledged goal is queried after this time without one
+TIMEOUT_S = 30.0  # a goal fails after this time without a status
 _LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED}
 
 
 @dataclass
 class OutgoingMessages:
-    """Messages to be said at the end of this tick."""
+    """Messages to publish at the end of this tick."""
 
     goals: list[RelocationGoal] = field(default_factory=list)
     speech: list[Speech] = field(default_factory=list)
@@ -34,14 +34,14 @@ class Goals:
     grasp_z: float
 
     def position(self, place: tuple[float, float], above: float = 0.0) -> Position:
-        """A place on the working plane as a position of the gripper."""
+        """A position on the working plane as a position of the gripper."""
         return Position(x=place[0], y=place[1], z=self.grasp_z + above)
 
 
 class GoalClient:
-    """One goal after the other, each sent again until it is acknowledged, and asked for when it is silent too long.
+    """Sends one goal after the other, each until it is acknowledged, and queries its status after a while without one.
 
-    Whoever does the goals may have been restarted and know nothing of it: it then says so, and the goal has failed.
+    The node that executes goals may have been restarted and not know the goal: it reports that, and the goal fails.
 
     Attributes:
         grasps: How many times an object was to be grasped.
@@ -54,7 +54,7 @@ class GoalClient:
         self._goal: RelocationGoal | None = None
         self._status: RelocationStatus | None = None
         self._sent_s = 0.0
-        self._heard_s = 0.0
+        self._received_s = 0.0
         self._now_s = 0.0
         self.started_s = 0.0
         self.grasps = 0
@@ -81,26 +81,26 @@ class GoalClient:
             goal.to.CopyFrom(target)
         goal.avoid.extend(self._goals.position(place) for place in avoid)
         self._goal, self._status, self._sent_s, self.started_s = goal, None, float("-inf"), now_s
-        self._heard_s = now_s
+        self._received_s = now_s
         if kind in (RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_FETCH):
             self.grasps += 1
             self.retries += attempt > 1
 
     def on_status(self, status: RelocationStatus) -> None:
-        """Hear how a goal fares."""
+        """Store the status of the current goal."""
         if self._goal is not None and status.goal_id == self._goal.id:
-            self._status, self._heard_s = status, self._now_s
+            self._status, self._received_s = status, self._now_s
 
     def step(self, now_s: float, outgoing: OutgoingMessages) -> None:
-        """Send the goal, again if nobody acknowledged it; ask for it or give it up if nothing is heard of it."""
+        """Send the goal, again without an acknowledgement; query it, or let it fail, without a status."""
         self._now_s = now_s
         if self._goal is None or self.outcome is not None:
             return
         acknowledged = self._status is not None
-        if now_s - self._heard_s >= SILENT_S:
-            reason = f"nobody has said for {SILENT_S:g} s how goal {self._goal.id} fares; is the synthesizer alive?"
+        if now_s - self._received_s >= TIMEOUT_S:
+            reason = f"no status of goal {self._goal.id} for {TIMEOUT_S:g} s; check that the synthesizer is running"
             self._status = RelocationStatus(goal_id=self._goal.id, state=RelocationStatus.STATE_FAILED, reason=reason)
-        elif now_s >= (max(self._sent_s, self._heard_s) + ASK_AGAIN_S if acknowledged else self._sent_s + RESEND_S):
+        elif now_s >= (max(self._sent_s, self._received_s) + QUERY_S if acknowledged else self._sent_s + RESEND_S):
             self._goal.asked_again = acknowledged
             sent = RelocationGoal()
             sent.CopyFrom(self._goal)
@@ -109,7 +109,7 @@ class GoalClient:
 
     @property
     def outcome(self) -> RelocationStatus | None:
-        """The last status of the goal, None while it is being done."""
+        """The final status of the goal, None while it is being executed."""
         return self._status if self._status is not None and self._status.state in _LAST else None
 
     @property

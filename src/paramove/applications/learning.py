@@ -10,7 +10,7 @@ from paramove.applications.stage import ApplicationState, Place, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 
-BORDER = 0.02  # m; what vanishes at the surface's border was carried away
+BORDER = 0.02  # m; an object that vanishes at the surface's border was carried away
 GONE_FOR_GOOD_S = 1.5  # an object that was only hidden appears again within this time
 
 
@@ -23,12 +23,11 @@ class Learning(Stage):
         super().__init__(app)
         self._moved: set[str] = set()
         self._going_in: dict[str, tuple[Place, float]] = {}
-        self._seen: dict[str, tuple[float, int]] = {}
-        self._asked_again = ""
+        self._observations: dict[str, tuple[float, int]] = {}
 
     def enter(self) -> None:
         """Ask for the rules."""
-        self.app.tell("Please show me into which opening each object belongs.", Speech.REQUEST_SHOW_RULES)
+        self.app.speak("Please show me into which opening each object belongs.", Speech.REQUEST_SHOW_RULES)
         self.go("watching")
         self._last_event_s = self.app.now_s
 
@@ -43,8 +42,10 @@ class Learning(Stage):
             self._going_in.pop(name, None)
             self._moved.discard(name)
             if name in self.app.rules:
-                del self.app.rules[name]  # it is back: what was seen was not its opening, or it is shown again
-                self._say_rules()
+                del self.app.rules[
+                    name
+                ]  # it is back: the observed opening was wrong, or the person demonstrates it again
+                self._publish_rules()
         elif gesture.kind == Gesture.KIND_VANISHED and name in self._moved and gesture.located:
             self._moved.discard(name)
             if self.app.options.surface.contains(place, BORDER):
@@ -55,39 +56,39 @@ class Learning(Stage):
         for name, (place, seen_s) in list(self._going_in.items()):
             if self.app.now_s - seen_s >= GONE_FOR_GOOD_S and not self.app.table.hand_in_view:
                 del self._going_in[name]
-                self._believe(name, place, seen_s)
+                self._learn(name, place, seen_s)
         missing = [name for name in self.app.options.objects if name not in self.app.rules]
         if not missing:
-            self.app.tell("I know all the rules now.")
+            self.app.speak("I know all the rules now.")
             return ApplicationStage.STAGE_APPLY
         quiet_s = self.app.now_s - max(self._last_event_s, self.app.now_s - self.for_s)
         if quiet_s > self.app.options.ask_again_s:
             self._ask_again(missing[0])
         return None
 
-    def _believe(self, name: str, place: Place, seen_s: float) -> None:
-        count = self._seen.get(name, (0.0, 0))[1] + 1
-        self._seen[name] = (seen_s, count)
+    def _learn(self, name: str, place: Place, seen_s: float) -> None:
+        count = self._observations.get(name, (0.0, 0))[1] + 1
+        self._observations[name] = (seen_s, count)
         self.app.rules[name] = place
-        self.app.tell(self._sentence(name))
-        self._say_rules()
+        self.app.speak(self._description(name))
+        self._publish_rules()
 
-    def _sentence(self, name: str) -> str:
-        place, (seen_s, _) = self.app.rules[name], self._seen[name]
+    def _description(self, name: str) -> str:
+        place, (seen_s, _) = self.app.rules[name], self._observations[name]
         return f"{name} belongs to the opening at {cm(place)}, seen going in at {seen_s:.1f} s"
 
-    def _say_rules(self) -> None:
+    def _publish_rules(self) -> None:
         message = Rules(frame=self.app.options.frame)
         message.captured.FromNanoseconds(round(self.app.now_s * 1e9))
         for name in sorted(self.app.rules):
-            place, (seen_s, count) = self.app.rules[name], self._seen[name]
-            rule = Rule(object=name, x=place[0], y=place[1], observations=count, sentence=self._sentence(name))
+            place, (seen_s, count) = self.app.rules[name], self._observations[name]
+            rule = Rule(object=name, x=place[0], y=place[1], observations=count, sentence=self._description(name))
             rule.seen.FromNanoseconds(round(seen_s * 1e9))
             message.rules.append(rule)
         self.app.outgoing.rules.append(message)
 
     def _ask_again(self, name: str) -> None:
-        self.app.tell(
+        self.app.speak(
             f"I did not see where {name} belongs. Please show me again.", Speech.REQUEST_SHOW_RULE_AGAIN, name
         )
         self.go("watching")

@@ -1,4 +1,4 @@
-"""A list of places to reach for and of objects to relocate, done by a servo arm one after the other."""
+"""A list of positions to reach and objects to relocate, executed by a servo arm one after the other."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from paramove.robots import OutOfReachError
 
 REST_NS = 300_000_000
 STALE_NS = 1_000_000_000
-MOST = 2.0 * np.pi
+MAX_ANGLE = 2.0 * np.pi
 REST_TOLERANCE = np.deg2rad(0.5)
 _log = logging.getLogger(__name__)
 
 RESEND_NS = 400_000_000
-SILENT_NS = 10_000_000_000
-TOLD_AFTER_NS = 1_000_000_000
-"""For so long an arm may be unarmed before that is said aloud: where a node arms it, nobody has to hear of it."""
+STATUS_TIMEOUT_NS = 10_000_000_000
+REPORT_UNARMED_AFTER_NS = 1_000_000_000
+"""How long an arm may be unarmed before that is reported: where a node arms it, no report is needed."""
 STALE_TRIES = 3
 _STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REFUSED: "refused"}
 
 
-def _near(place: tuple[float, float, float]) -> tuple[float, float, float]:
-    if max(map(abs, place)) > FARTHEST_M:
+def _near(position: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, position)) > FARTHEST_M:
         raise ValueError(f"expected x, y, z in m, each from -{FARTHEST_M:g} to {FARTHEST_M:g}")
-    return place
+    return position
 
 
 Point = Annotated[tuple[float, float, float], AfterValidator(_near)]
 
 
 class ReachStep(BaseModel):
-    """`reach` a place, or `pick` an object up and `place` it; frame of the arm's base, m."""
+    """`reach` a position, or `pick` an object up and `place` it; frame of the arm's base, m."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -64,7 +64,7 @@ class ReachStep(BaseModel):
 
     @property
     def sentence(self) -> str:
-        """What is done, for people."""
+        """The step as text."""
         if self.reach is not None:
             return f"reach for {metres(np.array(self.reach))}"
         return f"pick up at {metres(np.array(self.pick))} and place at {metres(np.array(self.place))}"
@@ -80,7 +80,7 @@ class ReachStep(BaseModel):
 
 @dataclass
 class ReachOutput:
-    """What a tick gives."""
+    """Messages of a tick."""
 
     trajectories: list[JointTrajectory] = field(default_factory=list)
     speech: list[Speech] = field(default_factory=list)
@@ -91,24 +91,24 @@ class _Running:
     motion: PlannedMotion
     message: JointTrajectory
     sent_ns: int
-    heard_ns: int
+    received_ns: int
     acknowledged: bool = False
     stale: int = 0
 
 
 class ReachTask:
-    """Hear messages with the `on_…` methods, then call `tick`. Begins when the arm is armed and rests.
+    """Pass received messages to the `on_…` methods, then call `tick`. Begins when the arm is armed and rests.
 
     Args:
         reaching: Plans the motions.
         steps: What to do; at the end the arm goes back to its base pose.
-        run_name: Begins the trajectories' ids; a new one for every process.
+        run_name: Prefix of the trajectories' ids; unique to the process.
 
     Raises:
-        InputError: A step cannot be done; names it, the reason and what would work.
+        InputError: A step cannot be executed; the message has the step, the reason and what would work.
 
     Attributes:
-        sentence: What it does, for people.
+        sentence: What it does, as text.
         failure: Why it cannot go on; empty while it can.
         finished: Whether all is done.
     """
@@ -127,31 +127,31 @@ class ReachTask:
         self._output = ReachOutput()
         self._now_ns = 0
         self._unarmed = self.sentence = "waiting for the arm's driver"
-        self._unarmed_since_ns, self._unarmed_told = 0, ""
+        self._unarmed_since_ns, self._unarmed_reported = 0, ""
         self.failure = ""
         self.finished = False
         self._rehearse()
 
     def on_joint_states(self, message: JointStates) -> None:
-        """Hear the measured joints."""
+        """Store the measured joints."""
         self._joints.handle(message, self._now_ns)
 
     def on_safety(self, message: SafetyState) -> None:
-        """Hear the safety gate's state."""
+        """Store the safety gate's state."""
         self._armed = message.state == SafetyState.STATE_ARMED
         self._watch.on_safety(message, self._now_ns * 1e-9)
         why = "".join(f"; {fault.sentence}" for fault in message.faults)
         self._unarmed = f"waiting until a person arms the arm (paramove arm enable){why}"
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
-        """Hear how the driver fares with the motion under way."""
+        """Follow the driver's status of the current motion."""
         running = self._running
         if running is None or status.trajectory_id != running.message.id:
             return
-        running.heard_ns = self._now_ns
-        refused = status.state == TrajectoryStatus.STATE_REFUSED
-        if refused and status.code == "stale" and running.stale < STALE_TRIES:
-            running.stale += 1  # it lay too long before the driver heard it: it is said again with the time of now
+        running.received_ns = self._now_ns
+        rejected = status.state == TrajectoryStatus.STATE_REFUSED
+        if rejected and status.code == "stale" and running.stale < STALE_TRIES:
+            running.stale += 1  # it was too old when the driver received it: publish it again with the current time
             running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
             return
         running.acknowledged = True
@@ -161,7 +161,7 @@ class ReachTask:
             self._fail(f"the arm's driver {_STOPPED[status.state]} the motion: {status.reason or 'it gives no reason'}")
 
     def tick(self, now_ns: int) -> ReachOutput:
-        """Once per turn: what is to be said."""
+        """One tick; returns the messages to publish."""
         self._now_ns = now_ns
         running = self._running
         if self.finished or self.failure:
@@ -170,8 +170,8 @@ class ReachTask:
             self._fail(self._watch.sentence)
         elif running is None:
             self._begin()
-        elif now_ns - running.heard_ns > SILENT_NS:
-            self._fail(f"the arm's driver has said nothing of the motion for {SILENT_NS * 1e-9:.0f} s")
+        elif now_ns - running.received_ns > STATUS_TIMEOUT_NS:
+            self._fail(f"no status of the motion from the arm's driver for {STATUS_TIMEOUT_NS * 1e-9:.0f} s")
         elif not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS:
             running.message.captured.FromNanoseconds(now_ns)
             running.sent_ns = now_ns
@@ -181,13 +181,13 @@ class ReachTask:
 
     @property
     def _what(self) -> str:
-        """The step under way, in words."""
+        """The current step as text."""
         if self._done >= len(self._steps):
             return "going back to the base pose"
         return f"task {self._done + 1} of {len(self._steps)}, {self._steps[self._done].sentence}"
 
     def _rehearse(self) -> None:
-        """Plan all steps once, so that what cannot be done is known before the arm moves."""
+        """Plan all steps once: a step that cannot be executed is reported before the arm moves."""
         at = self._reaching.base_angles
         for step in self._steps:
             try:
@@ -222,9 +222,11 @@ class ReachTask:
         """For a driver and an armed arm."""
         if self.sentence != self._unarmed or not self._unarmed_since_ns:
             self.sentence, self._unarmed_since_ns = self._unarmed, self._now_ns
-        elif self._now_ns - self._unarmed_since_ns > TOLD_AFTER_NS and self._unarmed_told != self._unarmed:
-            self._unarmed_told = self._unarmed
-            self._tell(self._unarmed)
+        elif (
+            self._now_ns - self._unarmed_since_ns > REPORT_UNARMED_AFTER_NS and self._unarmed_reported != self._unarmed
+        ):
+            self._unarmed_reported = self._unarmed
+            self._speak(self._unarmed)
 
     def _plan(self, start: Floats) -> None:
         going_home = self._done >= len(self._steps)
@@ -237,9 +239,9 @@ class ReachTask:
             return
         self._sent += 1
         message = motion_message(f"{self._run_name}/{self._sent}", self._reaching.joints, motion, self._now_ns)
-        # Planning takes a while: it is said in the next turn, with the time of then.
+        # Planning takes a while: the next tick publishes it, with its own time.
         self._running = _Running(motion, message, self._now_ns - RESEND_NS, self._now_ns)
-        self._tell(f"{self._what}: {motion.times[-1]:.0f} s")
+        self._speak(f"{self._what}: {motion.times[-1]:.0f} s")
 
     def _ended(self, motion: PlannedMotion) -> None:
         self._running, self._at = None, motion.angles[-1]
@@ -247,14 +249,14 @@ class ReachTask:
         at_base = bool(np.abs(self._at - self._reaching.base_angles).max() < 1e-6)
         if self._done > len(self._steps) or (self._done == len(self._steps) and at_base):
             self.finished = True
-            self._tell(f"all {len(self._steps)} tasks are done")
+            self._speak(f"all {len(self._steps)} tasks are done")
 
     def _fail(self, why: str) -> None:
         self._running = None
         self.failure = f"{self._what}: {why}"
-        self._tell(self.failure, Speech.REQUEST_HELP)
+        self._speak(self.failure, Speech.REQUEST_HELP)
 
-    def _tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
+    def _speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
         speech = Speech(request=request, sentence=sentence)
         speech.captured.FromNanoseconds(self._now_ns)
         self._output.speech.append(speech)
@@ -263,10 +265,10 @@ class ReachTask:
 
 
 class SettledJoints:
-    """Where an arm's joints are once they rest, from what its driver reported in the last third of a second.
+    """An arm's joint angles once they rest, from its driver's reports of the last third of a second.
 
     Args:
-        joints: Names, in the order that is wanted.
+        joints: Names, in the order of the angles returned.
 
     Attributes:
         missing: Of these names, those that the latest message did not have.
@@ -274,24 +276,24 @@ class SettledJoints:
 
     def __init__(self, joints: Sequence[str]) -> None:
         self._joints = tuple(joints)
-        self._heard: deque[tuple[int, Floats]] = deque()
+        self._received: deque[tuple[int, Floats]] = deque()
         self.missing: tuple[str, ...] = ()
 
     def handle(self, message: JointStates, now_ns: int) -> None:
-        """Take in measured joints; a message in which one is missing, or no angle, counts for nothing."""
+        """Store measured joints; a message with a missing joint or an invalid angle is ignored."""
         measured = {joint.name: joint.position for joint in message.joints}
         self.missing = tuple(name for name in self._joints if name not in measured)
         angles = np.array([measured.get(name, np.nan) for name in self._joints])
-        if not (np.abs(angles) <= MOST).all():  # NaN is not below either
+        if not (np.abs(angles) <= MAX_ANGLE).all():  # NaN is not below either
             return
-        self._heard.append((now_ns, angles))
-        while len(self._heard) > 2 and now_ns - self._heard[1][0] >= REST_NS:
-            self._heard.popleft()
+        self._received.append((now_ns, angles))
+        while len(self._received) > 2 and now_ns - self._received[1][0] >= REST_NS:
+            self._received.popleft()
 
     def settled(self, now_ns: int) -> Floats | None:
-        """The latest angles [J], rad, if the joints have rested for a while and are heard; else None."""
-        if not self._heard or now_ns - self._heard[-1][0] > STALE_NS or now_ns - self._heard[0][0] < REST_NS:
+        """The latest angles [J], rad, if the joints have rested for a while and the data is recent; else None."""
+        if not self._received or now_ns - self._received[-1][0] > STALE_NS or now_ns - self._received[0][0] < REST_NS:
             return None
-        if np.ptp([angles for _, angles in self._heard], axis=0).max() > REST_TOLERANCE:
+        if np.ptp([angles for _, angles in self._received], axis=0).max() > REST_TOLERANCE:
             return None
-        return self._heard[-1][1]
+        return self._received[-1][1]

@@ -1,6 +1,7 @@
 """Relocation by pointing (paper 5.4, figure 16): the robot holds an object and puts it where a person points.
 
-Then it fetches the object again and the next place is pointed at. It knows where the object is: it has put it there.
+Then it fetches the object again, and the person points at the next position. It knows the object's position from its
+own last placement.
 """
 
 from __future__ import annotations
@@ -19,26 +20,26 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
 
-SILENT_S = 1.0
+NO_ESTIMATE_S = 1.0
 _log = logging.getLogger(__name__)
 
 STAGE_PERIOD_S = 1.0
 
 
 class Relocator:
-    """Hear messages with the `on_…` methods, then call `tick`.
+    """Pass received messages to the `on_…` methods, then call `tick`.
 
-    States: resting, aligning (waiting for the object to be pointed at), fetching, waiting (for a place),
+    States: resting, aligning (waiting for the object to be pointed at), fetching, waiting (for a target),
     letting_hand_leave, placing, helped (waiting for help).
 
     Args:
-        options: Places and timeouts.
-        run_name: Begins the goals' ids; a new one for every process, as the same id is done only once.
+        options: Positions and timeouts.
+        run_name: Prefix of the goals' ids; unique to the process, as a goal id is executed only once.
 
     Attributes:
         state: Name of the state.
-        sentence: What was said last.
-        placed: Places at which the object was put.
+        sentence: Text of the last speech message.
+        placed: Positions at which the object was put.
     """
 
     def __init__(self, options: RelocatorOptions, run_name: str) -> None:
@@ -51,13 +52,13 @@ class Relocator:
         self._now_s = 0.0
         self._since_s = 0.0
         self._quiet_since_s = 0.0
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._object_at = options.start
         self._target: Place = options.start
         self._offset: Place | None = None if options.aligns else (0.0, 0.0)
         self._holding = False
         self._missed = 0
-        self._said = ("", float("-inf"))
+        self._last_stage = ("", float("-inf"))
         self.state = ""
         self.sentence = ""
         self.placed: list[Place] = []
@@ -78,13 +79,13 @@ class Relocator:
 
     @property
     def finished(self) -> bool:
-        """Whether the object was put at all places."""
+        """Whether the object was put at all positions."""
         return len(self.placed) >= self._options.places
 
     def on_gesture(self, gesture: Gesture) -> None:
-        """Somebody points at a place. What was pointed at before the robot asked does not count."""
-        asked = gesture.captured.ToNanoseconds() * 1e-9 > self._since_s
-        if gesture.kind != Gesture.KIND_POINTED_AT or not gesture.located or not asked:
+        """The tracker recognised a pointing gesture. One captured before the robot's request is ignored."""
+        after_request = gesture.captured.ToNanoseconds() * 1e-9 > self._since_s
+        if gesture.kind != Gesture.KIND_POINTED_AT or not gesture.located or not after_request:
             return
         if self.state == "waiting":
             self._pointed_at(gesture)
@@ -92,29 +93,29 @@ class Relocator:
             self._pointed_at_object(gesture)
 
     def on_estimate(self, estimate: ActionEstimate) -> None:
-        """What the tracker believes of the person's arm."""
+        """The tracker's estimate of the person's arm."""
         self._sight.on_estimate(estimate, self._now_s)
 
     def on_goal_status(self, status: RelocationStatus) -> None:
-        """The arm says how a goal fares."""
+        """The arm reports the status of a goal."""
         self._goal_client.on_status(status)
 
     def on_safety(self, state: SafetyState) -> None:
-        """The safety gate says how it stands."""
+        """The safety gate reports its state."""
         armed = not self._watch.lost
         self._watch.on_safety(state, self._now_s)
         if armed and self._watch.lost:
-            self._tell(f"I cannot go on: {self._watch.sentence}.")
+            self._speak(f"I cannot go on: {self._watch.sentence}.")
 
     def tick(self, now_s: float) -> OutgoingMessages:
-        """One turn: what is to be said."""
+        """One tick; returns the messages to publish."""
         self._now_s = now_s
         if not self.state:
             self._rest()
         elif not self.finished and not self._watch.lost:
             self._steps[self.state]()
         self._goal_client.step(now_s, self._outgoing)
-        self._say_stage()
+        self._publish_stage()
         outgoing, self._outgoing = self._outgoing, OutgoingMessages()
         return outgoing
 
@@ -147,42 +148,42 @@ class Relocator:
             self._missed += 1
             failed = outcome.state == RelocationStatus.STATE_FAILED
             if failed and self._missed < self._options.attempts:
-                self._tell(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}. I try again.")
+                self._speak(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}. I try again.")
                 self._rest()
             else:
                 self._ask_for_help(f"I could not fetch it at {cm(self._object_at)}: {outcome.reason}")
 
     def _ask(self, before: str = "") -> None:
-        self._tell(f"{before}Please point at the place where I shall put it.", Speech.REQUEST_POINT_AT_PLACE)
+        self._speak(f"{before}Please point at the place where I shall put it.", Speech.REQUEST_POINT_AT_PLACE)
         self._wait_for("waiting")
 
     def _ask_to_align(self, before: str = "") -> None:
-        self._tell(f"{before}Please point at the object, so that I see how you point.", Speech.REQUEST_POINT_AT_OBJECT)
+        self._speak(f"{before}Please point at the object, so that I see how you point.", Speech.REQUEST_POINT_AT_OBJECT)
         self._wait_for("aligning")
 
     def _wait_for(self, state: str) -> None:
-        self._quiet_since_s, self._told = self._now_s, set()
+        self._quiet_since_s, self._reported = self._now_s, set()
         self._go(state)
 
     def _watch_for(self, ask: Callable[[str], None]) -> None:
-        unseen = self._sight.trouble(self._now_s)
-        if unseen:
+        trouble = self._sight.trouble(self._now_s)
+        if trouble:
             self._quiet_since_s = self._now_s
-            if unseen not in self._told:
-                self._told.add(unseen)
-                self._tell(f"I do not see where you point: {unseen}. I wait.")
+            if trouble not in self._reported:
+                self._reported.add(trouble)
+                self._speak(f"I do not see where you point: {trouble}. I wait.")
         elif self._now_s - self._quiet_since_s > self._options.ask_again_s:
             ask("I have not seen you point. ")
 
     def _pointed_at(self, gesture: Gesture) -> None:
         assert self._offset is not None
-        place = (gesture.x - self._offset[0], gesture.y - self._offset[1])
-        doubt = self._doubt(gesture) or self._unfit(place)
+        target = (gesture.x - self._offset[0], gesture.y - self._offset[1])
+        doubt = self._doubt(gesture) or self._unfit(target)
         if doubt:
             self._ask(f"{doubt} ")
             return
-        self._target = place
-        self._tell(f"You point at {cm(place)}, certain to {100 * gesture.confidence:.0f} %. I put it there.")
+        self._target = target
+        self._speak(f"You point at {cm(target)}, certain to {100 * gesture.confidence:.0f} %. I put it there.")
         self._go("letting_hand_leave")
 
     def _pointed_at_object(self, gesture: Gesture) -> None:
@@ -194,11 +195,11 @@ class Relocator:
             self._ask_to_align(f"{doubt} ")
             return
         self._offset, self._target = offset, self._object_at
-        self._tell(f"I see you point {1000 * math.hypot(*offset):.0f} mm beside the object. I bear that in mind.")
+        self._speak(f"I see you point {1000 * math.hypot(*offset):.0f} mm beside the object. I bear that in mind.")
         self._go("letting_hand_leave")
 
     def _doubt(self, gesture: Gesture) -> str:
-        """Why it is not known where a gesture points; empty if it is."""
+        """Why a gesture's target is not accepted; empty if it is."""
         o = self._options
         if gesture.frame != o.frame:
             return f"You point at a place in the frame {gesture.frame!r}; I only know places in {o.frame!r}."
@@ -209,19 +210,19 @@ class Relocator:
             )
         return ""
 
-    def _unfit(self, place: Place) -> str:
-        """Why the object cannot be put at a place; empty if it can."""
+    def _unfit(self, target: Place) -> str:
+        """Why the object cannot be put at a position; empty if it can."""
         o = self._options
-        if not o.area.contains(place):
+        if not o.area.contains(target):
             first, last = (cm(corner) for corner in zip(o.area_x, o.area_y, strict=True))
-            return f"You point at {cm(place)}, which I do not reach: my working area goes from {first} to {last}."
-        near = [other for other in o.standing if math.dist(other, place) < o.min_gap]
+            return f"You point at {cm(target)}, which I do not reach: my working area goes from {first} to {last}."
+        near = [other for other in o.standing if math.dist(other, target) < o.min_gap]
         if near:
-            return f"You point at {cm(place)}, but something stands there, at {cm(near[0])}."
+            return f"You point at {cm(target)}, but something stands there, at {cm(near[0])}."
         return ""
 
     def _letting_hand_leave(self) -> None:
-        """The arm does not go where a hand still is, nor where it is not known whether one is there."""
+        """Wait until the hand is known to be away from the target."""
         away_s = self._sight.away_for(self._target, self._options.hand_away, self._now_s)
         if away_s >= self._options.hand_away_s and not self._holding:
             self._fetch()
@@ -229,7 +230,7 @@ class Relocator:
             self._start(RelocationGoal.KIND_PLACE_HELD, None, self._goals.position(self._target))
             self._go("placing")
         elif self._now_s - self._since_s > self._options.ask_again_s:
-            self._tell(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
+            self._speak(f"Please take your hand away from {cm(self._target)}, so that I can go there.")
             self._go("letting_hand_leave")
 
     def _placing(self) -> None:
@@ -237,7 +238,7 @@ class Relocator:
         if self._goal_client.succeeded:
             self._object_at, self._holding = self._target, False
             self.placed.append(self._target)
-            self._tell(f"It stands at {cm(self._target)}.")
+            self._speak(f"It stands at {cm(self._target)}.")
             self._finish() if self.finished else self._fetch()
         elif outcome is None:
             return
@@ -247,20 +248,20 @@ class Relocator:
             self._ask_for_help(f"I could not put it at {cm(self._target)}: {outcome.reason}")
 
     def _finish(self) -> None:
-        self._tell("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
+        self._speak("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
         self._go("resting")
 
     def _ask_for_help(self, sentence: str) -> None:
-        """Where the object is, only a person can tell now: it goes on from the start."""
+        """Ask a person to put the object back to its start: its position is no longer known."""
         self._object_at, self._missed, self._holding = self._options.start, 0, False
-        self._tell(f"{sentence}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
+        self._speak(f"{sentence}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
         self._go("helped")
 
     def _helped(self) -> None:
         if self._now_s - self._since_s > self._options.ask_again_s:
             self._rest()
 
-    # What is said
+    # Outgoing messages
 
     def _start(self, kind: RelocationGoal.Kind, source: Position | None, target: Position, attempt: int = 1) -> None:
         o = self._options
@@ -269,19 +270,19 @@ class Relocator:
     def _go(self, state: str) -> None:
         self.state, self._since_s = state, self._now_s
 
-    def _tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
+    def _speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
         speech = Speech(request=request, object=self._options.object_name, sentence=sentence)
         speech.captured.FromNanoseconds(round(self._now_s * 1e9))
         self._outgoing.speech.append(speech)
         self.sentence = sentence
         _log.info("%.1f s: %s", self._now_s, sentence)
 
-    def _say_stage(self) -> None:
-        """Once a second, and whenever it changes."""
+    def _publish_stage(self) -> None:
+        """Publish the stage once a second and on every change."""
         content = f"{self.state} {self.sentence} {self.finished}"
-        if content == self._said[0] and self._now_s - self._said[1] < STAGE_PERIOD_S:
+        if content == self._last_stage[0] and self._now_s - self._last_stage[1] < STAGE_PERIOD_S:
             return
-        self._said = (content, self._now_s)
+        self._last_stage = (content, self._now_s)
         message = ApplicationStage(
             stage=ApplicationStage.STAGE_DONE if self.finished else ApplicationStage.STAGE_APPLY,
             step="done" if self.finished else self.state,
@@ -297,19 +298,19 @@ class ArmSight:
     """Follows the tracker's estimates.
 
     Args:
-        frame: In which places are asked for.
+        frame: Frame of the positions passed to `away_for`.
     """
 
     def __init__(self, frame: str) -> None:
         self._frame = frame
-        self._heard_s = float("-inf")
+        self._received_s = float("-inf")
         self._trouble = ""
         self._hand: tuple[float, float] | None = None
         self._near_s: dict[tuple[float, float], float] = {}
 
     def on_estimate(self, estimate: ActionEstimate, now_s: float) -> None:
-        """Take in what is believed now; a hand told in another frame is nowhere."""
-        self._heard_s = now_s
+        """Store the current estimate; a hand in another frame is ignored."""
+        self._received_s = now_s
         if estimate.lost or estimate.degraded:
             self._trouble = "the tracker has lost the arm" if estimate.lost else "no camera sees the arm"
             self._hand = None
@@ -318,18 +319,18 @@ class ArmSight:
             self._hand = (estimate.hand.x, estimate.hand.y) if estimate.frame == self._frame else None
 
     def trouble(self, now_s: float) -> str:
-        """Why it is not known where the person points; empty while it is."""
-        if now_s - self._heard_s > SILENT_S:
-            return "the tracker is silent"
+        """Why there is no valid estimate of the arm; empty while there is one."""
+        if now_s - self._received_s > NO_ESTIMATE_S:
+            return "the tracker sends no data"
         return self._trouble
 
-    def away_for(self, place: tuple[float, float], distance: float, now_s: float) -> float:
-        """How long the hand has been farther from a place than `distance`, m, as far as it was asked; s."""
+    def away_for(self, position: tuple[float, float], distance: float, now_s: float) -> float:
+        """How long the hand has been farther than `distance`, m, from a position, s; counted from its first query."""
         away = (
             not self.trouble(now_s)
             and self._hand is not None
-            and math.dist(self._hand, place) > distance  # False for NaN
+            and math.dist(self._hand, position) > distance  # False for NaN
         )
-        if not away or place not in self._near_s:
-            self._near_s = {place: now_s}
-        return now_s - self._near_s[place]
+        if not away or position not in self._near_s:
+            self._near_s = {position: now_s}
+        return now_s - self._near_s[position]

@@ -1,4 +1,4 @@
-"""Places and timeouts of relocation by pointing, as parameters of its process."""
+"""Positions and timeouts of relocation by pointing, as parameters of its process."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ Range = tuple[float, float]
 
 
 class RelocatorOptions(OldNames):
-    """Places in the right shoulder's frame, m; times in s.
+    """Positions in the right shoulder's frame, m; times in s.
 
     Attributes:
-        object_name: As it is called.
-        start: Where the object stands at first, and after somebody has helped.
-        hold: Where the robot holds it while it waits: beside the person's way, and where the elbow need not turn aside.
+        object_name: Name of the object.
+        start: Where the object stands at first and after a person has helped.
+        hold: Where the robot holds it while it waits: out of the person's path, and reached without turning the elbow.
         grasp_z: Height at which a standing object is grasped.
-        area_x, area_y: Working area; a place outside is not taken.
-        standing: Places of other objects, which stay where they are.
-        min_gap: Between the middles of two objects.
-        places: How many places are pointed at.
-        aligns: Whether the person first points at the object, whose place is known. As far beside it as the tracker
-            finds that, it finds every place: person and cameras are measured a little wrong.
-        max_offset: A person who points farther beside the object does not point at it.
-        min_certainty: Of a place, 0 to 1; for a less certain one the robot asks again. 0.85 is a deviation of 1.5 cm.
-        hand_away: The person's hand has left when it is so far from the place pointed at.
-        hand_away_s: And has been for so long.
-        attempts: How often in a row an object is tried to be fetched before the person is asked.
-        ask_again_s: A request is repeated after so long.
+        area_x, area_y: Working area; a target outside is rejected.
+        standing: Positions of other objects, which are not moved.
+        min_gap: Minimum distance between the centres of two objects.
+        places: Number of targets in a run.
+        aligns: Whether the person first points at the object, whose position is known. The tracker's offset from it is
+            subtracted from every target: it comes from small errors in the measured person and cameras.
+        max_offset: Maximum of this offset; a person who points farther away does not point at the object.
+        min_certainty: Minimum certainty of a target, 0 to 1; below, the robot asks again. 0.85: deviation of 1.5 cm.
+        hand_away: The person's hand has left when it is this far from the target.
+        hand_away_s: And has been for this time.
+        attempts: Attempts to fetch an object before the robot asks a person for help.
+        ask_again_s: Time after which a request is repeated.
         arming_timeout_s: The application ends when the arm is not armed again for so long.
-        frame: Of all places.
+        frame: Frame of all positions.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

@@ -17,11 +17,11 @@ STAGE_PERIOD_S = 1.0
 
 
 class RuleLearner:
-    """Hear messages with the `on_…` methods, then call `tick`.
+    """Pass received messages to the `on_…` methods, then call `tick`.
 
     Args:
-        options: Places and timeouts.
-        run_name: Begins the goals' ids; a new one for every process, as the same id is done only once.
+        options: Positions and timeouts.
+        run_name: Prefix of the goals' ids; unique to the process, as a goal id is executed only once.
     """
 
     def __init__(self, options: RuleLearnerOptions, run_name: str) -> None:
@@ -30,8 +30,8 @@ class RuleLearner:
         self._watch = ArmWatch(options.arming_timeout_s)
         self._stage: Stage | None = None
         self._finished = False
-        self._said_s = float("-inf")
-        self._said_state = ""
+        self._published_s = float("-inf")
+        self._published_state = ""
 
     @property
     def failure(self) -> str:
@@ -45,7 +45,7 @@ class RuleLearner:
 
     @property
     def sentence(self) -> str:
-        """What was said last."""
+        """Text of the last speech message."""
         return self._app.sentence
 
     def on_gesture(self, gesture: Gesture) -> None:
@@ -55,18 +55,18 @@ class RuleLearner:
             self._stage.on_gesture(gesture)
 
     def on_goal_status(self, status: RelocationStatus) -> None:
-        """The arm says how a goal fares."""
+        """The arm reports the status of a goal."""
         self._app.goal_client.on_status(status)
 
     def on_safety(self, state: SafetyState) -> None:
-        """The safety gate says how it stands."""
+        """The safety gate reports its state."""
         armed = not self._watch.lost
         self._watch.on_safety(state, self._app.now_s)
         if armed and self._watch.lost:
-            self._app.tell(f"I cannot go on: {self._watch.sentence}.")
+            self._app.speak(f"I cannot go on: {self._watch.sentence}.")
 
     def tick(self, now_s: float) -> OutgoingMessages:
-        """One turn: what is to be said."""
+        """One tick; returns the messages to publish."""
         app = self._app
         app.now_s = now_s
         if self._stage is None:
@@ -76,7 +76,7 @@ class RuleLearner:
             if following is not None:
                 self._follow(following)
         app.goal_client.step(now_s, app.outgoing)
-        self._say_stage()
+        self._publish_stage()
         outgoing, app.outgoing = app.outgoing, OutgoingMessages()
         return outgoing
 
@@ -90,14 +90,14 @@ class RuleLearner:
         self._stage = stage
         stage.enter()
 
-    def _say_stage(self) -> None:
-        """Once a second, and whenever it changes."""
+    def _publish_stage(self) -> None:
+        """Publish the stage once a second and on every change."""
         app, stage = self._app, self._stage
         assert stage is not None
         state = f"{stage.state} {app.sentence} {self._finished}"
-        if state == self._said_state and app.now_s - self._said_s < STAGE_PERIOD_S:
+        if state == self._published_state and app.now_s - self._published_s < STAGE_PERIOD_S:
             return
-        self._said_state, self._said_s = state, app.now_s
+        self._published_state, self._published_s = state, app.now_s
         message = ApplicationStage(
             stage=ApplicationStage.STAGE_DONE if self._finished else stage.stage,
             step=stage.state,

@@ -20,7 +20,7 @@ Pointing = Literal["nearness", "action_space"]
 
 @dataclass(frozen=True)
 class RuleLearnerOptions:
-    """The application's places and timeouts; shoulder frame, m, s.
+    """The application's positions and timeouts; shoulder frame, m, s.
 
     Attributes:
         objects: Names (colours) of the objects.
@@ -28,11 +28,11 @@ class RuleLearnerOptions:
         offer: Where the open hand waits for an object: x, y, and height of the gripper.
         grasp_z: Height at which standing objects are grasped.
         surface: The working surface.
-        pointing: What tells who is pointed at: the "nearness" of the hand to an object, or the place that a tracked arm
-            points at, by tracking in "action_space".
-        attempts: How often an object is tried before the instructor is asked.
-        settle_s: The view of an object is trusted so long after the arm has left.
-        ask_again_s: A request to the instructor is repeated after so long without an answer.
+        pointing: How the object pointed at is recognised: by "nearness" of the hand, or by the target of an arm tracked
+            in "action_space".
+        attempts: Attempts to relocate an object before the robot asks the instructor for help.
+        settle_s: Time from when the arm has left until the view of an object counts.
+        ask_again_s: Time without an answer after which a request to the instructor is repeated.
         arming_timeout_s: The application ends when the arm is not armed again for so long.
     """
 
@@ -51,10 +51,10 @@ class RuleLearnerOptions:
 
 @dataclass
 class ApplicationState:
-    """What all stages see and use.
+    """State that all stages use.
 
     Attributes:
-        rules: Object -> place of its opening.
+        rules: Object -> position of its opening.
         done: Objects that have been put away.
     """
 
@@ -68,8 +68,8 @@ class ApplicationState:
     done: set[str] = field(default_factory=set)
     sentence: str = ""
 
-    def tell(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
-        """Say a sentence to the instructor, with or without a request."""
+    def speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
+        """Send a speech message to the instructor, with or without a request."""
         speech = Speech(request=request, object=name, sentence=sentence)
         speech.captured.FromNanoseconds(round(self.now_s * 1e9))
         self.outgoing.speech.append(speech)
@@ -81,7 +81,7 @@ class Stage(ABC):
     """A stage: `enter`, then `step` once a tick until it gives the next stage's name.
 
     Attributes:
-        stage: As said in `ApplicationStage`.
+        stage: As published in `ApplicationStage`.
         state: Name of the state it is in, for people.
     """
 
@@ -115,5 +115,5 @@ class Stage(ABC):
 
 
 def cm(place: Place) -> str:
-    """A place in words: centimetres."""
+    """A position as text, in centimetres."""
     return f"({place[0] * 100:.1f}, {place[1] * 100:.1f}) cm".replace("-", "−")

@@ -25,14 +25,14 @@ def evaluated(
 
     Args:
         module: whose command it is. described: its help.
-        flags: options without a value beside `--no-video`, with their help.
+        flags: options without a value in addition to `--no-video`, with their help.
         evaluate: what is to be done with `run_folder`, an absolute path, and the flags; returns whether the run did
-            what it should, None if nobody knows. Raises RunFolderError for a folder that holds no such run.
+            what it should, None if it is unknown. Raises RunFolderError for a folder that holds no such run.
     """
     parser = argparse.ArgumentParser(prog=f"python -m {module}", description=described)
     parser.add_argument("run_folder", type=lambda text: Path(text).resolve())
-    for flag, told in {"--no-video": "write no video", **flags}.items():
-        parser.add_argument(flag, action="store_true", help=told)
+    for flag, text in {"--no-video": "write no video", **flags}.items():
+        parser.add_argument(flag, action="store_true", help=text)
     options = parser.parse_args(arguments)
     with QueuedOutput():
         errors = Console(stderr=True, highlight=False, markup=False)

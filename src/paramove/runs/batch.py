@@ -1,4 +1,4 @@
-"""Many runs of an application, one per seed, each in processes and a domain of its own; finished ones are kept."""
+"""Many runs of an application, one per seed, each in processes and a domain of its own; finished ones are stored."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ INTERRUPTED = tuple(exit_codes.by_signal(number) for number in (signal.SIGHUP, s
 
 
 class SeedsError(ValueError):
-    """A text that names no seeds; the message says what would."""
+    """A text that names no seeds; the message has the valid forms."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class BatchOptions:
 
     Attributes:
         workspace: Root of the workspace.
-        folder: Where the runs and results are kept.
+        folder: Where the runs and results are stored.
         jobs: Runs at the same time.
         video: Whether each run gets its video (and takes longer).
         report: Whether each run gets its report.
-        keep_recordings: Whether the recordings stay; a run takes about 0.5 GB.
+        keep_recordings: Whether the recordings are kept; a run takes about 0.5 GB.
         settings: `node.parameter=value`, as `paramove launch --set`.
         overlays: As `paramove launch --with`; none: the launch file's own.
     """
@@ -52,17 +52,17 @@ class BatchOptions:
 
 def seeds_of(text: str) -> list[int]:
     """Seeds of "0-9" or "3,5,10-12", in order and each once; raises SeedsError."""
-    found: list[int] = []
+    seeds: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
             raise SeedsError(f"{part.strip()!r} names no seeds; write 7, 0-9 or 3,5,10-12")
-        found.extend(range(int(first), int(last or first) + 1))
-    return list(dict.fromkeys(found))
+        seeds.extend(range(int(first), int(last or first) + 1))
+    return list(dict.fromkeys(seeds))
 
 
 def result_file(folder: Path, seed: int) -> Path:
-    """Where the result of a seed is kept."""
+    """Where the result of a seed is stored."""
     return folder / f"seed_{seed:04d}.json"
 
 
@@ -70,14 +70,14 @@ def finished(
     folder: Path, seeds: Iterable[int], settings: Sequence[str] = (), overlays: Sequence[str] = ()
 ) -> dict[int, dict[str, Any]]:
     """Results that are there already and were made with the same settings and overlays."""
-    found = {}
+    results = {}
     for seed in seeds:
         path = result_file(folder, seed)
         if path.is_file():
             result = json.loads(path.read_text(encoding="utf-8"))
             if result.get("settings", []) == list(settings) and result.get("overlays", []) == list(overlays):
-                found[seed] = result
-    return found
+                results[seed] = result
+    return results
 
 
 def run_batch(
@@ -107,7 +107,7 @@ def run_batch(
 
 
 def run_seed(seed: int, options: BatchOptions, children: Children) -> dict[str, Any]:
-    """One run and its evaluation; what comes out is kept unless the run was interrupted."""
+    """One run and its evaluation; the result is stored unless the run was interrupted."""
     runs = options.folder / f"seed_{seed:04d}"
     environment = os.environ | {"PARAMOVE_DOMAIN": f"eval-{os.getpid()}-{seed}"}
     launch = [sys.executable, "-m", "paramove.cli.main", "launch", APPLICATION, f"--seed={seed}", f"--runs={runs}"]
@@ -143,12 +143,12 @@ def _summary_in(folder: Path) -> dict[str, Any]:
     path = folder / "run.json"
     if not path.is_file():
         return {"success": False, "reason": "the run ended before it could be evaluated; see its logs"}
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return summary
 
 
 class Children:
-    """Processes under way. They do not hear the terminal's Ctrl-C but are told once by `interrupt`."""
+    """Processes under way. They do not receive the terminal's Ctrl-C, but one signal from `interrupt`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

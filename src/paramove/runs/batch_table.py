@@ -45,30 +45,30 @@ LEGEND = (
     "robot's own calibration; comm.: commanded gripper to its target; phys.: gripper to the commanded one, both the "
     "largest while grasping and placing; inside, outside hull: relocations that succeeded of those tried, by whether "
     "the object is fetched within the convex hull of the targets that the movement model was trained with; pointed, "
-    "right: pointings that were tracked, and those whose object was told rightly, with the error of the place, also "
-    "as a share of the distance to the next object; yellow: not within its goal"
+    "right: pointings that were tracked, and those whose object was recognised, with the error of the target, also "
+    "as a fraction of the distance to the next object; yellow: not within its goal"
 )
-NEEDED_SHARE = 0.9
+NEEDED_FRACTION = 0.9
 TABLE_WIDTH = 140
 """On a narrower terminal the rows are broken by the terminal."""
 
 
 def value_of(result: dict[str, Any], keys: Sequence[str]) -> float | None:
     """A number of a result; None where it is not known."""
-    found: Any = result
+    value: Any = result
     for key in keys:
-        found = found.get(key) if isinstance(found, dict) else None
-    return found if isinstance(found, int | float) else None
+        value = value.get(key) if isinstance(value, dict) else None
+    return value if isinstance(value, int | float) else None
 
 
 def totals_of(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Counts, and for each column its total, median or largest value, under the path of its keys."""
     succeeded = sum(bool(result.get("success")) for result in results)
-    found: dict[str, Any] = {"runs": len(results), "succeeded": succeeded, "needed_share": NEEDED_SHARE}
-    for _, keys, way in columns_of(results):
+    totals: dict[str, Any] = {"runs": len(results), "succeeded": succeeded, "needed_share": NEEDED_FRACTION}
+    for _, keys, statistic in columns_of(results):
         values = [value for result in results if (value := value_of(result, keys)) is not None]
-        found[f"{'.'.join(keys)} ({way})"] = _summed_up(values, way) if values else None
-    return found | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
+        totals[f"{'.'.join(keys)} ({statistic})"] = _summed_up(values, statistic) if values else None
+    return totals | {"training_hull.from": {where: _hull_total(results, where) for _, where in HULL_COLUMNS}}
 
 
 def columns_of(results: Sequence[dict[str, Any]]) -> tuple[tuple[str, tuple[str, ...], str], ...]:
@@ -79,10 +79,10 @@ def columns_of(results: Sequence[dict[str, Any]]) -> tuple[tuple[str, tuple[str,
 
 def _hull_total(results: Sequence[dict[str, Any]], where: str) -> dict[str, int]:
     """Of all runs, and of runs with such relocations: in how many there were any, and in how many all succeeded."""
-    counts = [found for result in results if (found := hull_counts(result, where)) is not None]
-    some = [found for found in counts if found["tried"] + found["refused"] > 0]
-    total = {key: sum(found[key] for found in counts) for key in ("tried", "succeeded", "refused")}
-    whole = sum(found["succeeded"] == found["tried"] > 0 for found in some)
+    counts = [count for result in results if (count := hull_counts(result, where)) is not None]
+    some = [count for count in counts if count["tried"] + count["refused"] > 0]
+    total = {key: sum(count[key] for count in counts) for key in ("tried", "succeeded", "refused")}
+    whole = sum(count["succeeded"] == count["tried"] > 0 for count in some)
     return total | {"runs": len(some), "runs_all_succeeded": whole}
 
 
@@ -92,19 +92,19 @@ def hull_counts(result: dict[str, Any], where: str) -> dict[str, int] | None:
     return found if isinstance(found, dict) else None
 
 
-def _share(counts: dict[str, int] | None) -> str:
+def _succeeded_of_tried(counts: dict[str, int] | None) -> str:
     return "–" if counts is None else f"{counts['succeeded']}/{counts['tried']}"
 
 
-def _summed_up(values: Sequence[float], way: str) -> float:
-    if way == "total":
+def _summed_up(values: Sequence[float], statistic: str) -> float:
+    if statistic == "total":
         return sum(values)
-    return median(values) if way == "median" else max(values)
+    return median(values) if statistic == "median" else max(values)
 
 
 def enough(results: Sequence[dict[str, Any]]) -> bool:
     """Whether 9 of 10 runs succeeded."""
-    return sum(bool(result.get("success")) for result in results) >= NEEDED_SHARE * len(results) > 0
+    return sum(bool(result.get("success")) for result in results) >= NEEDED_FRACTION * len(results) > 0
 
 
 def table_of(results: Sequence[dict[str, Any]]) -> Table:
@@ -114,22 +114,22 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
     table.add_column("seed", justify="right", footer="all")
     table.add_column("success", footer=f"{totals['succeeded']}/{totals['runs']}")
     for heading, where in HULL_COLUMNS:
-        table.add_column(heading, justify="right", footer=_share(totals["training_hull.from"][where]))
+        table.add_column(heading, justify="right", footer=_succeeded_of_tried(totals["training_hull.from"][where]))
     columns = columns_of(results)
-    for heading, keys, way in columns:
-        foot = totals[f"{'.'.join(keys)} ({way})"]
-        footer = f"{shown(foot)}\n{way}" if foot is not None else "–"
+    for heading, keys, statistic in columns:
+        foot = totals[f"{'.'.join(keys)} ({statistic})"]
+        footer = f"{short(foot)}\n{statistic}" if foot is not None else "–"
         table.add_column(heading, justify="right", footer=footer)
     for result in sorted(results, key=lambda item: int(item["seed"])):
         verdict = "[green]yes[/]" if result.get("success") else "[red]no[/]"
         cells = [_cell(heading, value_of(result, keys)) for heading, keys, _ in columns]
-        hulls = [_share(hull_counts(result, where)) for _, where in HULL_COLUMNS]
+        hulls = [_succeeded_of_tried(hull_counts(result, where)) for _, where in HULL_COLUMNS]
         table.add_row(str(result["seed"]), verdict, *hulls, *cells)
     return table
 
 
-def shown(value: float | None) -> str:
-    """A number as short as it may be."""
+def short(value: float | None) -> str:
+    """A number with few digits."""
     if value is None:
         return "–"
     if isinstance(value, int):
@@ -149,4 +149,4 @@ _LIMITS = {
 
 def _cell(heading: str, value: float | None) -> str:
     limit = _LIMITS.get(heading)
-    return shown(value) if limit is None or below(value, limit) else f"[yellow]{shown(value)}[/]"
+    return short(value) if limit is None or below(value, limit) else f"[yellow]{short(value)}[/]"

@@ -37,14 +37,14 @@ STYLE: dict[str, Any] = {
 }
 THINNING = 3
 
-Shown = TypeVar("Shown")
+Subject = TypeVar("Subject")
 
 
-def svg_of(draw: Callable[[Shown, Figure], None], shown: Shown, size: tuple[float, float]) -> str:
-    """A plot of what is shown as an SVG element; `size` in inches."""
+def svg_of(draw: Callable[[Subject, Figure], None], subject: Subject, size: tuple[float, float]) -> str:
+    """A plot of the subject as an SVG element; `size` in inches."""
     with mpl.rc_context(cast(Any, STYLE)):
         figure = Figure(figsize=size, layout="constrained")
-        draw(shown, figure)
+        draw(subject, figure)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     svg = text.getvalue()
@@ -52,7 +52,7 @@ def svg_of(draw: Callable[[Shown, Figure], None], shown: Shown, size: tuple[floa
 
 
 def timeline(evaluation: RunEvaluation, figure: Figure) -> None:
-    """Stages, goals of the arm, and what was seen, over time."""
+    """Stages, goals of the arm, and the robot's observations, over time."""
     axes: Axes = figure.subplots()
     for stage in stages_of(evaluation.run):
         begin, length = stage["begin_s"], stage["end_s"] - stage["begin_s"]
@@ -76,7 +76,7 @@ def timeline(evaluation: RunEvaluation, figure: Figure) -> None:
                 color="white",
             )
     _gestures(evaluation, axes)
-    axes.set_yticks([0.5, 1.5, 2.5], ["sees", "does", "stage"])
+    axes.set_yticks([0.5, 1.5, 2.5], ["detects", "does", "stage"])
     axes.set(xlim=(0, max(evaluation.run.end_s, 1.0)), ylim=(0, 3), xlabel="simulated time, s")
     axes.grid(visible=False, axis="y")
 
@@ -90,10 +90,10 @@ def _gestures(evaluation: RunEvaluation, axes: Axes) -> None:
         Gesture.KIND_VANISHED: ("x", "vanishes"),
         Gesture.KIND_POINTED_AT: ("*", "is pointed at"),
     }
-    heights = {name: 0.25 + 0.25 * place for place, name in enumerate(sorted(evaluation.run.truth.objects))}
-    for kind, (mark, words) in marks.items():
-        said = [r.message for r in evaluation.run.heard(topics.GESTURES) if r.message.kind == kind]
-        known = [m for m in said if m.object in heights]
+    heights = {name: 0.25 + 0.25 * row for row, name in enumerate(sorted(evaluation.run.truth.objects))}
+    for kind, (mark, text) in marks.items():
+        messages = [r.message for r in evaluation.run.received(topics.GESTURES) if r.message.kind == kind]
+        known = [m for m in messages if m.object in heights]
         axes.scatter(
             [m.captured.ToNanoseconds() * 1e-9 for m in known],
             [heights[m.object] for m in known],
@@ -103,19 +103,19 @@ def _gestures(evaluation: RunEvaluation, axes: Axes) -> None:
             linewidths=1,
             zorder=3,
         )
-        axes.scatter([], [], c=OTHER, marker=mark, s=70 if mark == "*" else 18, label=words)
+        axes.scatter([], [], c=OTHER, marker=mark, s=70 if mark == "*" else 18, label=text)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
 
 
 def plan(evaluation: RunEvaluation, figure: Figure) -> None:
-    """The working surface from above in cm: openings, corners, true and believed places."""
+    """The working surface from above in cm: openings, corners, true and estimated positions."""
     axes: Axes = figure.subplots()
     truth, run = evaluation.run.truth, evaluation.run
     radius = 100 * truth.layout.openings[0].radius if truth.layout.openings else 0.0
-    for place in truth.openings.values():
-        axes.add_patch(Circle((100 * place[1], 100 * place[0]), radius, fill=False, ec=OTHER, lw=1.2))
-    said = run.heard(topics.CALIBRATION_PLANE)
-    corners = said[-1].message.correspondences if said else ()
+    for opening in truth.openings.values():
+        axes.add_patch(Circle((100 * opening[1], 100 * opening[0]), radius, fill=False, ec=OTHER, lw=1.2))
+    calibrations = run.received(topics.CALIBRATION_PLANE)
+    corners = calibrations[-1].message.correspondences if calibrations else ()
     axes.plot([100 * c.y for c in corners], [100 * c.x for c in corners], "+", c="black", ms=9, label="corners placed")
     for rule in evaluation.rules:
         colour = COLOURS.get(rule["object"], OTHER)
@@ -124,7 +124,7 @@ def plan(evaluation: RunEvaluation, figure: Figure) -> None:
         if rule["believed"] is not None:
             bx, by = rule["believed"]
             axes.plot(100 * by, 100 * bx, "x", c=colour, ms=9, mew=2.2)
-    for item in evaluation.seen:
+    for item in evaluation.detections:
         colour = COLOURS.get(item.object, OTHER)
         axes.add_patch(Circle((100 * item.true[1], 100 * item.true[0]), 1.0, fill=False, ec=colour, lw=0.8, alpha=0.7))
         axes.plot(100 * item.estimated[1], 100 * item.estimated[0], ".", c=colour, ms=5)
@@ -137,8 +137,8 @@ def plan(evaluation: RunEvaluation, figure: Figure) -> None:
                 (start[1], start[0]),
                 arrowprops={"arrowstyle": "->", "color": COLOURS.get(grasp.goal.object, OTHER), "lw": 1.2, "ls": ":"},
             )
-    axes.plot([], [], "x", c=OTHER, ms=8, mew=2, label="believed opening")
-    axes.plot([], [], ".", c=OTHER, label="object seen at rest (ring: truth)")
+    axes.plot([], [], "x", c=OTHER, ms=8, mew=2, label="estimated opening")
+    axes.plot([], [], ".", c=OTHER, label="object detected at rest (ring: truth)")
     axes.add_patch(Rectangle((-17, 10), 30, 14, fill=False, ec="#c7cdd4", lw=1, ls="--"))
     axes.set(xlim=(14, -18), ylim=(8.5, 25), aspect="equal", xlabel="y, cm (left ↔ right)", ylabel="x, cm (forward)")
     axes.legend(loc="upper center", ncols=3, fontsize=7.5, bbox_to_anchor=(0.5, 1.14))
@@ -157,13 +157,13 @@ def homography(evaluation: RunEvaluation, figure: Figure) -> None:
     levels = np.linspace(0.0, max(GOAL_MM, float(errors.max())), 13)
     filled = axes.contourf(y, x, errors, levels=levels, cmap="viridis_r")
     figure.colorbar(filled, ax=axes, label="error, mm", orientation="horizontal", aspect=40, format="%.1f")
-    shown = slice(None, None, 7)
+    arrows = slice(None, None, 7)
     off = 100 * (grid.estimated - grid.true)
     axes.quiver(
-        100 * grid.true[shown, 1],
-        100 * grid.true[shown, 0],
-        off[shown, 1],
-        off[shown, 0],
+        100 * grid.true[arrows, 1],
+        100 * grid.true[arrows, 0],
+        off[arrows, 1],
+        off[arrows, 0],
         angles="xy",
         scale_units="xy",
         scale=0.2,
@@ -186,9 +186,9 @@ def motion(evaluation: RunEvaluation, figure: Figure) -> None:
     error = 1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1)
     below.plot(time_s, error[::THINNING], c="#3a4a5e", lw=0.8, label="in the world to commanded")
     for kind, mark in (("grasp", "v"), ("place", "^")):
-        moments = [moment for moment in evaluation.moments if moment.kind == kind]
+        samples = [sample for sample in evaluation.samples if sample.kind == kind]
         below.plot(
-            [m.time_s for m in moments], [m.commanded_error_mm for m in moments], mark, ms=5, label=f"{kind}: to target"
+            [s.time_s for s in samples], [s.commanded_error_mm for s in samples], mark, ms=5, label=f"{kind}: to target"
         )
     below.set_ylabel("gripper\nerror, mm")
     below.set_xlabel("simulated time, s")
@@ -201,13 +201,13 @@ def motion(evaluation: RunEvaluation, figure: Figure) -> None:
 
 def _joints(evaluation: RunEvaluation, axes: Axes) -> None:
     arm = evaluation.robot.arms["right"]
-    said = evaluation.run.heard(topics.ARM_JOINT_STATES)[::THINNING]
+    states = evaluation.run.received(topics.ARM_JOINT_STATES)[::THINNING]
     names = (*arm.joints, arm.fingers)
-    angles = np.full((len(said), len(names)), np.nan)
-    for row, recorded in enumerate(said):
-        found = {joint.name: joint.position for joint in recorded.message.joints}
-        angles[row] = [found.get(name, np.nan) for name in names]
-    time_s = [recorded.log_ns * 1e-9 for recorded in said]
+    angles = np.full((len(states), len(names)), np.nan)
+    for row, recorded in enumerate(states):
+        measured = {joint.name: joint.position for joint in recorded.message.joints}
+        angles[row] = [measured.get(name, np.nan) for name in names]
+    time_s = [recorded.log_ns * 1e-9 for recorded in states]
     for name, column in zip(names, np.rad2deg(angles).T, strict=True):
         axes.plot(time_s, column, lw=1, label=name.removeprefix("right_").replace("_", " "))
     axes.set_ylabel("joint angle, °")

@@ -1,7 +1,7 @@
-"""A finished run read from its folder: what was said on the bus and what really happened.
+"""A finished run read from its folder: the messages on the bus and the ground truth.
 
-Everything is cut at the moment at which the application said that it was done: how much is recorded after that depends
-on how fast the processes were stopped, and so on the wall clock.
+Everything is cut at the time at which the application reported that it was done: how much is recorded after that
+depends on how fast the processes were stopped, and so on the wall clock.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ HEAVY = frozenset(
         *(topics.ACTION_OUTLINE, topics.ACTION_SCENE),
     )
 )
-"""Topics of which only the traffic is kept."""
-SAID_AT_THE_END = frozenset({topics.APPLICATION_STAGE.name, topics.SPEECH.name})
+"""Topics of which only the traffic is stored."""
+AT_THE_END = frozenset({topics.APPLICATION_STAGE.name, topics.SPEECH.name})
 
 
 class RunFolderError(InputError):
-    """A folder that holds no run that can be evaluated; the message says what is missing."""
+    """A folder that holds no run that can be evaluated; the message names what is missing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What really happened, in the right shoulder's frame, m. N states.
+    """The ground truth, in the right shoulder's frame, m. N states.
 
     Attributes:
         layout: The world's constants (`TruthLayout`, world frame).
@@ -86,13 +86,13 @@ class Truth:
         return {rule.object: rule.opening for rule in self.layout.rules}
 
     def at(self, time_s: float) -> int:
-        """Place of the state nearest to a time."""
+        """Index of the state nearest to a time."""
         return int(np.abs(self.time_s - time_s).argmin())
 
 
 @dataclass(frozen=True)
 class RecordingGap:
-    """Nothing was recorded between two times, s, in `recording` (what was said) or `truth`."""
+    """Nothing was recorded between two times, s, in `recording` (the messages) or `truth`."""
 
     recording: str
     begin_s: float
@@ -105,18 +105,18 @@ class RecordedRun:
 
     Attributes:
         folder: Of the run.
-        said: Topic name -> messages in order; without those of `HEAVY`.
+        messages: Topic name -> messages in order; without those of `HEAVY`.
         traffic: Counts of every recorded topic.
-        truth: What really happened.
+        truth: The ground truth.
         verdict: Of `truth.json`.
         facts: Of `run.yaml`.
         end_s: When the application was done, else when the recording ended.
-        done: Whether the application said that it was done.
+        done: Whether the application reported that it was done.
         gaps: Times at which nothing was recorded: the recorder or the judge was being started again, or the disk full.
     """
 
     folder: Path
-    said: dict[str, list[Recorded]]
+    messages: dict[str, list[Recorded]]
     traffic: Traffic
     truth: Truth
     verdict: dict[str, Any]
@@ -125,9 +125,9 @@ class RecordedRun:
     done: bool = False
     gaps: tuple[RecordingGap, ...] = ()
 
-    def heard(self, topic: topics.Topic) -> list[Recorded]:
+    def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
-        return self.said.get(topic.name, [])
+        return self.messages.get(topic.name, [])
 
 
 def load_run(folder: Path) -> RecordedRun:
@@ -137,17 +137,17 @@ def load_run(folder: Path) -> RecordedRun:
         RunFolderError: There is no recording or no truth in it, or they are empty.
     """
     recording, truth_file = recording_in(folder, "recording.mcap"), recording_in(folder, "truth.mcap")
-    said, traffic = _read_recording(recording)
-    end_ns, done = _end_of(said, traffic)
-    kept = {
-        name: [m for m in messages if m.publish_ns < end_ns or (m.publish_ns == end_ns and name in SAID_AT_THE_END)]
-        for name, messages in said.items()
+    recorded, traffic = _read_recording(recording)
+    end_ns, done = _end_of(recorded, traffic)
+    until_end = {
+        name: [m for m in messages if m.publish_ns < end_ns or (m.publish_ns == end_ns and name in AT_THE_END)]
+        for name, messages in recorded.items()
     }
     traffic.cut(end_ns)
     truth = _read_truth(truth_file, end_ns)
     return RecordedRun(
         folder=folder,
-        said=kept,
+        messages=until_end,
         traffic=traffic,
         truth=truth,
         verdict=_read_json(folder / "truth.json"),
@@ -160,12 +160,12 @@ def load_run(folder: Path) -> RecordedRun:
 
 def gaps_in(folder: Path) -> tuple[RecordingGap, ...]:
     """The gaps of all recordings of a run, which has them only where there are further parts."""
-    found = {name: PartedRecording(folder / f"{name}.mcap") for name in ("recording", "truth")}
-    for recording in found.values():
+    recordings = {name: PartedRecording(folder / f"{name}.mcap") for name in ("recording", "truth")}
+    for recording in recordings.values():
         if len(recording.parts) > 1:
             for _ in recording.read():
                 pass  # the recording learns of its gaps
-    return _gaps(found)
+    return _gaps(recordings)
 
 
 def _gaps(recordings: Mapping[str, PartedRecording], end_ns: float = float("inf")) -> tuple[RecordingGap, ...]:
@@ -182,24 +182,24 @@ def recording_in(folder: Path, name: str) -> PartedRecording:
     recording = PartedRecording(folder / name)
     if recording.parts:
         return recording
-    found = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
-    raise RunFolderError(f"{folder} holds no {name} ({found}); a folder below runs/ of a simulated run is needed")
+    content = ", ".join(sorted(path.name for path in folder.iterdir())) if folder.is_dir() else "no such folder"
+    raise RunFolderError(f"{folder} holds no {name} ({content}); a folder below runs/ of a simulated run is needed")
 
 
 def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded]], Traffic]:
-    said: dict[str, list[Recorded]] = defaultdict(list)
+    messages: dict[str, list[Recorded]] = defaultdict(list)
     traffic = Traffic()
     for recorded in recording.read():
         traffic.take(recorded)
         if recorded.topic not in HEAVY:
-            said[recorded.topic].append(recorded)
-    if not said:
+            messages[recorded.topic].append(recorded)
+    if not messages:
         raise RunFolderError(f"{_names(recording)} holds no message")
-    return dict(said), traffic
+    return dict(messages), traffic
 
 
-def _end_of(said: dict[str, list[Recorded]], traffic: Traffic) -> tuple[int, bool]:
-    for recorded in said.get(topics.APPLICATION_STAGE.name, []):
+def _end_of(messages: dict[str, list[Recorded]], traffic: Traffic) -> tuple[int, bool]:
+    for recorded in messages.get(topics.APPLICATION_STAGE.name, []):
         if recorded.message.stage == ApplicationStage.STAGE_DONE:
             return recorded.publish_ns, True
     return traffic.last_ns, False
@@ -247,8 +247,8 @@ def _upright(body: Any) -> float:
 def _read_json(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {"success": False, "reason": f"the judge wrote no {path.name}"}
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content
 
 
 def read_facts(folder: Path) -> dict[str, Any]:

@@ -24,15 +24,15 @@ class Relocation:
     """One goal.
 
     Attributes:
-        goal: As it was said first.
+        goal: As it was first published.
         stage: Name of the application's stage: calibrate, learn, apply.
         begun_s, ended_s: From the goal to its last status (or the end of the run).
         result: "succeeded", "failed", "refused", or "unfinished".
-        reason: What the synthesizer said of it.
+        reason: The synthesizer's reason.
         held: Whether the object was felt in the hand when it was to be carried.
         elbow_turn_rad: Largest turn of the elbow.
-        from_hull, to_hull: Whether the goal's places lie "inside" or "outside" the convex hull of the targets that the
-            movement model was trained with; None where there is no such place or it is not known.
+        from_hull, to_hull: Whether the goal's positions lie "inside" or "outside" the convex hull of the targets that
+            the movement model was trained with; None where there is none or it is not known.
     """
 
     goal: Any
@@ -53,7 +53,7 @@ class Relocation:
 
     @property
     def kind(self) -> str:
-        """Kind of goal in words."""
+        """Kind of goal as text."""
         return str(RelocationGoal.Kind.Name(self.goal.kind)).removeprefix("KIND_").lower()
 
     @property
@@ -105,14 +105,14 @@ class Motion:
 
 def stages_of(run: RecordedRun) -> list[dict[str, Any]]:
     """Stages in order: name, begin_s, end_s."""
-    found: list[dict[str, Any]] = []
-    for recorded in run.heard(topics.APPLICATION_STAGE):
+    stages: list[dict[str, Any]] = []
+    for recorded in run.received(topics.APPLICATION_STAGE):
         name = ApplicationStage.Stage.Name(recorded.message.stage).removeprefix("STAGE_").lower()
-        if not found or found[-1]["stage"] != name:
-            if found:
-                found[-1]["end_s"] = recorded.publish_ns * 1e-9
-            found.append({"stage": name, "begin_s": recorded.publish_ns * 1e-9, "end_s": run.end_s})
-    return [stage for stage in found if stage["stage"] != "done"]
+        if not stages or stages[-1]["stage"] != name:
+            if stages:
+                stages[-1]["end_s"] = recorded.publish_ns * 1e-9
+            stages.append({"stage": name, "begin_s": recorded.publish_ns * 1e-9, "end_s": run.end_s})
+    return [stage for stage in stages if stage["stage"] != "done"]
 
 
 def relocations_of(run: RecordedRun) -> list[Relocation]:
@@ -120,17 +120,17 @@ def relocations_of(run: RecordedRun) -> list[Relocation]:
     stages = stages_of(run)
     begins = [stage["begin_s"] for stage in stages]
     statuses: dict[str, list[Any]] = {}
-    for recorded in run.heard(topics.RELOCATION_STATUS):
+    for recorded in run.received(topics.RELOCATION_STATUS):
         statuses.setdefault(recorded.message.goal_id, []).append(recorded)
-    found: dict[str, Relocation] = {}
-    for recorded in run.heard(topics.RELOCATION_GOAL):
+    relocations: dict[str, Relocation] = {}
+    for recorded in run.received(topics.RELOCATION_GOAL):
         goal, begun_s = recorded.message, recorded.publish_ns * 1e-9
-        if goal.id not in found:
-            # A goal said with a stage's last breath belongs to that stage: a stage never begins with a fetch.
-            place = max(bisect_right(begins, begun_s) - 1, 0)
-            stage = stages[place]["stage"] if stages else ""
-            found[goal.id] = _relocation(goal, stage, begun_s, statuses.get(goal.id, []), run.end_s)
-    return list(found.values())
+        if goal.id not in relocations:
+            # A goal published with a stage's last message belongs to that stage: a stage never begins with a fetch.
+            index = max(bisect_right(begins, begun_s) - 1, 0)
+            stage = stages[index]["stage"] if stages else ""
+            relocations[goal.id] = _relocation(goal, stage, begun_s, statuses.get(goal.id, []), run.end_s)
+    return list(relocations.values())
 
 
 def _relocation(goal: Any, stage: str, begun_s: float, statuses: list[Any], end_s: float) -> Relocation:
@@ -151,14 +151,14 @@ def _relocation(goal: Any, stage: str, begun_s: float, statuses: list[Any], end_
 
 
 def _hull_of(statuses: list[Any], name: str) -> str | None:
-    found = [_HULLS[value] for r in statuses if (value := getattr(r.message, name)) in _HULLS]
-    return found[-1] if found else None
+    hulls = [_HULLS[value] for r in statuses if (value := getattr(r.message, name)) in _HULLS]
+    return hulls[-1] if hulls else None
 
 
 def motions_of(run: RecordedRun) -> list[Motion]:
     """Every trajectory that was begun, in order."""
     progress: dict[str, list[tuple[float, float]]] = {}
-    for recorded in run.heard(topics.ARM_TRAJECTORY_STATUS):
+    for recorded in run.received(topics.ARM_TRAJECTORY_STATUS):
         status = recorded.message
         if status.state == TrajectoryStatus.STATE_EXECUTING and status.time_s > 0:
             at_s = status.captured.ToNanoseconds() * 1e-9
@@ -166,13 +166,13 @@ def motions_of(run: RecordedRun) -> list[Motion]:
         elif status.state == TrajectoryStatus.STATE_SUCCEEDED and status.trajectory_id in progress:
             begun_s = progress[status.trajectory_id][0][0] - progress[status.trajectory_id][0][1]
             progress[status.trajectory_id].append((begun_s + status.duration_s, status.duration_s))
-    found: dict[str, Motion] = {}
-    for recorded in run.heard(topics.ARM_TRAJECTORY):
+    motions: dict[str, Motion] = {}
+    for recorded in run.received(topics.ARM_TRAJECTORY):
         message = recorded.message
-        if message.id in found or message.id not in progress:
+        if message.id in motions or message.id not in progress:
             continue
         known = progress[message.id]
-        found[message.id] = Motion(
+        motions[message.id] = Motion(
             goal_id=message.id.rpartition("/")[0],
             begun_s=float(np.median([at_s - time_s for at_s, time_s in known])),
             reached_s=max(time_s for _, time_s in known),
@@ -181,4 +181,4 @@ def motions_of(run: RecordedRun) -> list[Motion]:
             joints=tuple(message.joints),
             phases={phase.name: phase.start_s for phase in message.phases},
         )
-    return list(found.values())
+    return list(motions.values())

@@ -1,7 +1,7 @@
 """Evaluates a run of a servo arm's tasks: `run.json` and `tasks.png` in its folder.
 
 Called by the launcher after the run, or by hand: `python -m paramove.runs.servo_arm RUN_FOLDER`. Exit codes: 0
-the arm reached every place and put every object where it belongs, by the recorded truth; 3 it did not; 66 no such run.
+the arm reached every target and put every object where it belongs, by the recorded truth; 3 it did not; 66 no such run.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from paramove.runs.after_a_run import evaluated, write_run_json
 from paramove.runs.recorded_run import RunFolderError
 
 REACHED_M, PLACED_M = 0.015, 0.010
-"""The hand hangs below where it is commanded: a servo holds a load by the error of its position."""
+"""The hand hangs below its commanded position: a servo holds a load by its position error."""
 
 
 @dataclass(frozen=True)
 class TaskResult:
-    """One task; places in the arm's base frame, m.
+    """One task; positions in the arm's base frame, m.
 
     Attributes:
         task: "reach" or "place".
-        wanted: The place.
+        wanted: The target.
         found: Where the end effector came nearest to it, or where the object ended.
         thing: Name of the object; "" of a reach.
         error: Between the two, m.
@@ -52,21 +52,21 @@ class TaskResult:
 
 
 def results_of(tasks: Sequence[dict[str, Any]], states: Sequence[TruthState]) -> list[TaskResult]:
-    """What became of each task. Of an object that several tasks move, the last one counts."""
+    """The result of each task. Of an object that several tasks move, the last one counts."""
     gripper = np.array([state.gripper for state in states])
     begin, end = (_places(states[at]) for at in (0, -1))
-    found: dict[Any, TaskResult] = {}
+    results: dict[Any, TaskResult] = {}
     for number, task in enumerate(tasks):
         if task.get("reach") is not None:
-            wanted = np.array(task["reach"])
-            nearest = gripper[np.argmin(np.linalg.norm(gripper - wanted, axis=1))]
-            found[number] = _result("reach", wanted, nearest, "")
+            target = np.array(task["reach"])
+            nearest = gripper[np.argmin(np.linalg.norm(gripper - target, axis=1))]
+            results[number] = _result("reach", target, nearest, "")
         else:
-            wanted = np.array(task["place"])
+            target = np.array(task["place"])
             thing = min(begin, key=lambda name: float(np.linalg.norm(begin[name] - task["pick"])))
-            begin[thing] = wanted
-            found[thing] = _result("place", wanted, end[thing], thing)
-    return list(found.values())
+            begin[thing] = target
+            results[thing] = _result("place", target, end[thing], thing)
+    return list(results.values())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -104,7 +104,7 @@ def _truth_in(folder: Path) -> list[TruthState]:
         raise RunFolderError(f"no run folder {folder}")
     if not (folder / "nodes" / "judge.yaml").is_file():
         raise RunFolderError(f"no truth.mcap in {folder}: only emulated runs, which have a node judge, write one")
-    raise RunFolderError(f"nothing to judge in {folder}: the run ended before anything was known of the emulated arm")
+    raise RunFolderError(f"nothing to judge in {folder}: the run ended before the emulated arm published a state")
 
 
 def _tasks_in(folder: Path) -> list[dict[str, Any]]:
@@ -112,16 +112,16 @@ def _tasks_in(folder: Path) -> list[dict[str, Any]]:
     try:
         return list(read_document(path, "configuration of a node").data["parameters"]["tasks"])
     except (InputError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{path} does not tell the tasks of the run ({error!r})") from error
+        raise RunFolderError(f"{path} has no tasks of the run ({error!r})") from error
 
 
 def _places(state: TruthState) -> dict[str, Floats]:
     return {body.name: np.array([body.x, body.y, body.z]) for body in state.objects}
 
 
-def _result(task: str, wanted: Floats, found: Floats, thing: str) -> TaskResult:
-    error = float(np.linalg.norm(found - wanted))
-    return TaskResult(task, tuple(wanted.tolist()), tuple(found.tolist()), thing, error)
+def _result(task: str, target: Floats, reached: Floats, thing: str) -> TaskResult:
+    error = float(np.linalg.norm(reached - target))
+    return TaskResult(task, tuple(target.tolist()), tuple(reached.tolist()), thing, error)
 
 
 def _metres(place: Sequence[float]) -> str:
@@ -129,19 +129,21 @@ def _metres(place: Sequence[float]) -> str:
 
 
 def _draw(path: Path, results: Sequence[TaskResult], states: Sequence[TruthState]) -> Path:
-    """From above and from the side: the way of the hand, those of the objects, and the places."""
+    """From above and from the side: the paths of the hand and the objects, and the targets."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     axes = figure.subplots(1, 2)
     gripper = np.array([state.gripper for state in states])
-    ways = {name: np.array([_places(state)[name] for state in states]) for name in _places(states[0])}
+    paths = {name: np.array([_places(state)[name] for state in states]) for name in _places(states[0])}
     for ax, (across, up), title in zip(axes, ((1, 0), (0, 2)), ("from above", "from the side"), strict=True):
         ax.plot(gripper[:, across], gripper[:, up], color="0.6", linewidth=1, label="hand")
-        for name, way in ways.items():
+        for name, route in paths.items():
             colour = name.split("_")[0]
-            ax.plot(way[:, across], way[:, up], linewidth=2, color=colour, label=name.replace("_", " "))
-            ax.plot(way[-1, across], way[-1, up], "s", color=colour, markersize=5)  # what did not move has no way
+            ax.plot(route[:, across], route[:, up], linewidth=2, color=colour, label=name.replace("_", " "))
+            ax.plot(
+                route[-1, across], route[-1, up], "s", color=colour, markersize=5
+            )  # an object that did not move has no path
         for one in results:
             ax.plot(one.wanted[across], one.wanted[up], "x", color="black", markersize=9)
         ax.set_xlabel(f"{'xyz'[across]}, m")

@@ -41,30 +41,30 @@ class TopicTraffic:
 
 
 class Traffic:
-    """Takes in every message of a recording."""
+    """Counts every message of a recording."""
 
     def __init__(self) -> None:
         self.topics: dict[str, TopicTraffic] = {}
         self.last_ns = 0
 
     def take(self, recorded: Recorded) -> None:
-        """One more message."""
+        """Count a message."""
         topic = self.topics.setdefault(recorded.topic, TopicTraffic())
         topic.publish_ns.append(recorded.publish_ns)
         topic.sequence.append(recorded.sequence)
         self.last_ns = max(self.last_ns, recorded.publish_ns)
 
     def cut(self, end_ns: int) -> None:
-        """Forget what was said at `end_ns` and later."""
+        """Drop what was published at `end_ns` and later."""
         for topic in self.topics.values():
-            kept = sum(time_ns < end_ns for time_ns in topic.publish_ns)
-            del topic.publish_ns[kept:], topic.sequence[kept:]
+            n_before = sum(time_ns < end_ns for time_ns in topic.publish_ns)
+            del topic.publish_ns[n_before:], topic.sequence[n_before:]
 
-    def rates(self, speakers: dict[str, str]) -> dict[str, dict[str, Any]]:
+    def rates(self, publishers: dict[str, str]) -> dict[str, dict[str, Any]]:
         """Topic -> node, declared and measured rate, messages, longest gap."""
         return {
             name: {
-                "node": speakers.get(name, ""),
+                "node": publishers.get(name, ""),
                 "declared_hz": topics.by_name(name).rate_hz,
                 "measured_hz": topic.rate_hz,
                 "messages": len(topic.sequence),
@@ -79,11 +79,11 @@ class Traffic:
         return {"total": sum(lost.values()), "topics": lost}
 
 
-def speakers(launch_file: Path, workspace: Workspace) -> dict[str, str]:
-    """Topic -> name of the node that says it, from a run's effective launch file; what cannot be read is left out."""
-    found: dict[str, str] = {}
+def publishers_of(launch_file: Path, workspace: Workspace) -> dict[str, str]:
+    """Topic -> name of the node that publishes it, from a run's effective launch file. Skips unreadable interfaces."""
+    publishers: dict[str, str] = {}
     if not launch_file.is_file():
-        return found
+        return publishers
     launch = read_document(launch_file, "launch file of a run").data
     for node, settings in launch.get("nodes", {}).items():
         try:
@@ -91,6 +91,6 @@ def speakers(launch_file: Path, workspace: Workspace) -> dict[str, str]:
         except (InterfaceError, KeyError):
             continue
         remaps = settings.get("remaps", {})
-        found |= {remaps.get(topic.name, topic.name): node for topic in interface.publishes}
-        found[topics.status(node).name] = node
-    return found
+        publishers |= {remaps.get(topic.name, topic.name): node for topic in interface.publishes}
+        publishers[topics.status(node).name] = node
+    return publishers

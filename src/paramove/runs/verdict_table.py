@@ -1,4 +1,4 @@
-"""What a person sees in the terminal at the end of a run."""
+"""The verdict of a run as a table in the terminal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.table import Table
 
 
 def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
-    """Print the verdict, the main numbers beside their goals, and where to read on."""
+    """Print the verdict, the main numbers with their goals, and where to read on."""
     colour = "green" if summary["success"] else "red"
     verdict = "SUCCESS" if summary["success"] else "FAILURE"
     console.print(
@@ -23,10 +23,10 @@ def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Cons
         console.print(summary["reason"], markup=False, soft_wrap=True)
     table = Table(show_edge=False, pad_edge=False)
     table.add_column("what")
-    table.add_column("found", justify="right")
+    table.add_column("result", justify="right")
     table.add_column("goal", justify="right", style="dim")
-    for name, found, goal, good in rows_of(summary):
-        table.add_row(name, found if good else f"[yellow]{found}[/]", goal)
+    for name, result, goal, good in rows_of(summary):
+        table.add_row(name, result if good else f"[yellow]{result}[/]", goal)
     console.print(table)
     for rule in summary["rules"]:
         mark = "[green]✓[/]" if rule["right"] else "[red]✗[/]"
@@ -36,7 +36,7 @@ def show_verdict(summary: dict[str, Any], written: Sequence[Path], console: Cons
 
 
 def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
-    """Name, found, goal, and whether it is met."""
+    """Name, result, goal, and whether it is met."""
     homography = summary["homography_error_mm"]
     commanded, physical = summary["gripper_error_commanded_mm"], summary["gripper_error_physical_mm"]
     rules = [rule["error_mm"] for rule in summary["rules"]]
@@ -88,26 +88,26 @@ def rows_of(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
 
 
 def _pointing_rows(summary: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
-    """With tracking in action space: what the arm was believed to point at."""
+    """With tracking in action space: the estimated targets of the arm."""
     if "pointings" not in summary:
         return []
-    count, right, unasked = summary["pointings"], summary["pointings_right"], len(summary["unasked_fetches"])
-    error, share = summary["pointing_error_mm"], summary["pointing_error_of_spacing"]
+    count, right, unrequested = summary["pointings"], summary["pointings_right"], len(summary["unasked_fetches"])
+    error, of_spacing = summary["pointing_error_mm"], summary["pointing_error_of_spacing"]
     return [
-        ("pointings, object told rightly", f"{count}, {right}", "all", count == right > 0),
-        ("fetched without being pointed at", str(unasked), "0", unasked == 0),
+        ("pointings, object recognised", f"{count}, {right}", "all", count == right > 0),
+        ("fetched without being pointed at", str(unrequested), "0", unrequested == 0),
         ("error of pointing, median (max)", f"{mm(error['median'])} ({mm(error['max'])})", "", True),
         (
             "of the spacing of the objects",
-            f"{percent(share['median'])} ({percent(share['max'])})",
+            f"{percent(of_spacing['median'])} ({percent(of_spacing['max'])})",
             "< 50 %",
-            below(share["max"], 0.5) or not share["samples"],
+            below(of_spacing["max"], 0.5) or not of_spacing["samples"],
         ),
     ]
 
 
 def percent(value: float | None) -> str:
-    """A share; a dash where there is none."""
+    """A fraction in per cent; a dash where there is none."""
     return "–" if value is None else f"{100 * value:.0f} %"
 
 

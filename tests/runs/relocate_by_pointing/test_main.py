@@ -43,7 +43,7 @@ def test_objects_at_the_places_pointed_at_are_a_success(tmp_path):
 @pytest.mark.parametrize(
     ("put", "reason"),
     [
-        (FAR, "place 2: the object stands 13.0 mm beside the place pointed at (goal 12.6 mm)"),
+        (FAR, "place 2: the object stands 13.0 mm from the place pointed at (goal 12.6 mm)"),
         (replace(GOOD, lying=True), "place 2: the object does not stand"),
         (replace(GOOD, by_person=True), "place 2: the object does not stand"),
         (replace(GOOD, state=RelocationStatus.STATE_FAILED), "place 2: it slipped"),
@@ -106,4 +106,4 @@ def test_a_folder_without_a_run_is_told(tmp_path, capsys):
     assert "holds no recording.mcap" in capsys.readouterr().err
     folder = write_run(tmp_path / "run", [GOOD], with_table=False)
     assert main([str(folder)]) == 66
-    assert "does not tell where the person's table is" in capsys.readouterr().err
+    assert "world_from_table" in capsys.readouterr().err

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramove.runs.rule_learning.homography_accuracy import accuracy_of, project
-from paramove.runs.spread import spread
+from paramove.runs.summary_statistics import summary_statistics
 from tests.runs.synthetic_run import SHOULDER, layout
 
 
@@ -40,7 +40,7 @@ def test_only_standing_objects_count_as_seen_at_rest(evaluated):
 
 def test_run_without_calibration_has_no_errors(evaluated):
     run = evaluated().run
-    run.said.pop("calibration/plane")
+    run.messages.pop("calibration/plane")
     assert accuracy_of(run)["grid_mm"] == {"median": None, "max": None, "samples": 0, "p95": None}
 
 
@@ -58,5 +58,5 @@ def test_projection_is_that_of_opencv(offsets):
 
 
 def test_spread_of_nothing_is_not_zero():
-    assert spread([]) == {"median": None, "max": None, "samples": 0}
-    assert spread([3.0, 1.0, 2.0]) == {"median": 2.0, "max": 3.0, "samples": 3}
+    assert summary_statistics([]) == {"median": None, "max": None, "samples": 0}
+    assert summary_statistics([3.0, 1.0, 2.0]) == {"median": 2.0, "max": 3.0, "samples": 3}

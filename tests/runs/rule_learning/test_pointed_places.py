@@ -102,7 +102,7 @@ def test_report_and_tables_show_it(evaluate):
     evaluation = evaluate([(3.0, GREEN), (5.0, YELLOW)])
     assert "Where the person pointed" in page(evaluation, None)
     rows = {name: found for name, found, _, _ in rows_of(evaluation.summary)}
-    assert rows["pointings, object told rightly"] == "2, 2"
+    assert rows["pointings, object recognised"] == "2, 2"
     results = [{"seed": 0, "success": True} | evaluation.summary]
     assert totals_of(results)["pointings_right (total)"] == 2
     assert any(str(column.header).startswith("pointed") for column in table_of(results).columns)

@@ -1,7 +1,7 @@
 """Evaluates a run of the pointing application: `run.json`, `report.html`, `pointing.mp4` in its folder.
 
 Called by the launcher after the run, or by hand: `python -m paramove.runs.pointing RUN_FOLDER [--no-video]`.
-Exit codes: 0 the targets were found, or nobody knows them; 3 they were not; 66 no such run.
+Exit codes: 0 the targets were recognised, or the true ones are unknown; 3 they were not; 66 no such run.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool | None:
 
 
 def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
-    """What a person sees in the terminal at the end of a run."""
+    """Print the verdict and the numbers of a run."""
     if summary["success"] is None:
-        console.print(f"{summary['gestures']} targets in {summary['seconds']:.0f} s; nobody knows the true ones")
+        console.print(f"{summary['gestures']} targets in {summary['seconds']:.0f} s; the true ones are unknown")
     else:
         word = "[bold green]SUCCESS[/]" if summary["success"] else "[bold red]FAILURE[/]"
         answered = sum(one["answers"] > 0 for one in summary["pointings"])
@@ -53,8 +53,8 @@ def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> 
             table.add_column(name, justify=side)  # type: ignore[arg-type]
         for number, one in enumerate(summary["pointings"], start=1):
             x, y, _ = (100 * value for value in one["target"])
-            told = ("-", "-") if one["error_cm"] is None else (f"{one['error_cm']:.1f} cm", f"{one['delay_s']:.2f} s")
-            table.add_row(str(number), f"({x:.1f}, {y:.1f})", *told)
+            errors = ("-", "-") if one["error_cm"] is None else (f"{one['error_cm']:.1f} cm", f"{one['delay_s']:.2f} s")
+            table.add_row(str(number), f"({x:.1f}, {y:.1f})", *errors)
         console.print(table)
         error, hand = summary["target_error_cm"], summary["hand_rms_cm"]
         console.print(

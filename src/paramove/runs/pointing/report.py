@@ -14,14 +14,14 @@ from paramove.documents import film, report_page, section
 from paramove.runs import plots
 from paramove.runs.pointing.run import PointingRun
 
-TRUE, BELIEVED = "#1d2530", "#2f9e57"
+TRUE, ESTIMATED = "#1d2530", "#2f9e57"
 
 
 def write_pointing_report(run: PointingRun, summary: dict[str, Any], video: Path | None) -> Path:
     """Write `report.html` into the run's folder; the video is put into it."""
     good = summary["success"] is not False
     title = "Pointing" if summary["success"] is None else "Pointing: found" if good else "Pointing: not found"
-    told = summary["reason"] or f"{summary['gestures']} gestures in {summary['seconds']:.0f} s"
+    subtitle = summary["reason"] or f"{summary['gestures']} gestures in {summary['seconds']:.0f} s"
     parts = [
         film(video),
         section(
@@ -29,13 +29,13 @@ def write_pointing_report(run: PointingRun, summary: dict[str, Any], video: Path
             plots.svg_of(plan, run, (7, 4.6)),
         ),
         section(
-            "The hand", "Black: true. Green: believed, with its standard deviation. Grey: the hand is at a target.",
+            "The hand", "Black: true. Green: estimated, with its standard deviation. Grey: the hand is at a target.",
             plots.svg_of(hand, run, (11, 5)),
         ),
         _how_sure(run),
     ]  # fmt: skip
     path = run.folder / "report.html"
-    path.write_text(report_page(title, title, told, parts, good=good), encoding="utf-8")
+    path.write_text(report_page(title, title, subtitle, parts, good=good), encoding="utf-8")
     return path
 
 
@@ -43,8 +43,8 @@ def _how_sure(run: PointingRun) -> str:
     """Nothing for a body tracker, which has no particles."""
     if not np.isfinite(run.pointed_deviation).any():
         return ""
-    told = "Standard deviation of the believed target; effective number of particles."
-    return section("How sure", told, plots.svg_of(certainty, run, (11, 3)))
+    legend = "Standard deviation of the estimated target; effective number of particles."
+    return section("How sure", legend, plots.svg_of(certainty, run, (11, 3)))
 
 
 def plan(run: PointingRun, figure: Figure) -> None:
@@ -58,22 +58,22 @@ def plan(run: PointingRun, figure: Figure) -> None:
         axes.annotate(
             str(one.number), (-100 * one.target[1], 100 * one.target[0]), xytext=(8, 6), textcoords="offset points"
         )
-        for _, place, sure in one.answers:
-            axes.plot(-100 * place[1], 100 * place[0], "o", color=(1 - sure, sure, 0.1), ms=5)
-    for _, place in run.spurious:
-        axes.plot(-100 * place[1], 100 * place[0], "x", color="#b3372b")
+        for _, answer, sure in one.answers:
+            axes.plot(-100 * answer[1], 100 * answer[0], "o", color=(1 - sure, sure, 0.1), ms=5)
+    for _, target in run.spurious:
+        axes.plot(-100 * target[1], 100 * target[0], "x", color="#b3372b")
     axes.set(xlabel="to the right, cm", ylabel="forward, cm", aspect="equal")
 
 
 def hand(run: PointingRun, figure: Figure) -> None:
-    """Believed and true hand over time."""
+    """Estimated and true hand over time."""
     for number, axes in enumerate(figure.subplots(3, 1, sharex=True)):
         for one in run.pointings:
             axes.axvspan(one.arrived_s, one.left_s, color="#e7eaee")
         axes.plot(run.time_s, 100 * run.true_hand[:, number], color=TRUE, lw=1.0)
         middle, wide = 100 * run.hand[:, number], 100 * run.hand_deviation
-        axes.fill_between(run.time_s, middle - wide, middle + wide, color=BELIEVED, alpha=0.25, lw=0)
-        axes.plot(run.time_s, middle, color=BELIEVED, lw=1.2)
+        axes.fill_between(run.time_s, middle - wide, middle + wide, color=ESTIMATED, alpha=0.25, lw=0)
+        axes.plot(run.time_s, middle, color=ESTIMATED, lw=1.2)
         axes.set_ylabel(f"{'xyz'[number]}, cm")
     axes.set_xlabel("time, s")
 
@@ -81,7 +81,7 @@ def hand(run: PointingRun, figure: Figure) -> None:
 def certainty(run: PointingRun, figure: Figure) -> None:
     """Deviation of the target and effective sample size over time."""
     left = figure.subplots()
-    left.semilogy(run.time_s, 100 * np.maximum(run.pointed_deviation, 1e-4), color=BELIEVED)
+    left.semilogy(run.time_s, 100 * np.maximum(run.pointed_deviation, 1e-4), color=ESTIMATED)
     left.set(xlabel="time, s", ylabel="deviation, cm")
     right = left.twinx()
     right.plot(run.time_s, run.effective, color="#3367d6", lw=0.8)

@@ -1,4 +1,4 @@
-"""A recorded run of the pointing application: what was believed, what was true, and how far apart they were."""
+"""A recorded run of the pointing application: estimates, ground truth, and their errors."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from paramove.runs.recorded_run import RunFolderError, recording_in
 
 FARTHEST_M = 0.10
 MEDIAN_M = 0.04
-"""Goals of a run: no answer farther off, half of them nearer."""
+"""Goals of a run: maximum and median error of the answers."""
 LATE_S = 1.0
 """A gesture that comes so long after the hand has left still answers that pointing."""
 
 
 @dataclass(frozen=True)
 class Pointing:
-    """One performance and what was answered.
+    """One demonstration and the gestures that answer it.
 
     Attributes:
         number: from 1.
-        target: the true place, (3,), m.
+        target: the true target, (3,), m.
         arrived_s, left_s: when the end of the hand was there.
-        answers: times, places (2,) and certainties of the gestures meanwhile.
+        answers: times, targets (2,) and certainties of the gestures meanwhile.
     """
 
     number: int
@@ -56,13 +56,13 @@ class PointingRun:
     Attributes:
         folder: Of the run.
         time_s: of the estimates, (T,).
-        hand, true_hand: (T, 3), m; NaN where it was not seen, and in `true_hand` where no truth was recorded.
-        hand_deviation: largest standard deviation of the hand, (T,), m; 0 where a body tracker tells none.
-        pointed_deviation: of the believed target, (T,), m; NaN where a body tracker tells none.
+        hand, true_hand: (T, 3), m; NaN where it was not detected, and in `true_hand` where no truth was recorded.
+        hand_deviation: largest standard deviation of the hand, (T,), m; 0 where a body tracker reports none.
+        pointed_deviation: of the estimated target, (T,), m; NaN where a body tracker reports none.
         effective: effective sample sizes, (T,); NaN without particles.
-        unsure: whether the estimate was lost or degraded, or a body tracker did not see the hand, (T,).
-        pointings: performances, empty if no truth was recorded.
-        spurious: times and places of gestures that answer nothing.
+        unsure: whether the estimate was lost or degraded, or a body tracker did not detect the hand, (T,).
+        pointings: demonstrations, empty if no truth was recorded.
+        spurious: times and targets of gestures that answer nothing.
         gestures: how many there were.
     """
 
@@ -120,13 +120,15 @@ class PointingRun:
         }
 
     def _reason(self, errors: Floats) -> str:
-        silent = [str(one.number) for one, error in zip(self.pointings, errors, strict=True) if not np.isfinite(error)]
-        if silent:
-            return f"pointing {', '.join(silent)} was not answered"
+        unanswered = [
+            str(one.number) for one, error in zip(self.pointings, errors, strict=True) if not np.isfinite(error)
+        ]
+        if unanswered:
+            return f"pointing {', '.join(unanswered)} was not answered"
         if self.spurious:
             return f"{len(self.spurious)} gestures where nobody pointed"
         worst = int(errors.argmax())
-        return f"pointing {worst + 1} was answered {100 * errors[worst]:.1f} cm beside its target"
+        return f"pointing {worst + 1} was answered {100 * errors[worst]:.1f} cm from its target"
 
 
 def load_pointing_run(folder: Path) -> PointingRun:
@@ -134,14 +136,14 @@ def load_pointing_run(folder: Path) -> PointingRun:
     estimates: list[tuple[float, Any]] = []
     poses: list[tuple[float, Any]] = []
     gestures: list[tuple[float, Floats, float]] = []
-    wanted = {topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name, topics.GESTURES.name}
-    for recorded in recording_in(folder, "recording.mcap").read(wanted):
+    needed = {topics.ACTION_ESTIMATE.name, topics.HUMAN_ARM_POSE.name, topics.GESTURES.name}
+    for recorded in recording_in(folder, "recording.mcap").read(needed):
         time_s = recorded.log_ns * 1e-9
         if recorded.topic != topics.GESTURES.name:
             (estimates if recorded.topic == topics.ACTION_ESTIMATE.name else poses).append((time_s, recorded.message))
         elif recorded.message.kind == Gesture.KIND_POINTED_AT:
-            place = np.array([recorded.message.x, recorded.message.y])
-            gestures.append((time_s, place, recorded.message.confidence))
+            target = np.array([recorded.message.x, recorded.message.y])
+            gestures.append((time_s, target, recorded.message.confidence))
     if not estimates and not poses:
         raise RunFolderError(
             f"{folder}: no action estimates and no arm poses recorded; a run of launch/pointing.yaml expected"
@@ -150,21 +152,21 @@ def load_pointing_run(folder: Path) -> PointingRun:
     pointings = _pointings(truth, gestures)
     answered = {time for one in pointings for time, _, _ in one.answers}
     times = np.array([time for time, _ in estimates or poses])
-    believed = _of_estimates([one for _, one in estimates]) if estimates else _of_poses([one for _, one in poses])
+    estimated = _of_estimates([one for _, one in estimates]) if estimates else _of_poses([one for _, one in poses])
     return PointingRun(
         folder=folder,
         time_s=times,
         true_hand=_true_hands(truth, times),
-        **believed,
+        **estimated,
         pointings=pointings,
-        spurious=tuple((time, place) for time, place, _ in gestures if truth and time not in answered),
+        spurious=tuple((time, target) for time, target, _ in gestures if truth and time not in answered),
         gestures=len(gestures),
     )
 
 
 def _of_estimates(messages: list[Any]) -> dict[str, Any]:
     return {
-        "hand": np.array([_place(one.hand) for one in messages]),
+        "hand": np.array([_xyz(one.hand) for one in messages]),
         "hand_deviation": np.array([max(_deviations(one.hand)) for one in messages]),
         "pointed_deviation": np.array([max(_deviations(one.pointed)) for one in messages]),
         "effective": np.array([one.effective_sample_size for one in messages]),
@@ -173,8 +175,8 @@ def _of_estimates(messages: list[Any]) -> dict[str, Any]:
 
 
 def _of_poses(messages: list[Any]) -> dict[str, Any]:
-    nowhere = (np.nan,) * 3
-    hand = np.array([next((_place(p) for p in one.points if p.name == "index"), nowhere) for one in messages])
+    undetected = (np.nan,) * 3
+    hand = np.array([next((_xyz(p) for p in one.points if p.name == "index"), undetected) for one in messages])
     unknown = np.full(len(hand), np.nan)
     return {
         "hand": hand,
@@ -194,7 +196,7 @@ def _truth(folder: Path) -> list[tuple[float, Any]]:
 
 
 def _pointings(truth: list[tuple[float, Any]], gestures: list[tuple[float, Floats, float]]) -> tuple[Pointing, ...]:
-    found = []
+    pointings = []
     for number in sorted({message.performance for _, message in truth} - {0}):
         own = [(time, message) for time, message in truth if message.performance == number]
         there = [time for time, message in own if message.at_target]
@@ -202,21 +204,21 @@ def _pointings(truth: list[tuple[float, Any]], gestures: list[tuple[float, Float
             continue
         target = own[0][1].target
         answers = tuple(one for one in gestures if there[0] - LATE_S <= one[0] <= own[-1][0])
-        place = np.array([target.x, target.y, target.z])
-        found.append(Pointing(number, place, there[0], there[-1], answers))
-    return tuple(found)
+        position = np.array([target.x, target.y, target.z])
+        pointings.append(Pointing(number, position, there[0], there[-1], answers))
+    return tuple(pointings)
 
 
 def _true_hands(truth: list[tuple[float, Any]], times: Floats) -> Floats:
-    """True places of the hand at these times, (T, 3), m; NaN without truth."""
+    """True positions of the hand at these times, (T, 3), m; NaN without truth."""
     if not truth:
         return np.full((len(times), 3), np.nan)
     known = np.array([time for time, _ in truth])
-    hands = np.array([next(_place(p) for p in message.points if p.name == "hand") for _, message in truth])
+    hands = np.array([next(_xyz(p) for p in message.points if p.name == "hand") for _, message in truth])
     return np.stack([np.interp(times, known, column) for column in hands.T], axis=1)
 
 
-def _place(point: Any) -> tuple[float, float, float]:
+def _xyz(point: Any) -> tuple[float, float, float]:
     return point.x, point.y, point.z
 
 

@@ -1,7 +1,7 @@
-"""The video of a pointing run: the first camera's images with the believed arm and the ball where it points.
+"""The video of a pointing run: the first camera's images with the estimated arm and the ball where it points.
 
-The action tracker draws the ball into its outline. Where a body tracker's poses point is told in the world; it is drawn
-where the calibration beside the run has it in the image.
+The action tracker draws the ball into its outline. The target of a body tracker's poses is
+published in the world; the calibration in the run's folder projects it into the image.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from paramove.runs.video_writer import VideoWriter
 WIDTH_PX = 960
 RATE_HZ = 15.0
 BALL_PX = 9.0
-SHOWN_S = 1.5
-"""A gesture is told so long."""
+DISPLAYED_S = 1.5
+"""How long a gesture is displayed."""
 CAMERA = topics.CAMERA_IMAGES[0].name
 
 
 def write_pointing_video(folder: Path, console: Console) -> Path | None:
     """Write `pointing.mp4` into the run's folder; None if no image was recorded. Raises VideoError."""
-    moments = list(_moments(folder))
-    if not moments:
+    frames = list(_frames(folder))
+    if not frames:
         return None
     path = folder / "pointing.mp4"
-    height, width = decode(moments[0][0]).shape[:2]
+    height, width = decode(frames[0][0]).shape[:2]
     size = (WIDTH_PX, round(WIDTH_PX * height / width) // 2 * 2)
     with replacing(path) as unfinished, VideoWriter(unfinished, size, RATE_HZ) as writer:
-        for image, outline, told in track(moments, "video", console=console, transient=True):
-            writer.write(drawn(decode(image), outline, told, size))
+        for image, outline, caption in track(frames, "video", console=console, transient=True):
+            writer.write(drawn(decode(image), outline, caption, size))
     return path
 
 
-def drawn(image_bgr: Image, outline: Any | None, told: str, size_px: tuple[int, int]) -> Image:
+def drawn(image_bgr: Image, outline: Any | None, caption: str, size_px: tuple[int, int]) -> Image:
     """The picture RGB of an image with `foxglove.ImageAnnotations` in its pixels, enlarged."""
     scale = size_px[0] / image_bgr.shape[1]
     picture = cv2.cvtColor(cv2.resize(image_bgr, size_px, interpolation=cv2.INTER_CUBIC), cv2.COLOR_BGR2RGB)
@@ -56,10 +56,10 @@ def drawn(image_bgr: Image, outline: Any | None, told: str, size_px: tuple[int, 
         centre = (round(scale * circle.position.x), round(scale * circle.position.y))
         cv2.circle(picture, centre, round(scale * circle.diameter / 2), _rgb(circle.fill_color), -1, cv2.LINE_AA)
         cv2.circle(picture, centre, round(scale * circle.diameter / 2), (0, 0, 0), 1, cv2.LINE_AA)
-    if told:
-        place, font = (16, size_px[1] - 20), cv2.FONT_HERSHEY_SIMPLEX
-        cv2.putText(picture, told, place, font, 0.8, (0, 0, 0), 5, cv2.LINE_AA)
-        cv2.putText(picture, told, place, font, 0.8, (255, 255, 255), 2, cv2.LINE_AA)
+    if caption:
+        corner, font = (16, size_px[1] - 20), cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(picture, caption, corner, font, 0.8, (0, 0, 0), 5, cv2.LINE_AA)
+        cv2.putText(picture, caption, corner, font, 0.8, (255, 255, 255), 2, cv2.LINE_AA)
     return np.asarray(picture, dtype=np.uint8)
 
 
@@ -67,14 +67,14 @@ def _rgb(colour: Any) -> tuple[int, int, int]:
     return round(255 * colour.r), round(255 * colour.g), round(255 * colour.b)
 
 
-def _moments(folder: Path) -> Iterator[tuple[Any, Any | None, str]]:
-    """Image, annotations of the same capture time, and the words of the last gesture."""
+def _frames(folder: Path) -> Iterator[tuple[Any, Any | None, str]]:
+    """Image, annotations of the same capture time, and the text of the last gesture."""
     waiting: dict[int, Any] = {}
     outlines: dict[int, Any] = {}
-    told: list[tuple[int, str]] = []
+    captions: list[tuple[int, str]] = []
     camera = _camera(folder)
-    wanted = {CAMERA, topics.ACTION_OUTLINE.name, topics.GESTURES.name, topics.GESTURES_SCENE.name}
-    for recorded in recording_in(folder, "recording.mcap").read(wanted):
+    needed = {CAMERA, topics.ACTION_OUTLINE.name, topics.GESTURES.name, topics.GESTURES_SCENE.name}
+    for recorded in recording_in(folder, "recording.mcap").read(needed):
         if recorded.topic == CAMERA:
             waiting[recorded.log_ns] = recorded.message
         elif recorded.topic == topics.ACTION_OUTLINE.name:
@@ -84,9 +84,9 @@ def _moments(folder: Path) -> Iterator[tuple[Any, Any | None, str]]:
                 _add_ball(outlines[recorded.log_ns], recorded.message, camera)
         elif recorded.message.kind == Gesture.KIND_POINTED_AT:
             at = recorded.message
-            told.append((recorded.log_ns, f"points at ({100 * at.x:.0f}, {100 * at.y:.0f}) cm"))
+            captions.append((recorded.log_ns, f"points at ({100 * at.x:.0f}, {100 * at.y:.0f}) cm"))
     for time_ns, image in waiting.items():
-        recent = [words for at, words in told if 0 <= time_ns - at <= SHOWN_S * 1e9]
+        recent = [text for at, text in captions if 0 <= time_ns - at <= DISPLAYED_S * 1e9]
         yield image, outlines.get(time_ns), recent[-1] if recent else ""
 
 
@@ -99,8 +99,8 @@ def _camera(folder: Path) -> CalibratedCamera | None:
 def _add_ball(outline: Any, scene: Any, camera: CalibratedCamera) -> None:
     """Adds the balls of a `foxglove.SceneUpdate` to annotations of the camera's image."""
     for ball in (ball for entity in scene.entities for ball in entity.spheres):
-        place = ball.pose.position
-        x, y = camera.project(np.array([place.x, place.y, place.z]))
+        centre = ball.pose.position
+        x, y = camera.project(np.array([centre.x, centre.y, centre.z]))
         if np.isfinite((x, y)).all():
             circle = outline.circles.add(diameter=BALL_PX)
             circle.position.x, circle.position.y = x, y

@@ -2,7 +2,7 @@
 
 Called by the launcher after the run, or by hand:
 `python -m paramove.runs.relocate_by_pointing RUN_FOLDER [--no-video]`. Exit codes: 0 the object ended at every
-place pointed at, by the recorded truth; 3 it did not; 66 no such run.
+target pointed at, by the recorded truth; 3 it did not; 66 no such run.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ def _evaluate(options: argparse.Namespace, console: Console) -> bool:
 
 
 def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> None:
-    """What a person sees in the terminal at the end of a run."""
+    """Print the verdict and the numbers of a run."""
     word = "[bold green]SUCCESS[/]" if summary["success"] else "[bold red]FAILURE[/]"
-    found = summary["relocations"]
+    relocations = summary["relocations"]
     console.print(
-        f"\n{word}: {summary['good']} of {len(found)} times the object ended within {1e3 * GOAL:.1f} mm of the place "
-        f"pointed at",
+        f"\n{word}: {summary['good']} of {len(relocations)} times the object ended within {1e3 * GOAL:.1f} mm "
+        f"of the place pointed at",
         soft_wrap=True,
     )
     console.print(f"1 mm here is {1 / SCALE:.1f} mm for a grown person at a table: the scale is {SCALE}", style="dim")
@@ -56,7 +56,7 @@ def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> 
     heads = ("place", "pointed at, cm", "recognised, cm", "ended, cm", "certain", "error", "at human scale")
     for number, head in enumerate(heads):
         table.add_column(head, justify="left" if number == 0 else "right")
-    for number, one in enumerate(found, start=1):
+    for number, one in enumerate(relocations, start=1):
         error = "-" if one["error_mm"] is None else f"{one['error_mm']:.1f} mm"
         human = "-" if one["error_cm_at_human_scale"] is None else f"{one['error_cm_at_human_scale']:.1f} cm"
         places = (_cm(one[name]) for name in ("pointed", "recognised", "final"))
@@ -64,7 +64,7 @@ def show(summary: dict[str, Any], written: Sequence[Path], console: Console) -> 
         table.add_row(str(number), *places, f"{100 * one['certainty']:.0f} %", mark, human)
     console.print(table)
     console.print(
-        f"asked to point {summary['asked']} times; goals refused {summary['refused']}, failed {summary['failed']}; "
+        f"requests to point: {summary['asked']}; goals rejected {summary['refused']}, failed {summary['failed']}; "
         f"unwanted contacts {summary['unwanted_contacts']}; {summary['simulated_s']:.0f} s of simulated time",
         soft_wrap=True,
     )

@@ -31,7 +31,7 @@ def write_relocation_report(
     """Write `report.html` into the run's folder; the video is put into it."""
     good = summary["success"]
     title = f"Relocation by pointing, seed {summary['seed']}"
-    told = summary["reason"] or f"{summary['good']} of {len(relocations)} times the object ended where it should"
+    subtitle = summary["reason"] or f"{summary['good']} of {len(relocations)} times the object ended where it should"
     legend = (
         "Ring: where the person pointed; dashed, what counts as there "
         f"({1e3 * GOAL:.1f} mm, 3 cm at human scale). Dot: recognised, its colour how certain. Disc: the object."
@@ -47,12 +47,12 @@ def write_relocation_report(
         ),
     ]  # fmt: skip
     path = run.folder / "report.html"
-    path.write_text(report_page(title, title, told, parts, good=good, style="img{width:100%}"), encoding="utf-8")
+    path.write_text(report_page(title, title, subtitle, parts, good=good, style="img{width:100%}"), encoding="utf-8")
     return path
 
 
 def plan(relocations: list[PointedRelocation], figure: Figure) -> None:
-    """All places in one picture."""
+    """All targets in one picture."""
     axes = figure.subplots()
     for one in relocations:
         _mark(axes, one)
@@ -64,7 +64,7 @@ def plan(relocations: list[PointedRelocation], figure: Figure) -> None:
 
 
 def close_up(one: PointedRelocation, figure: Figure) -> None:
-    """One place, 5 cm around it."""
+    """One target, 5 cm around it."""
     axes = figure.subplots()
     _mark(axes, one)
     x, y = 100 * (one.final if one.pointed is None else one.pointed)
@@ -83,19 +83,19 @@ def _mark(axes: Any, one: PointedRelocation) -> None:
 
 def _words(one: PointedRelocation) -> str:
     if one.pointed is None:
-        return "Nobody had pointed."
-    sure = f"recognised {1e3 * one.recognition_error:.1f} mm beside it, certain to {100 * one.certainty:.0f} %"
+        return "No pointing before."
+    sure = f"recognised {1e3 * one.recognition_error:.1f} mm from it, certain to {100 * one.certainty:.0f} %"
     end = f"the object ended {1e3 * one.error:.1f} mm from it, {1e2 * one.error / SCALE:.1f} cm at human scale"
     return f"{sure}; {end}; {'good' if one.good else 'not good'}."
 
 
 def _two(picture: bytes | None, one: PointedRelocation) -> str:
-    seen = "" if picture is None else image(picture, "", "jpeg")
-    return f"<div class=two><div>{seen}</div><div>{plots.svg_of(close_up, one, (4.4, 3.6))}</div></div>"
+    view = "" if picture is None else image(picture, "", "jpeg")
+    return f"<div class=two><div>{view}</div><div>{plots.svg_of(close_up, one, (4.4, 3.6))}</div></div>"
 
 
 def _table(summary: dict[str, Any]) -> str:
-    heads = ("place", "certain", "recognised beside, mm", "put beside that, mm", "error, mm", "at human scale, cm", "")
+    heads = ("place", "certain", "recognition error, mm", "placing error, mm", "error, mm", "at human scale, cm", "")
     rows = "".join(
         f"<tr><td>{number}</td><td class=n>{100 * one['certainty']:.0f} %</td>"
         + "".join(
@@ -105,24 +105,24 @@ def _table(summary: dict[str, Any]) -> str:
         + ("<td class=yes>good</td></tr>" if one["good"] else f"<td class=no>{escape(one['reason'] or 'no')}</td></tr>")
         for number, one in enumerate(summary["relocations"], start=1)
     )
-    shown = "".join(f"<th{' class=n' if 0 < number < 6 else ''}>{head}</th>" for number, head in enumerate(heads))
-    return f"<table><tr>{shown}</tr>{rows}</table>"
+    header = "".join(f"<th{' class=n' if 0 < number < 6 else ''}>{head}</th>" for number, head in enumerate(heads))
+    return f"<table><tr>{header}</tr>{rows}</table>"
 
 
 def _pictures(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[int, bytes]:
-    """Number of a relocation -> what the first camera saw when the place was recognised, with the ball, JPEG."""
+    """Number of a relocation -> the first camera's image when the target was recognised, with the ball, JPEG."""
     outlines = {
         recorded.log_ns: recorded.message
         for recorded in recording_in(run.folder, "recording.mcap").read({topics.ACTION_OUTLINE.name})
     }
     times = np.array(sorted(outlines)) if outlines else np.empty(0)
-    wanted = {
+    needed = {
         int(times[np.abs(times - 1e9 * one.recognised_s).argmin()]): one.number for one in relocations if len(times)
     }
-    found = {}
+    pictures = {}
     for recorded in recording_in(run.folder, "recording.mcap").read({CAMERA}):
-        if recorded.log_ns in wanted:
-            shown = drawn(decode(recorded.message), outlines[recorded.log_ns], "", PICTURE_PX)
-            pixels = np.ascontiguousarray(shown[:, :, ::-1])
-            found[wanted[recorded.log_ns]] = encode(Frame(pixels, 0, 0), 85).data
-    return found
+        if recorded.log_ns in needed:
+            picture = drawn(decode(recorded.message), outlines[recorded.log_ns], "", PICTURE_PX)
+            pixels = np.ascontiguousarray(picture[:, :, ::-1])
+            pictures[needed[recorded.log_ns]] = encode(Frame(pixels, 0, 0), 85).data
+    return pictures

@@ -1,4 +1,4 @@
-"""A recorded run of relocation by pointing: where a person pointed, what was recognised, where the object ended."""
+"""A recorded run of relocation by pointing: true targets, recognised targets, and where the object ended."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ SCALE = 0.42
 """Of the simulated person and table over a grown person at a table of usual size."""
 GOAL_AT_HUMAN_SCALE = 0.03
 GOAL = SCALE * GOAL_AT_HUMAN_SCALE
-"""m: an object nearer than this to the place pointed at stands there."""
+"""m: maximum distance of the object from the target pointed at."""
 UPRIGHT = 0.99
-"""Cosine of the tilt from which on an object stands."""
+"""Minimum cosine of the tilt of a standing object."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointedRelocation:
-    """One place at which the robot was to put the object. Places are x, y in the right shoulder's frame, m.
+    """One target at which the robot was to put the object. Positions are x, y in the right shoulder's frame, m.
 
     Attributes:
         number: From 1.
-        pointed: The place that the person really pointed at, (2,); None if nobody did.
+        pointed: The true target of the person, (2,); None if nobody pointed.
         pointed_s: When the fingertip arrived there.
-        recognised: The place that the robot understood, (2,), at `recognised_s`.
+        recognised: The target that the robot recognised, (2,), at `recognised_s`.
         certainty: Of it, 0 to 1.
         final: Where the object ended, (2,), at `final_s`.
         stands: Whether it stands upright there, put by the robot.
-        result: Of the robot's goal, in a word; `reason` if it is not "succeeded".
+        result: Of the robot's goal, one word; `reason` if it is not "succeeded".
     """
 
     number: int
@@ -53,26 +53,26 @@ class PointedRelocation:
 
     @property
     def error(self) -> float:
-        """From the place pointed at to where the object ended, m; infinite if nobody pointed."""
+        """From the true target to where the object ended, m; infinite if nobody pointed."""
         return _apart(self.final, self.pointed)
 
     @property
     def recognition_error(self) -> float:
-        """From the place pointed at to the recognised one, m."""
+        """From the true target to the recognised one, m."""
         return _apart(self.recognised, self.pointed)
 
     @property
     def placing_error(self) -> float:
-        """From the recognised place to where the object ended, m."""
+        """From the recognised target to where the object ended, m."""
         return _apart(self.final, self.recognised)
 
     @property
     def good(self) -> bool:
-        """Whether the object stands at the place pointed at."""
+        """Whether the object stands at the true target."""
         return self.result == "succeeded" and self.stands and self.error <= GOAL
 
     def as_json(self) -> dict[str, Any]:
-        """All numbers; places in m, errors in mm as they are and in cm at human scale."""
+        """All numbers; positions in m, errors in mm as they are and in cm at human scale."""
         return {
             "good": self.good,
             "pointed": None if self.pointed is None else _places(self.pointed),
@@ -92,11 +92,11 @@ class PointedRelocation:
 
 
 def pointed_relocations_of(run: RecordedRun) -> list[PointedRelocation]:
-    """Every goal to put the object somewhere that the robot did not refuse, in order."""
+    """Every goal to put the object somewhere that was not rejected, in order."""
     arrivals = _arrivals(run)
     gestures = [
         (recorded.publish_ns * 1e-9, recorded.message)
-        for recorded in run.heard(topics.GESTURES)
+        for recorded in run.received(topics.GESTURES)
         if recorded.message.kind == Gesture.KIND_POINTED_AT
     ]
     goals = [
@@ -109,8 +109,8 @@ def pointed_relocations_of(run: RecordedRun) -> list[PointedRelocation]:
 
 def summary_of(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[str, Any]:
     """All numbers of a run, as plain JSON."""
-    speech = [recorded.message for recorded in run.heard(topics.SPEECH)]
-    asked = sum(one.request == Speech.REQUEST_POINT_AT_PLACE for one in speech)
+    speech = [recorded.message for recorded in run.received(topics.SPEECH)]
+    requests = sum(one.request == Speech.REQUEST_POINT_AT_PLACE for one in speech)
     goals = relocations_of(run)
     errors = np.array([one.error for one in relocations if np.isfinite(one.error)])
     good = sum(one.good for one in relocations)
@@ -128,7 +128,7 @@ def summary_of(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[s
             "median": _rounded(1e3 * float(np.median(errors))) if len(errors) else None,
             "worst": _rounded(1e3 * float(errors.max())) if len(errors) else None,
         },
-        "asked": asked,
+        "asked": requests,
         "refused": sum(one.result == "refused" for one in goals),
         "failed": sum(one.result == "failed" for one in goals),
         "helped": sum(one.request == Speech.REQUEST_HELP for one in speech),
@@ -156,7 +156,7 @@ def _fault(one: PointedRelocation) -> str:
         return "nobody had pointed"
     if not one.stands:
         return "the object does not stand"
-    return f"the object stands {1e3 * one.error:.1f} mm beside the place pointed at (goal {1e3 * GOAL:.1f} mm)"
+    return f"the object stands {1e3 * one.error:.1f} mm from the place pointed at (goal {1e3 * GOAL:.1f} mm)"
 
 
 def _relocation(
@@ -166,9 +166,11 @@ def _relocation(
     arrivals: list[tuple[float, Floats]],
     gestures: list[tuple[float, Any]],
 ) -> PointedRelocation:
-    said = [(time_s, gesture) for time_s, gesture in gestures if time_s <= put.begun_s]
-    recognised_s, certainty = (said[-1][0], said[-1][1].confidence) if said else (put.begun_s, 0.0)
-    before = [(time_s, place) for time_s, place in arrivals if time_s <= recognised_s]
+    gestures_before = [(time_s, gesture) for time_s, gesture in gestures if time_s <= put.begun_s]
+    recognised_s, certainty = (
+        (gestures_before[-1][0], gestures_before[-1][1].confidence) if gestures_before else (put.begun_s, 0.0)
+    )
+    before = [(time_s, target) for time_s, target in arrivals if time_s <= recognised_s]
     pointed_s, pointed = before[-1] if before else (float("nan"), None)
     at = run.truth.at(put.ended_s)
     name = put.goal.object
@@ -188,19 +190,19 @@ def _relocation(
 
 
 def _arrivals(run: RecordedRun) -> list[tuple[float, Floats]]:
-    """When the fingertip was at a target for the first time in each performance, s, and the target (2,)."""
+    """When the fingertip was at a target for the first time in each demonstration, s, and the target (2,)."""
     layout = run.truth.layout
     if len(layout.world_from_table) != 16:
-        raise RunFolderError(f"{run.folder}: the truth does not tell where the person's table is")
+        raise RunFolderError(f"{run.folder}: the truth has no position of the person's table (world_from_table)")
     world_from_table = np.array(layout.world_from_table).reshape(4, 4)
-    found: dict[int, tuple[float, Floats]] = {}
+    arrivals: dict[int, tuple[float, Floats]] = {}
     for recorded in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_ARM.name}):
         arm = recorded.message
-        if arm.at_target and arm.performance not in found and arm.time_ns * 1e-9 <= run.end_s:
+        if arm.at_target and arm.performance not in arrivals and arm.time_ns * 1e-9 <= run.end_s:
             in_table = np.array([arm.target.x, arm.target.y, arm.target.z, 1.0])
             in_shoulder = (world_from_table @ in_table)[:3] - run.truth.shoulder
-            found[arm.performance] = (arm.time_ns * 1e-9, in_shoulder[:2])
-    return list(found.values())
+            arrivals[arm.performance] = (arm.time_ns * 1e-9, in_shoulder[:2])
+    return list(arrivals.values())
 
 
 def _apart(one: Floats, other: Floats | None) -> float:

@@ -1,4 +1,4 @@
-"""The video of relocation by pointing: what camera 1 sees and the ball, the world beside it, what the robot says."""
+"""The video of relocation by pointing: camera 1 with the ball, the world next to it, and the robot's speech."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     views = sum(1 for _ in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_VIEW.name}))
     if not views:
         return None
-    words = [(r.publish_ns, r.message.sentence) for r in run.heard(topics.SPEECH)]
-    states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.heard(topics.APPLICATION_STAGE)]
+    speech = [(r.publish_ns, r.message.sentence) for r in run.received(topics.SPEECH)]
+    states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.received(topics.APPLICATION_STAGE)]
     path = run.folder / "relocations.mp4"
     title = f"relocation by pointing, seed {run.truth.layout.seed}"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
-        moments = track(_moments(run.folder), "video", views // EVERY, console=console, transient=True)
-        for time_ns, camera, outline, view in moments:
+        frames = track(_frames(run.folder), "video", views // EVERY, console=console, transient=True)
+        for time_ns, camera, outline, view in frames:
             picture = composed(camera, outline, view)
             paste(picture, label(title, 15, TEXT, bold=True), 12, 9)
             paste(picture, label(f"{_latest(states, time_ns)}", 15, ACCENT), 420, 9)
             clock = label(f"{time_ns * 1e-9:6.1f} s   2× speed", 14, FAINT)
             paste(picture, clock, SIZE[0] - clock.shape[1] - 12, 10)
-            said = label(_shown(_latest(words, time_ns)), 16, TEXT, bold=True)
-            paste(picture, said, 14, TOP_PX + PANEL[1] + 14)
+            caption = label(_quoted(_latest(speech, time_ns)), 16, TEXT, bold=True)
+            paste(picture, caption, 14, TOP_PX + PANEL[1] + 14)
             writer.write(picture)
         for _ in range(LINGER_FRAMES):
             writer.write(picture)
@@ -77,30 +77,30 @@ def composed(camera_bgr: Image, outline: Any | None, view: Image) -> Image:
     return frame
 
 
-def _moments(folder: Path) -> Iterator[tuple[int, Image, Any | None, Image]]:
+def _frames(folder: Path) -> Iterator[tuple[int, Image, Any | None, Image]]:
     """Time, image BGR and its annotations, and the view RGB, of every so-many-th view."""
-    wanted = {CAMERA, topics.ACTION_OUTLINE.name}
+    needed = {CAMERA, topics.ACTION_OUTLINE.name}
     outlines: dict[int, Any] = {}
-    recorded_images = recording_in(folder, "recording.mcap").read(wanted)
+    recorded_images = recording_in(folder, "recording.mcap").read(needed)
     image, following = None, next(recorded_images, None)
-    for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+    for index, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
         while following is not None and following.publish_ns <= view.publish_ns:
             if following.topic == CAMERA:
                 image = following
             else:
                 outlines = {following.log_ns: following.message}
             following = next(recorded_images, None)
-        if place % EVERY == 0 and image is not None:
+        if index % EVERY == 0 and image is not None:
             latest = next(iter(outlines.values()), None)
             yield view.log_ns, decode(image.message), latest, decode(view.message)[:, :, ::-1]
 
 
-def _latest(said: list[tuple[int, str]], time_ns: int) -> str:
-    at = bisect_right(said, time_ns, key=lambda one: one[0])
-    return said[at - 1][1] if at else ""
+def _latest(texts: list[tuple[int, str]], time_ns: int) -> str:
+    at = bisect_right(texts, time_ns, key=lambda one: one[0])
+    return texts[at - 1][1] if at else ""
 
 
-def _shown(sentence: str) -> str:
+def _quoted(sentence: str) -> str:
     if not sentence:
         return ""
     return f"“{sentence if len(sentence) <= MAX_LETTERS else sentence[: MAX_LETTERS - 1] + '…'}”"

@@ -1,4 +1,4 @@
-"""How true the gripper is when it grasps and when it places (thesis 5.2.7: within 2 mm of the target).
+"""Accuracy of the gripper when it grasps and when it places (thesis 5.2.7: within 2 mm of the target).
 
 Commanded: the target against forward kinematics of the commanded integer joint units. Physical: the gripper in the
 world against the commanded one.
@@ -19,7 +19,7 @@ from paramove.runs.relocations import Motion, Relocation
 
 
 @dataclass(frozen=True, eq=False)
-class GripperMoment:
+class GripperSample:
     """The gripper at rest, closing or opening the hand.
 
     Attributes:
@@ -59,7 +59,7 @@ class CommandedGripper:
 
     def __init__(self, run: RecordedRun, robot: RobotDescription, side: str = "right") -> None:
         arm = robot.arm(side)
-        states = [r for r in run.heard(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
+        states = [r for r in run.received(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
         self.time_s = np.array([r.message.captured.ToNanoseconds() for r in states]) * 1e-9
         counts = np.array([list(r.message.target_counts) for r in states]).reshape(-1, robot.n_joints)
         self.angles = robot.units.to_radians(counts)[:, arm.indices]
@@ -68,16 +68,16 @@ class CommandedGripper:
 
     def at(self, time_s: float) -> tuple[Floats, Floats]:
         """Gripper and elbow [3] nearest to a time."""
-        place = int(np.abs(self.time_s - time_s).argmin())
-        return self.gripper[place], self.elbow[place]
+        index = int(np.abs(self.time_s - time_s).argmin())
+        return self.gripper[index], self.elbow[index]
 
 
-def gripper_moments(
+def gripper_samples(
     run: RecordedRun, relocations: list[Relocation], motions: list[Motion], commanded: CommandedGripper
-) -> list[GripperMoment]:
-    """Every grasp and every placing that the arm got to."""
+) -> list[GripperSample]:
+    """Every grasp and every placing that the arm reached."""
     by_id = {relocation.goal.id: relocation for relocation in relocations}
-    found = []
+    samples = []
     for motion in motions:
         relocation = by_id.get(motion.goal_id)
         if relocation is None or not commanded.time_s.size:
@@ -90,14 +90,16 @@ def gripper_moments(
             time_s = motion.begun_s + middle
             gripper, elbow = commanded.at(time_s)
             target = place_target(relocation) if kind == "place" else grasp_target(relocation.source, gripper, elbow)
-            moment = run.truth.gripper[run.truth.at(time_s)]
+            gripper_in_world = run.truth.gripper[run.truth.at(time_s)]
             goal = relocation.goal
-            found.append(GripperMoment(goal.id, goal.object, relocation.stage, kind, time_s, target, gripper, moment))
-    return found
+            samples.append(
+                GripperSample(goal.id, goal.object, relocation.stage, kind, time_s, target, gripper, gripper_in_world)
+            )
+    return samples
 
 
 def grasp_target(source: Floats, gripper: Floats, elbow: Floats) -> Floats:
-    """Where the gripper closes: beside the object's place, to the right of the forearm (thesis 5.2.5)."""
+    """Where the gripper closes: next to the object's position, to the right of the forearm (thesis 5.2.5)."""
     forward = (gripper - elbow) * [1.0, 1.0, 0.0]
     forward /= np.linalg.norm(forward)
     right = np.array([forward[1], -forward[0], 0.0])

@@ -1,4 +1,4 @@
-"""How well the robot's own calibration maps image points to places on its working plane (thesis 5.2.6, step 2)."""
+"""How well the robot's own calibration maps image points to positions on its working plane (thesis 5.2.6, step 2)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from paramove.documents import Floats
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects import PlaneHomography
 from paramove.runs.recorded_run import RecordedRun
-from paramove.runs.spread import spread
+from paramove.runs.summary_statistics import summary_statistics
 
 GRID_X = (0.135, 0.190)
 GRID_Y = (-0.100, 0.076)
 GRID_STEPS = (12, 23)
-HALF_HEIGHT = 0.025  # of the cylinders: their visible centre is seen at this height above the surface, m
+HALF_HEIGHT = 0.025  # of the cylinders: their visible centre is at this height above the surface, m
 STANDING = 0.003  # m; an object this near to its standing height rests on the surface
 UPRIGHT = 0.99
 GOAL_MM = 3.0
@@ -28,7 +28,7 @@ _AT_REST = (Gesture.KIND_APPEARED, Gesture.KIND_RESTED)
 
 @dataclass(frozen=True, eq=False)
 class MappedPoints:
-    """True places and the ones that the robot's calibration gives, each [M, 2], m, shoulder frame."""
+    """True positions and those of the robot's calibration, each [M, 2], m, shoulder frame."""
 
     true: Floats
     estimated: Floats
@@ -40,8 +40,8 @@ class MappedPoints:
 
 
 @dataclass(frozen=True)
-class SeenAtRest:
-    """An object that the robot said it sees at rest, with the truth of that moment."""
+class DetectedAtRest:
+    """An object that the robot detected at rest, with its true position at that time."""
 
     time_s: float
     object: str
@@ -82,15 +82,15 @@ def grid_error(run: RecordedRun) -> MappedPoints | None:
 
 def calibration_of(run: RecordedRun) -> PlaneHomography | None:
     """The latest homography that the robot published."""
-    said = run.heard(topics.CALIBRATION_PLANE)
-    return PlaneHomography.from_message(said[-1].message) if said else None
+    calibrations = run.received(topics.CALIBRATION_PLANE)
+    return PlaneHomography.from_message(calibrations[-1].message) if calibrations else None
 
 
-def seen_at_rest(run: RecordedRun) -> list[SeenAtRest]:
-    """Objects said to have appeared or come to rest that truly stood upright on the surface then."""
+def detected_at_rest(run: RecordedRun) -> list[DetectedAtRest]:
+    """Objects reported to have appeared or come to rest that truly stood upright on the surface then."""
     truth = run.truth
-    found = []
-    for recorded in run.heard(topics.GESTURES):
+    detections = []
+    for recorded in run.received(topics.GESTURES):
         gesture = recorded.message
         if gesture.kind not in _AT_REST or not gesture.located or gesture.object not in truth.objects:
             continue
@@ -99,21 +99,21 @@ def seen_at_rest(run: RecordedRun) -> list[SeenAtRest]:
         x, y, z = truth.objects[gesture.object][state]
         stands = abs(z - truth.surface_z - HALF_HEIGHT) < STANDING and truth.upright[gesture.object][state] > UPRIGHT
         if stands:
-            found.append(SeenAtRest(time_s, gesture.object, (float(x), float(y)), (gesture.x, gesture.y)))
-    return found
+            detections.append(DetectedAtRest(time_s, gesture.object, (float(x), float(y)), (gesture.x, gesture.y)))
+    return detections
 
 
 def accuracy_of(run: RecordedRun) -> dict[str, Any]:
-    """Seed, errors over the grid, and errors of the objects seen at rest, ready for JSON."""
+    """Seed, errors over the grid, and errors of the objects detected at rest, ready for JSON."""
     grid = grid_error(run)
     grid_mm = grid.errors_mm if grid is not None else np.zeros(0)
-    seen = seen_at_rest(run)
+    detections = detected_at_rest(run)
     p95 = float(np.percentile(grid_mm, 95)) if grid_mm.size else None
     return {
         "seed": int(run.truth.layout.seed),
         "run_folder": str(run.folder),
-        "grid_mm": spread(grid_mm) | {"p95": p95},
-        "seen_at_rest_mm": spread(item.error_mm for item in seen),
+        "grid_mm": summary_statistics(grid_mm) | {"p95": p95},
+        "seen_at_rest_mm": summary_statistics(item.error_mm for item in detections),
         "seen_at_rest": [
             {
                 "time_s": item.time_s,
@@ -122,6 +122,6 @@ def accuracy_of(run: RecordedRun) -> dict[str, Any]:
                 "estimated": list(item.estimated),
                 "error_mm": item.error_mm,
             }
-            for item in seen
+            for item in detections
         ],
     }

@@ -1,4 +1,4 @@
-"""Where the person pointed and where the tracker believed it, in a run with tracking in action space."""
+"""True and estimated targets of pointing, in a run with tracking in action space."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from paramove.bus import topics
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.runs.recorded_run import RecordedRun, Truth
 from paramove.runs.relocations import Relocation, stages_of
-from paramove.runs.spread import spread
+from paramove.runs.summary_statistics import summary_statistics
 
 POINTS_AT = "points at "
-"""What the instructor does then, before the object's name, in the recorded truth."""
+"""The instructor's action in the recorded truth, followed by the object's name."""
 Place = tuple[float, float]
 
 
@@ -25,13 +25,13 @@ class PointedPlace:
     """One pointing, or a gesture while the arm did something else: where it puts an object down, it rests too.
 
     Attributes:
-        time_s: When the place was said; when the person began, if it never was.
+        time_s: When the estimate was published; when the person began, if none was.
         meant: Object that the person pointed at; "" if nobody pointed.
         true: Its middle (x, y), m, right shoulder's frame; None if nobody pointed.
-        believed: What was said; None if nothing was.
-        nearest: Object on the surface that is truly nearest to the believed place; "" if there is none.
+        believed: The estimated target; None if none was published.
+        nearest: Object on the surface that is truly nearest to the estimated target; "" if there is none.
         spacing_mm: Distance from the object that is meant to the next one on the surface; None if it stands alone.
-        confidence: As it was said, 0 to 1; None if nothing was.
+        confidence: Of the estimate, 0 to 1; None if none was published.
     """
 
     time_s: float
@@ -44,14 +44,14 @@ class PointedPlace:
 
     @property
     def error_mm(self) -> float | None:
-        """Distance of the believed place from the middle of the object, seen from above."""
+        """Horizontal distance of the estimated target from the middle of the object."""
         if self.true is None or self.believed is None:
             return None
         return 1e3 * float(np.hypot(self.believed[0] - self.true[0], self.believed[1] - self.true[1]))
 
     @property
     def error_of_spacing(self) -> float | None:
-        """The error as a share of the spacing; the wrong object is the nearest from 0.5 on, at worst."""
+        """The error as a fraction of the spacing; from 0.5 on, another object can be nearer."""
         if self.error_mm is None or not self.spacing_mm:
             return None
         return self.error_mm / self.spacing_mm
@@ -63,27 +63,27 @@ class PointedPlace:
 
 
 def pointed_places(run: RecordedRun) -> list[PointedPlace]:
-    """Every pointing in order, with what was said of it last; then what else was said in the stage apply.
+    """Every pointing in order, with its last estimate; then the other estimates in the stage apply.
 
     Without tracking in action space there is nothing.
     """
-    if not run.heard(topics.ACTION_ESTIMATE):
+    if not run.received(topics.ACTION_ESTIMATE):
         return []
-    said = [
+    gestures = [
         recorded.message
-        for recorded in run.heard(topics.GESTURES)
+        for recorded in run.received(topics.GESTURES)
         if recorded.message.kind == Gesture.KIND_POINTED_AT and recorded.message.located and not recorded.message.object
     ]
     found = []
     for begin_s, end_s, name in _performances(run.truth):
-        within = [gesture for gesture in said if begin_s <= _time_s(gesture) <= end_s]
+        within = [gesture for gesture in gestures if begin_s <= _time_s(gesture) <= end_s]
         found.append(_place(run.truth, name, begin_s, within[-1] if within else None))
-        said = [gesture for gesture in said if gesture not in within[-1:]]
-    applied = [gesture for gesture in said if _in_apply(run, _time_s(gesture))]
+        gestures = [gesture for gesture in gestures if gesture not in within[-1:]]
+    applied = [gesture for gesture in gestures if _in_apply(run, _time_s(gesture))]
     return found + [_place(run.truth, "", _time_s(gesture), gesture) for gesture in applied]
 
 
-def unasked_fetches(run: RecordedRun, relocations: Sequence[Relocation]) -> list[Relocation]:
+def unrequested_fetches(run: RecordedRun, relocations: Sequence[Relocation]) -> list[Relocation]:
     """Fetches in the stage apply of an object that was not what the person had pointed at last."""
     performances = _performances(run.truth)
     found = []
@@ -95,7 +95,7 @@ def unasked_fetches(run: RecordedRun, relocations: Sequence[Relocation]) -> list
     return found
 
 
-def pointing_summary(places: list[PointedPlace], unasked: Sequence[Relocation]) -> dict[str, Any]:
+def pointing_summary(places: list[PointedPlace], unrequested: Sequence[Relocation]) -> dict[str, Any]:
     """Counts, errors and each pointing, ready for JSON."""
     pointings = [place for place in places if place.meant]
     return {
@@ -103,9 +103,9 @@ def pointing_summary(places: list[PointedPlace], unasked: Sequence[Relocation]) 
         "pointings_told": sum(place.believed is not None for place in pointings),
         "pointings_right": sum(place.right for place in pointings),
         "pointings_by_nobody": len(places) - len(pointings),
-        "unasked_fetches": [{"time_s": goal.begun_s, "object": goal.goal.object} for goal in unasked],
-        "pointing_error_mm": spread(place.error_mm for place in pointings if place.error_mm is not None),
-        "pointing_error_of_spacing": spread(
+        "unasked_fetches": [{"time_s": goal.begun_s, "object": goal.goal.object} for goal in unrequested],
+        "pointing_error_mm": summary_statistics(place.error_mm for place in pointings if place.error_mm is not None),
+        "pointing_error_of_spacing": summary_statistics(
             place.error_of_spacing for place in pointings if place.error_of_spacing is not None
         ),
         "pointing_list": [
@@ -150,7 +150,7 @@ def _place(truth: Truth, meant: str, begin_s: float, gesture: Any | None) -> Poi
 
 
 def _standing(truth: Truth, time_s: float) -> dict[str, Place]:
-    """The objects whose middle is above the working plane, with their places."""
+    """The objects whose middle is above the working plane, with their positions."""
     state = truth.at(time_s)
     found = {}
     for name, centres in truth.objects.items():

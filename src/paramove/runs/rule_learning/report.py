@@ -30,14 +30,14 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         _video(video),
         _plot(
             "What happened when",
-            "Stages of the application, goals of the arm in the colour of the object, and what the robot noticed.",
+            "Stages of the application, goals of the arm in the colour of the object, and the robot's observations.",
             svg_of(plots.timeline, evaluation, (11, 2.5)),
         ),
         _rules(summary),
         "<div class=two>",
         _plot(
             "The working surface from above",
-            "Rings are true, crosses and dots are what the robot believed. The robot stands below, looking up.",
+            "Rings are true, crosses and dots are the robot's estimates. The robot stands below, looking up.",
             svg_of(plots.plan, evaluation, (5.6, 3.7)),
         ),
         _plot(
@@ -50,7 +50,7 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         _grasps(summary),
         _plot(
             "The arm",
-            "Measured joint angles; the gripper's height; its distance from where it was sent and from its targets.",
+            "Measured joint angles; the gripper's height; its distance from its command and from its targets.",
             svg_of(plots.motion, evaluation, (11, 5.6)),
         ),
         _contacts(evaluation),
@@ -58,11 +58,11 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
         _speech(summary),
         _origin(summary),
     ]
-    found = f"{summary['objects_placed']} of {len(summary['rules'])} objects rest in their own opening"
+    placed = f"{summary['objects_placed']} of {len(summary['rules'])} objects rest in their own opening"
     world = f"Rule learning, world {summary['seed']}, {summary['simulated_s']:.0f} s simulated"
     return report_page(
         f"Rule learning, seed {summary['seed']}",
-        f"{'Success' if summary['success'] else 'Failure'}: {found}",
+        f"{'Success' if summary['success'] else 'Failure'}: {placed}",
         f"{world}: {summary['reason']}. Judged by the recorded truth.",
         parts,
         good=summary["success"],
@@ -71,9 +71,9 @@ def page(evaluation: RunEvaluation, video: Path | None) -> str:
 
 def _tiles(summary: dict[str, Any]) -> str:
     tiles = (
-        f"<div class='tile{'' if good else ' off'}'><b>{escape(found)}</b><span>{escape(name)}"
+        f"<div class='tile{'' if good else ' off'}'><b>{escape(result)}</b><span>{escape(name)}"
         f"{f' (goal {escape(goal)})' if goal else ''}</span></div>"
-        for name, found, goal, good in rows_of(summary)
+        for name, result, goal, good in rows_of(summary)
     )
     return f"<div class=tiles>{''.join(tiles)}</div>"
 
@@ -84,8 +84,8 @@ def _video(video: Path | None) -> str:
     data = base64.b64encode(video.read_bytes()).decode("ascii")
     kind = f"video/{video.suffix.removeprefix('.')}"
     return (
-        "<section><h2>The run</h2><p class=why>Left, the camera with what the robot makes of it; right, the world, "
-        "which the robot is not shown. Boxes: tracked objects. Circles: openings it believes in, at the height of an "
+        "<section><h2>The run</h2><p class=why>Left, the camera with the robot's estimates; right, the world, "
+        "which the robot does not see. Boxes: tracked objects. Circles: estimated openings, at the height of an "
         "object's middle. Arrow: its goal.</p>"
         f"<video controls preload=metadata src='data:{kind};base64,{data}'></video></section>"
     )
@@ -107,16 +107,16 @@ def _rules(summary: dict[str, Any]) -> str:
         )
         for rule in summary["rules"]
     ]
-    heads = ("object", "in its own words", "believed, cm", "true, cm", "error, mm", "right")
+    heads = ("object", "the robot's statement", "estimated, cm", "true, cm", "error, mm", "right")
     return section(
-        "What the robot believes, beside the truth",
-        "The robot saw the instructor carry each object into an opening; nobody told it where the openings are.",
+        "The robot's estimates compared with the truth",
+        "The robot saw the instructor carry each object into an opening; the positions of the openings were not given.",
         table(heads, rows, numbers=(2, 3, 4)),
     )
 
 
 def _pointings(summary: dict[str, Any]) -> str:
-    """With tracking in action space, each place that was pointed at or believed to be."""
+    """With tracking in action space, each true or estimated target."""
     rows = [
         (
             f"{one['time_s']:.1f}",
@@ -134,12 +134,12 @@ def _pointings(summary: dict[str, Any]) -> str:
     if not rows:
         return ""
     heads = (
-        *("s", "meant", "true, cm", "believed, cm", "nearest", "error, mm", "next object, mm", "error of that"),
+        *("s", "meant", "true, cm", "estimated, cm", "nearest", "error, mm", "next object, mm", "error of that"),
         "certain",
     )
     return section(
         "Where the person pointed",
-        "Believed: the target of the arm tracked in action space, in the robot's frame. True: the object's middle. "
+        "Estimated: the target of the arm tracked in action space, in the robot's frame. True: the object's middle. "
         "The error is small enough while it is less than half of the distance to the next object.",
         table(heads, rows, numbers=(0, 2, 3, 5, 6, 7, 8)),
     )
@@ -171,22 +171,22 @@ def _grasps(summary: dict[str, Any]) -> str:
     )
     return section(
         "Every grasp",
-        "Off: how far the object truly stood from where the robot believed it. Elbow: turned because of a joint limit. "
+        "Off: how far the object truly stood from the robot's estimate. Elbow: turned because of a joint limit. "
         "Target: commanded gripper from its target. World: gripper from the commanded one.",
         (table(heads, rows, numbers=(0, 3, 4, 5, 6, 8, 9, 10, 11, 12)) if rows else "There was none.")
-        + _refused(summary["refused_goals"]),
+        + _rejected(summary["refused_goals"]),
     )
 
 
-def _refused(goals: Sequence[dict[str, Any]]) -> str:
+def _rejected(goals: Sequence[dict[str, Any]]) -> str:
     rows = [
         (f"{goal['time_s']:.1f}", escape(goal["kind"].replace("_", " ")), _dot(goal["object"]), escape(goal["reason"]))
         for goal in goals
     ]
     if not rows:
         return ""
-    shown = table(("s", "goal", "object", "why"), rows, numbers=(0,))
-    return f"<details><summary>{len(rows)} goals were refused before the arm moved</summary>{shown}</details>"
+    rejected = table(("s", "goal", "object", "why"), rows, numbers=(0,))
+    return f"<details><summary>{len(rows)} goals were rejected before the arm moved</summary>{rejected}</details>"
 
 
 def _contacts(evaluation: RunEvaluation) -> str:
@@ -219,7 +219,7 @@ def _topics(summary: dict[str, Any]) -> str:
     ]
     heads = ("node", "topic", "declared, Hz", "measured, Hz", "messages", "longest gap, s", "lost")
     return section(
-        "What was said on the bus",
+        "Messages on the bus",
         "Rates in simulated time. Lost: gaps in the sequence numbers of the recording." + _gaps(summary),
         table(heads, rows, numbers=(2, 3, 4, 5, 6)),
     )
@@ -232,8 +232,8 @@ def _gaps(summary: dict[str, Any]) -> str:
 
 
 def _speech(summary: dict[str, Any]) -> str:
-    rows = [(f"{said['time_s']:.1f}", f"“{escape(said['sentence'])}”") for said in summary["speech"]]
-    return folded("All that the robot said", table(("s", ""), rows, numbers=(0,)))
+    rows = [(f"{speech['time_s']:.1f}", f"“{escape(speech['sentence'])}”") for speech in summary["speech"]]
+    return folded("All speech of the robot", table(("s", ""), rows, numbers=(0,)))
 
 
 def _origin(summary: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""What the robot saw, believed, said and did at any moment of a run, for captions."""
+"""Observations, estimates, speech and goals of the robot at any time of a run, for captions."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from paramove.recording import Recorded
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Relocation
 
-GESTURE_SHOWN_S = 1.5
-_IN_WORDS = {
+GESTURE_DISPLAYED_S = 1.5
+_TEXTS = {
     Gesture.KIND_APPEARED: "appeared",
     Gesture.KIND_MOVED: "moves",
     Gesture.KIND_RESTED: "rests",
@@ -25,13 +25,13 @@ _IN_WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
-    """The robot's mind at one time.
+class RobotState:
+    """The robot's state at one time.
 
     Attributes:
         stage: "calibrate", "learn", "apply", "done" or "".
-        sentence: What it said last.
-        rules: Object -> believed place (x, y), m.
+        sentence: Text of the last speech message.
+        rules: Object -> estimated opening (x, y), m.
         goal: The goal under way, else None; `phase` of its motion.
         gesture: The latest gesture if it is fresh, else None.
         tracked: The latest `TrackedObjects`, else None.
@@ -49,7 +49,7 @@ class Moment:
 
     @property
     def doing(self) -> str:
-        """The goal in words."""
+        """The goal as text."""
         if self.goal is None:
             return ""
         name = f" {self.goal.goal.object}" if self.goal.goal.object else ""
@@ -58,10 +58,10 @@ class Moment:
 
     @property
     def seeing(self) -> str:
-        """The gesture in words."""
-        if self.gesture is None or self.gesture.kind not in _IN_WORDS:
+        """The gesture as text."""
+        if self.gesture is None or self.gesture.kind not in _TEXTS:
             return ""
-        return f"{self.gesture.object or 'hand'} {_IN_WORDS[self.gesture.kind]}"
+        return f"{self.gesture.object or 'hand'} {_TEXTS[self.gesture.kind]}"
 
 
 class Story:
@@ -73,8 +73,8 @@ class Story:
     """
 
     def __init__(self, run: RecordedRun, relocations: list[Relocation]) -> None:
-        self._said = {
-            topic: _Latest(run.heard(topic))
+        self._latest = {
+            topic: _Latest(run.received(topic))
             for topic in (
                 topics.APPLICATION_STAGE,
                 topics.SPEECH,
@@ -85,13 +85,13 @@ class Story:
             )
         }
         # What is drawn onto an image belongs to the time at which the image was taken.
-        tracked = run.heard(topics.OBJECTS_TRACKED)
-        self._said[topics.OBJECTS_TRACKED] = _Latest(tracked, [recorded.log_ns for recorded in tracked])
+        tracked = run.received(topics.OBJECTS_TRACKED)
+        self._latest[topics.OBJECTS_TRACKED] = _Latest(tracked, [recorded.log_ns for recorded in tracked])
         self._relocations = relocations
 
-    def at(self, time_s: float) -> Moment:
-        """The robot's mind at a time, s."""
-        latest = {topic: found.at(time_s) for topic, found in self._said.items()}
+    def at(self, time_s: float) -> RobotState:
+        """The robot's state at a time, s."""
+        latest = {topic: messages.at(time_s) for topic, messages in self._latest.items()}
         stage, speech, rules = (latest[topic] for topic in (topics.APPLICATION_STAGE, topics.SPEECH, topics.RULES))
         gesture, tracked, status = (
             latest[topic] for topic in (topics.GESTURES, topics.OBJECTS_TRACKED, topics.RELOCATION_STATUS)
@@ -99,8 +99,8 @@ class Story:
         plane = latest[topics.CALIBRATION_PLANE]
         goal = next((g for g in self._relocations if g.begun_s <= time_s < g.ended_s and g.result != "refused"), None)
         of_goal = goal is not None and status is not None and status.message.goal_id == goal.goal.id
-        fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_SHOWN_S
-        return Moment(
+        fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_DISPLAYED_S
+        return RobotState(
             stage=ApplicationStage.Stage.Name(stage.message.stage).removeprefix("STAGE_").lower() if stage else "",
             sentence=speech.message.sentence if speech is not None else "",
             rules={rule.object: (rule.x, rule.y) for rule in rules.message.rules} if rules is not None else {},
@@ -118,5 +118,5 @@ class _Latest:
         self._times = [1e-9 * t for t in times_ns or [recorded.publish_ns for recorded in messages]]
 
     def at(self, time_s: float) -> Recorded | None:
-        place = bisect_right(self._times, time_s) - 1
-        return self._messages[place] if place >= 0 else None
+        index = bisect_right(self._times, time_s) - 1
+        return self._messages[index] if index >= 0 else None

@@ -17,11 +17,16 @@ from paramove.msgs.rule_pb2 import Speech
 from paramove.robots import RobotDescription
 from paramove.runs.recorded_run import RecordedRun
 from paramove.runs.relocations import Motion, Relocation, motions_of, relocations_of, stages_of
-from paramove.runs.rule_learning.gripper_accuracy import CommandedGripper, GripperMoment, gripper_moments
-from paramove.runs.rule_learning.homography_accuracy import MappedPoints, SeenAtRest, grid_error, seen_at_rest
-from paramove.runs.rule_learning.pointed_places import PointedPlace, pointed_places, pointing_summary, unasked_fetches
-from paramove.runs.spread import spread
-from paramove.runs.traffic import speakers
+from paramove.runs.rule_learning.gripper_accuracy import CommandedGripper, GripperSample, gripper_samples
+from paramove.runs.rule_learning.homography_accuracy import DetectedAtRest, MappedPoints, detected_at_rest, grid_error
+from paramove.runs.rule_learning.pointed_places import (
+    PointedPlace,
+    pointed_places,
+    pointing_summary,
+    unrequested_fetches,
+)
+from paramove.runs.summary_statistics import summary_statistics
+from paramove.runs.traffic import publishers_of
 from paramove.workspace import Workspace
 
 WHERE = ("inside", "outside")
@@ -31,12 +36,12 @@ PACKAGES = ("mujoco", "numpy", "scipy", "opencv-contrib-python-headless", "numba
 
 @dataclass(frozen=True, eq=False)
 class RunEvaluation:
-    """What is found out about a run; each part is worked out when it is first asked for.
+    """The results of a run; each part is computed at its first use.
 
     Attributes:
         run: As recorded.
         robot: Description of its robot.
-        workspace: Where nodes' modules are found, to tell who says which topic.
+        workspace: Where nodes' modules are, to name the publisher of each topic.
     """
 
     run: RecordedRun
@@ -64,9 +69,9 @@ class RunEvaluation:
         return CommandedGripper(self.run, self.robot)
 
     @cached_property
-    def moments(self) -> list[GripperMoment]:
+    def samples(self) -> list[GripperSample]:
         """Grasps and placings."""
-        return gripper_moments(self.run, self.relocations, self.motions, self.commanded)
+        return gripper_samples(self.run, self.relocations, self.motions, self.commanded)
 
     @cached_property
     def grid(self) -> MappedPoints | None:
@@ -75,23 +80,23 @@ class RunEvaluation:
 
     @cached_property
     def pointings(self) -> list[PointedPlace]:
-        """What the person pointed at, with tracking in action space."""
+        """True and estimated targets, with tracking in action space."""
         return pointed_places(self.run)
 
     @cached_property
-    def seen(self) -> list[SeenAtRest]:
-        """Objects seen at rest."""
-        return seen_at_rest(self.run)
+    def detections(self) -> list[DetectedAtRest]:
+        """Objects detected at rest."""
+        return detected_at_rest(self.run)
 
     @cached_property
     def rules(self) -> list[dict[str, Any]]:
-        """What the robot believes in the end, beside the truth; one entry for each object that has an opening."""
-        said = self.run.heard(topics.RULES)
-        believed = {rule.object: rule for rule in said[-1].message.rules} if said else {}
+        """The robot's final rules compared with the truth; one entry for each object that has an opening."""
+        published = self.run.received(topics.RULES)
+        learnt = {rule.object: rule for rule in published[-1].message.rules} if published else {}
         truth = self.run.truth
         radius = min((float(o.radius) for o in truth.layout.openings), default=0.0)
         return [
-            _rule(name, truth.openings, radius, opening, believed.get(name))
+            _rule(name, truth.openings, radius, opening, learnt.get(name))
             for name, opening in sorted(truth.opening_of.items())
         ]
 
@@ -124,11 +129,11 @@ class RunEvaluation:
             "contact_list": unwanted_contacts(run),
             "deepest_penetration_mm": float(truth.penetration_mm[-1]),
             **self._pointing(),
-            "homography_error_mm": spread(self.grid.errors_mm if self.grid is not None else ()),
-            "seen_at_rest_error_mm": spread(item.error_mm for item in self.seen),
+            "homography_error_mm": summary_statistics(self.grid.errors_mm if self.grid is not None else ()),
+            "seen_at_rest_error_mm": summary_statistics(item.error_mm for item in self.detections),
             "gripper_error_commanded_mm": self._gripper_error("commanded_error_mm"),
             "gripper_error_physical_mm": self._gripper_error("physical_error_mm")
-            | {"overall": spread(1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1))},
+            | {"overall": summary_statistics(1e3 * np.linalg.norm(truth.gripper - truth.commanded, axis=1))},
             "simulated_s": run.end_s,
             "stages": stages_of(run),
             "rules": self.rules,
@@ -138,9 +143,9 @@ class RunEvaluation:
                     "request": Speech.Request.Name(recorded.message.request).removeprefix("REQUEST_").lower(),
                     "sentence": recorded.message.sentence,
                 }
-                for recorded in run.heard(topics.SPEECH)
+                for recorded in run.received(topics.SPEECH)
             ],
-            "topic_rates": run.traffic.rates(speakers(run.folder / "launch.yaml", self.workspace)),
+            "topic_rates": run.traffic.rates(publishers_of(run.folder / "launch.yaml", self.workspace)),
             "loss": run.traffic.loss(),
             "gaps": [{"recording": g.recording, "begin_s": g.begin_s, "end_s": g.end_s} for g in run.gaps],
             "versions": _versions(run.facts),
@@ -151,7 +156,7 @@ class RunEvaluation:
     def _pointing(self) -> dict[str, Any]:
         if not self.pointings:
             return {}
-        return pointing_summary(self.pointings, unasked_fetches(self.run, self.relocations))
+        return pointing_summary(self.pointings, unrequested_fetches(self.run, self.relocations))
 
     def _reason(self) -> str:
         run = self.run
@@ -166,7 +171,7 @@ class RunEvaluation:
             for name, found in sorted(run.verdict.get("objects", {}).items())
             if not found["success"]
         ]
-        return "; ".join(wrong) + ("" if run.done else "; the application never said that it was done")
+        return "; ".join(wrong) + ("" if run.done else "; the application did not report that it was done")
 
     def _objects(self) -> dict[str, Any]:
         return {
@@ -176,7 +181,7 @@ class RunEvaluation:
 
     def _gripper_error(self, which: str) -> dict[str, Any]:
         return {
-            kind: spread(getattr(moment, which) for moment in self.moments if moment.kind in kinds)
+            kind: summary_statistics(getattr(sample, which) for sample in self.samples if sample.kind in kinds)
             for kind, kinds in {"grasp": ("grasp",), "place": ("place",), "both": ("grasp", "place")}.items()
         }
 
@@ -185,9 +190,9 @@ class RunEvaluation:
         before, after = truth.at(grasp.begun_s), truth.at(grasp.ended_s)
         stood, stands = truth.objects[name][before][:2], truth.objects[name][after][:2]
         errors = {
-            f"{moment.kind}_{which}_mm": getattr(moment, f"{which}_error_mm")
-            for moment in self.moments
-            if moment.goal_id == grasp.goal.id
+            f"{sample.kind}_{which}_mm": getattr(sample, f"{which}_error_mm")
+            for sample in self.samples
+            if sample.goal_id == grasp.goal.id
             for which in ("commanded", "physical")
         }
         return {
@@ -211,7 +216,9 @@ class RunEvaluation:
 
     def _wall(self) -> dict[str, Any]:
         facts, verdict = self.run.facts, self.run.verdict
-        latest = {name: messages[-1].message for name, messages in self.run.said.items() if name.startswith("status/")}
+        latest = {
+            name: messages[-1].message for name, messages in self.run.messages.items() if name.startswith("status/")
+        }
         return {
             "realtime_factor": verdict.get("realtime_factor"),
             "seconds": verdict.get("wall_s"),
@@ -222,7 +229,7 @@ class RunEvaluation:
 
 
 def unwanted_contacts(run: RecordedRun) -> list[dict[str, Any]]:
-    """When the count of unwanted contacts grew, and what touched then."""
+    """When the count of unwanted contacts grew, and the contacts at that time."""
     counts = run.truth.unwanted_contacts
     grew = np.flatnonzero(np.diff(counts, prepend=0) > 0)
     return [
@@ -255,40 +262,38 @@ def _at_first_try(grasp: Relocation) -> bool:
     return bool(grasp.goal.attempt <= 1 and grasp.result == "succeeded")
 
 
-def _rule(name: str, openings: dict[str, Any], radius: float, opening: str, believed: Any) -> dict[str, Any]:
+def _rule(name: str, openings: dict[str, Any], radius: float, opening: str, learnt: Any) -> dict[str, Any]:
     true = openings[opening]
     rule: dict[str, Any] = {"object": name, "opening": opening, "true": true.tolist()}
-    if believed is None:
+    if learnt is None:
         return rule | {"believed": None, "error_mm": None, "nearest_opening": None, "right": False, "sentence": ""}
-    place = np.array([believed.x, believed.y])
-    nearest = min(openings, key=lambda other: float(np.linalg.norm(openings[other] - place)))
+    position = np.array([learnt.x, learnt.y])
+    nearest = min(openings, key=lambda other: float(np.linalg.norm(openings[other] - position)))
     return rule | {
-        "believed": place.tolist(),
-        "error_mm": 1e3 * float(np.linalg.norm(place - true)),
+        "believed": position.tolist(),
+        "error_mm": 1e3 * float(np.linalg.norm(position - true)),
         "nearest_opening": nearest,
-        "right": bool(np.linalg.norm(place - true) < radius),
-        "sentence": believed.sentence,
+        "right": bool(np.linalg.norm(position - true) < radius),
+        "sentence": learnt.sentence,
     }
 
 
 def _versions(facts: dict[str, Any]) -> dict[str, str]:
-    found = {"python": platform.python_version(), "commit": str(facts.get("commit") or "")}
+    versions = {"python": platform.python_version(), "commit": str(facts.get("commit") or "")}
     for package in ("paramove", *PACKAGES):
         try:
-            found[package] = importlib.metadata.version(package)
+            versions[package] = importlib.metadata.version(package)
         except importlib.metadata.PackageNotFoundError:
-            found[package] = ""
-    return found
+            versions[package] = ""
+    return versions
 
 
 def by_hull(goals: Iterable[Relocation]) -> dict[str, Any]:
     """Counts of the goals to fetch something, by where they fetch it (`from`) and where they bring it (`to`)."""
     fetching = [goal for goal in goals if goal.fetches]
     return {
-        place: {
-            where: _counts([goal for goal in fetching if getattr(goal, place + "_hull") == where]) for where in WHERE
-        }
-        for place in ("from", "to")
+        end: {where: _counts([goal for goal in fetching if getattr(goal, end + "_hull") == where]) for where in WHERE}
+        for end in ("from", "to")
     }
 
 

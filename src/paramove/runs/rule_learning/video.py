@@ -21,7 +21,7 @@ from paramove.runs.video_writer import VideoError, VideoWriter
 FRAMES_PER_S = 10.0
 CAMERA_HZ = 15.0
 LONG_RUN_S = 400.0
-"""A longer run is shown four times as fast as it was, others twice."""
+"""A longer run is displayed four times as fast as it was, others twice."""
 LINGER_FRAMES = 20  # the last picture stays so long
 
 
@@ -41,11 +41,11 @@ def write_video(evaluation: RunEvaluation, console: Console) -> Path | None:
     frame = VideoFrame(f"rule learning, seed {run.truth.layout.seed}", factor)
     path = run.folder / "demo.mp4"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:
-        shown = range(0, number, every)
+        indices = range(0, number, every)
         pictures = paired_images(run.folder, every)
         picture = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         for _, (time_s, camera, view) in zip(
-            track(shown, "video", console=console, transient=True), pictures, strict=False
+            track(indices, "video", console=console, transient=True), pictures, strict=False
         ):
             picture = frame.draw(camera, view, story.at(time_s), time_s, run.end_s)
             writer.write(picture)
@@ -64,10 +64,10 @@ def paired_images(folder: Path, every: int) -> Iterator[tuple[float, Image, Imag
     """Time, camera image and view, RGB, of every so-many-th view; the camera's image is the latest one by then."""
     cameras = recording_in(folder, "recording.mcap").read({topics.CAMERA_IMAGE.name})
     latest, following = None, next(cameras, None)
-    for place, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
+    for index, view in enumerate(recording_in(folder, "truth.mcap").read({topics.TRUTH_VIEW.name})):
         while following is not None and following.log_ns <= view.log_ns:
             latest, following = following, next(cameras, None)
-        if place % every == 0 and latest is not None:
+        if index % every == 0 and latest is not None:
             yield view.log_ns * 1e-9, _decoded(latest.message.data), _decoded(view.message.data)
 
 

@@ -1,4 +1,4 @@
-"""One picture of the demo video: the camera with what the robot makes of it, the world beside it, captions around."""
+"""One picture of the demo video: the camera with the robot's estimates, the world next to it, captions around."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from PIL import ImageDraw, ImageFont
 
 from paramove.documents import Image
 from paramove.msgs.tracked_objects_pb2 import TrackedObject
-from paramove.runs.rule_learning.story import Moment
+from paramove.runs.rule_learning.story import RobotState
 
 Colour = tuple[int, int, int]
 
@@ -42,33 +42,31 @@ class VideoFrame:
         self._title, self._factor = title, factor
         self._steady = SteadyImage()
 
-    def draw(self, camera: Image, view: Image, moment: Moment, time_s: float, end_s: float) -> Image:
-        """A picture from the two images, RGB, and the robot's mind."""
+    def draw(self, camera: Image, view: Image, state: RobotState, time_s: float, end_s: float) -> Image:
+        """A picture from the two images, RGB, and the robot's state."""
         frame = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         frame[:] = BACK
         body = frame[TOP_PX : TOP_PX + PANEL[1]]
-        seen = self._steady.update(np.asarray(cv2.resize(camera, PANEL), dtype=np.uint8))
-        draw_mind(seen, moment)
-        body[:, : PANEL[0]] = seen
+        view_of_robot = self._steady.update(np.asarray(cv2.resize(camera, PANEL), dtype=np.uint8))
+        draw_estimates(view_of_robot, state)
+        body[:, : PANEL[0]] = view_of_robot
         body[:, PANEL[0] :] = cv2.resize(view, PANEL)
         paste(body, label("camera: what the robot sees", 12, TEXT), 8, PANEL[1] - 22, shade=True)
         paste(body, label("the world: not shown to the robot", 12, TEXT), PANEL[0] + 8, PANEL[1] - 22, shade=True)
-        self._top(frame[:TOP_PX], moment, time_s)
-        _captions(frame[TOP_PX + PANEL[1] :], moment)
+        self._top(frame[:TOP_PX], state, time_s)
+        _captions(frame[TOP_PX + PANEL[1] :], state)
         done = round(SIZE[0] * min(1.0, time_s / end_s)) if end_s > 0 else 0
         frame[-3:, :done] = ACCENT
         return frame
 
-    def _top(self, bar: Image, moment: Moment, time_s: float) -> None:
+    def _top(self, bar: Image, state: RobotState, time_s: float) -> None:
         paste(bar, label(self._title, 15, TEXT, bold=True), 12, 9)
-        reached = (
-            len(STAGES) if moment.stage == "done" else STAGES.index(moment.stage) if moment.stage in STAGES else -1
-        )
+        reached = len(STAGES) if state.stage == "done" else STAGES.index(state.stage) if state.stage in STAGES else -1
         x = 400
-        for place, stage in enumerate(STAGES):
-            now = place == reached
-            colour = ACCENT if now else TEXT if place < reached else FAINT
-            text = f"{'✓' if place < reached else place + 1} {stage}"
+        for index, stage in enumerate(STAGES):
+            now = index == reached
+            colour = ACCENT if now else TEXT if index < reached else FAINT
+            text = f"{'✓' if index < reached else index + 1} {stage}"
             sprite = label(text, 15, colour, bold=now)
             paste(bar, sprite, x, 9)
             x += sprite.shape[1] + 26
@@ -98,22 +96,22 @@ class SteadyImage:
         return self._held.copy()
 
 
-def draw_mind(image: Image, moment: Moment) -> None:
-    """Tracked objects, the hand, the goal, the believed openings, in place onto the camera's image."""
-    if moment.homography is not None:
-        for name, place in moment.rules.items():
-            at = _pixel(moment.homography, place)
+def draw_estimates(image: Image, state: RobotState) -> None:
+    """Tracked objects, the hand, the goal, the estimated openings, drawn into the camera's image."""
+    if state.homography is not None:
+        for name, opening in state.rules.items():
+            at = _pixel(state.homography, opening)
             cv2.circle(image, at, 13, COLOURS.get(name, TEXT), 1, cv2.LINE_AA)
             cv2.drawMarker(image, at, COLOURS.get(name, TEXT), cv2.MARKER_CROSS, 8, 1, cv2.LINE_AA)
-        if moment.goal is not None and moment.goal.fetches:
-            start = _pixel(moment.homography, tuple(moment.goal.source[:2]))
-            end = _pixel(moment.homography, tuple(moment.goal.target[:2]))
+        if state.goal is not None and state.goal.fetches:
+            start = _pixel(state.homography, tuple(state.goal.source[:2]))
+            end = _pixel(state.homography, tuple(state.goal.target[:2]))
             cv2.arrowedLine(image, start, end, ACCENT, 2, cv2.LINE_AA, tipLength=0.08)
-    for item in moment.tracked.objects if moment.tracked is not None else ():
+    for item in state.tracked.objects if state.tracked is not None else ():
         if item.kind == TrackedObject.KIND_HAND:
             _draw_hand(image, item)
         else:
-            _draw_object(image, item, moment)
+            _draw_object(image, item, state)
 
 
 def _draw_hand(image: Image, item: Any) -> None:
@@ -123,41 +121,41 @@ def _draw_hand(image: Image, item: Any) -> None:
     cv2.circle(image, (round(item.u_px), round(item.v_px)), 3, HAND, -1, cv2.LINE_AA)
 
 
-def _draw_object(image: Image, item: Any, moment: Moment) -> None:
+def _draw_object(image: Image, item: Any, state: RobotState) -> None:
     colour = COLOURS.get(item.name, TEXT)
     left, top = round(item.left_px) - 2, round(item.top_px) - 2
     right, bottom = left + round(item.width_px) + 4, top + round(item.height_px) + 4
     cv2.rectangle(image, (left, top), (right, bottom), colour, 1, cv2.LINE_AA)
-    gesture = moment.gesture
+    gesture = state.gesture
     fresh = gesture is not None and gesture.object == item.name
-    text = moment.seeing if fresh else item.name
+    text = state.seeing if fresh else item.name
     sprite = label(text, 12, colour, bold=fresh)
     paste(image, sprite, left, max(0, top - sprite.shape[0] - 2), shade=True)
 
 
-def _captions(panel: Image, moment: Moment) -> None:
-    if moment.sentence:
-        paste(panel, label(f"“{_shortened(moment.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
-    paste(panel, label("believes", 13, FAINT), 14, 46)
+def _captions(panel: Image, state: RobotState) -> None:
+    if state.sentence:
+        paste(panel, label(f"“{_shortened(state.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
+    paste(panel, label("estimates", 13, FAINT), 14, 46)
     x = 84
-    for name, (u, v) in moment.rules.items():
+    for name, (u, v) in state.rules.items():
         sprite = label(f"{name} → ({u * 100:.1f}, {v * 100:.1f}) cm".replace("-", "−"), 14, COLOURS.get(name, TEXT))
         paste(panel, sprite, x, 45)
         x += sprite.shape[1] + 26
-    if not moment.rules:
+    if not state.rules:
         paste(panel, label("nothing yet", 14, FAINT), x, 45)
     paste(panel, label("does", 13, FAINT), 14, 74)
-    paste(panel, label(moment.doing or "waits", 14, ACCENT if moment.doing else FAINT), 84, 73)
-    paste(panel, label("notices", 13, FAINT), 494, 74)
-    paste(panel, label(moment.seeing or "–", 14, TEXT if moment.seeing else FAINT), 560, 73)
+    paste(panel, label(state.doing or "waits", 14, ACCENT if state.doing else FAINT), 84, 73)
+    paste(panel, label("detects", 13, FAINT), 494, 74)
+    paste(panel, label(state.seeing or "–", 14, TEXT if state.seeing else FAINT), 560, 73)
 
 
 def _shortened(text: str, length: int) -> str:
     return text if len(text) <= length else text[: length - 1] + "…"
 
 
-def _pixel(homography: Any, place: tuple[float, float]) -> tuple[int, int]:
-    u, v = homography.image_from_plane(*place)
+def _pixel(homography: Any, position: tuple[float, float]) -> tuple[int, int]:
+    u, v = homography.image_from_plane(*position)
     return round(float(np.clip(u, -999, 9999))), round(float(np.clip(v, -999, 9999)))
 
 

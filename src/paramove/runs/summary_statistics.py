@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 
-def spread(values: Iterable[float]) -> dict[str, float | int | None]:
+def summary_statistics(values: Iterable[float]) -> dict[str, float | int | None]:
     """Median, largest and number of values; None where there are none."""
     array = np.asarray(list(values), dtype=np.float64)
     if not array.size:
