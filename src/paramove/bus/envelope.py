@@ -119,8 +119,8 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
     """
     if len(header) != SIZE:
         raise RefusedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")
-    magic, version, flags, header_schema, publisher, epoch, sequence, published_ns, captured_ns, length, crc = _WHOLE.unpack(
-        header
+    magic, version, flags, header_schema, publisher, epoch, sequence, published_ns, captured_ns, length, crc = (
+        _WHOLE.unpack(header)
     )
     if magic != MAGIC:
         raise RefusedError(Reason.MAGIC, f"magic is {magic:#06x}, expected {MAGIC:#06x}: not a message of this bus")

@@ -1,8 +1,8 @@
 """Lockstep, the member's side: time waits until this process is done with a tick.
 
 1. The member connects to `<bus folder>/lockstep` and greets (JOIN) once the clock's publisher has welcomed it.
-2. The first tick whose marks name the member is a handshake: the member publishes nothing in it and only waits until the
-   publisher of every subscribed topic with a mark has welcomed it. So it misses nothing that is published later.
+2. The first tick whose marks name the member is a handshake: the member publishes nothing and waits until the publisher
+   of every subscribed topic with a mark has welcomed it. So it misses nothing that is published later.
 3. At every later tick it reads each topic up to the tick's mark: the messages published when the tick began. Messages
    beyond the mark are queued for the next iteration. So an iteration has the same messages on any machine.
 4. When the node comes back for the next iteration it answers DONE with the marks of what it has published itself.

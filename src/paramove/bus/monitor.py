@@ -70,8 +70,8 @@ class ForeignConnections:
 
     def __init__(self, socket: zmq.Socket[Any], name: str) -> None:
         socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
-        # With a domain, even without an authenticator, libzmq rejects peers of ZMTP 1. It takes any bytes for such a peer
-        # and aborts the whole process when it meets one while the socket closes.
+        # With a domain, even without an authenticator, libzmq rejects peers of ZMTP 1. It takes any bytes for such a
+        # peer and aborts the whole process when it meets one while the socket closes.
         socket.setsockopt(zmq.ZAP_DOMAIN, b"paramove")
         self._monitor = Monitor(socket, zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_ACCEPTED)
         self._name = name

@@ -224,7 +224,7 @@ class Subscriber:
         rate_hz = self.topic.budget_hz or 0.0
         return (
             f"{holder_of(self._path) or 'its publisher'} publishes more than {ALLOWANCE * rate_hz:g} a second and "
-            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. Messages above the rate are dropped; correct the publisher"
+            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. Excess messages are dropped; correct the publisher"
         )
 
     def _two_publishers_message(self, envelope: Envelope) -> str:
