@@ -140,6 +140,6 @@ def test_strangers_at_the_lockstep_socket_are_refused(folder: Path, caplog: pyte
         assert barrier.advance(1) == []
         stranger.close(linger=0)
     assert (barrier.refused, barrier.members) == (10, frozenset())
-    assert "lockstep: answer refused (number 1): 2 frames, expected 3: sender, header, answer" in caplog.text
-    assert "lockstep: answer refused (number 10)" in caplog.text
+    assert "lockstep: answer rejected (number 1): 2 frames, expected 3: sender, header, answer" in caplog.text
+    assert "lockstep: answer rejected (number 10)" in caplog.text
     assert "ghost cannot join as process 4194305" in caplog.text

@@ -129,7 +129,7 @@ def test_a_killed_member_is_named_and_joins_again(
 def test_a_stopped_process_makes_time_wait_and_is_named(
     members: Members, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("paramove.bus.barrier.COMPLAINT_PERIOD_S", 0.05)
+    monkeypatch.setattr("paramove.bus.barrier.WARNING_PERIOD_S", 0.05)
     with _simulator(members.folder, ("c",)) as bus:
         barrier = LockstepBarrier(bus)
         members.start("c", tmp_path / "c", "c")

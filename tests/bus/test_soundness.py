@@ -77,4 +77,4 @@ def test_what_is_unsound_is_refused_counted_and_told(
     assert wait(subscriber.receive).message.x == 0.5
     assert subscriber.counter.refused[Reason.NUMBER] == 2
     assert subscriber.counter.lost == 0
-    assert "topic gestures: message refused (number, number 1): x is nan; finite numbers expected" in caplog.text
+    assert "topic gestures: message rejected (number, number 1): x is nan; finite numbers expected" in caplog.text

@@ -128,9 +128,9 @@ def test_a_flood_of_refused_messages_fills_no_log(gestures: Pair, caplog: pytest
         gestures.speaker.socket.send_multipart([b"gestures\0", b""])
     gestures.refused(Reason.SIZE, 900)
     assert [record.message.split(":")[1] for record in caplog.records] == [
-        " message refused (size, number 1)",
-        " message refused (size, number 10)",
-        " message refused (size, number 100)",
+        " message rejected (size, number 1)",
+        " message rejected (size, number 10)",
+        " message rejected (size, number 100)",
     ]
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.operator.arming_key import ANSWER_S, WAITS_S, ArmingKey
+from paramove.operator.arming_key import ANSWER_TIMEOUT_S, PRESS_VALID_S, ArmingKey
 
 
 def gate(state, *sentences):
@@ -23,7 +23,7 @@ def test_a_gate_that_hears_is_told_once_and_its_answer_is_shown(state):
     key.press(1.0)
     assert [key.tick(1.0), key.tick(1.1)] == [True, False]
     key.handle(gate(state, "stopped by a person"))
-    assert key.sentence == "looking at the servos"
+    assert key.sentence == "checking the servos"
     key.handle(gate("ARMED"))
     assert (key.sentence, key.state, key.tick(9.0)) == ("armed", "armed", False)
 
@@ -32,15 +32,15 @@ def test_pressed_while_the_arm_stops_it_is_heard_once_the_arm_rests():
     key = hearing("STOPPING", "stopped by a person")
     key.press(1.0)
     assert not key.tick(1.0)
-    assert key.sentence == "the arm still stops: it is armed once it rests"
+    assert key.sentence == "the arm is still stopping: it is armed once it rests"
     key.handle(gate("HOLD", "stopped by a person"))
-    assert key.tick(1.0 + WAITS_S)
+    assert key.tick(1.0 + PRESS_VALID_S)
 
 
 def test_nobody_is_armed_by_a_key_that_was_pressed_long_ago():
     key = hearing("STOPPING", "stopped by a person")
     key.press(1.0)
-    assert not key.tick(1.1 + WAITS_S)
+    assert not key.tick(1.1 + PRESS_VALID_S)
     assert key.sentence == "not armed: the arm has not come to rest within 1 s; press a again once it does"
     key.handle(gate("HOLD", "stopped by a person"))
     assert not key.tick(2.5)
@@ -75,8 +75,8 @@ def test_a_key_after_a_stop_arms_although_the_gate_was_last_heard_armed():
     [
         ("DISCONNECTED", ["the port went away"], "not armed: the port went away"),
         ("ESTOP", ["the emergency stop is pressed"], "not armed: the emergency stop is pressed"),
-        ("UNSPECIFIED", [], "not armed: the safety gate is not heard"),
-        ("ARMED", [], "armed already"),
+        ("UNSPECIFIED", [], "not armed: no data from the safety gate"),
+        ("ARMED", [], "already armed"),
     ],
 )
 def test_a_gate_that_does_not_hear_is_told_at_once(state, sentences, told):
@@ -103,7 +103,7 @@ def test_the_same_refusal_again_and_no_answer_at_all_are_told_after_a_while(sent
     key.press(1.0)
     assert key.tick(1.0)
     key.handle(gate("DISARMED", *sentences))
-    key.tick(1.1 + ANSWER_S)
+    key.tick(1.1 + ANSWER_TIMEOUT_S)
     assert key.sentence == told
 
 

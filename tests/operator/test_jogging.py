@@ -55,7 +55,7 @@ def test_a_step_of_a_driver_that_is_gone_is_waited_for_no_longer(jogging):
     jogging.tick(int(1e9 * (duration_s + OVERDUE_S)))
     assert jogging.is_moving
     jogging.tick(int(1e9 * (duration_s + OVERDUE_S)) + 1)
-    assert "was it started again?" in jogging.sentence
+    assert "was it restarted?" in jogging.sentence
     assert jogging.step(1, 0).points[0].position_rad[0] == pytest.approx(0.1)
 
 

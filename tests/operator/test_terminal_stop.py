@@ -80,6 +80,6 @@ def test_silence_is_no_stop(folder):
 def test_when_others_say_all_stops_it_is_told(folder):
     with (
         Bus("dashboard", BusSettings(folder=folder), (), topics.STOPS),
-        pytest.raises(TopicTakenError, match="other programs say operator/stop and operator/estop"),
+        pytest.raises(TopicTakenError, match="other programs already publish operator/stop and operator/estop"),
     ):
         stop_arm(folder, "terminal", 0.1)

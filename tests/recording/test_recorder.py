@@ -126,8 +126,8 @@ def test_a_full_disk_is_waited_for_and_the_recording_goes_on_in_a_further_part(d
     assert missing == list(range(missing[0], missing[-1] + 1))  # one gap
     (gap,) = parts.gaps
     assert (gap.begin_ns, gap.end_ns) == (missing[0] - 1, missing[-1] + 1)
-    (told,) = [record.message for record in caplog.records if "goes on in" in record.message]
-    assert f"goes on in run.2.mcap: {len(missing)} messages from" in told
+    (told,) = [record.message for record in caplog.records if "continues in" in record.message]
+    assert f"continues in run.2.mcap: {len(missing)} messages from" in told
 
 
 def test_a_recorder_that_is_started_on_a_full_disk_waits_too(disk, monkeypatch) -> None:

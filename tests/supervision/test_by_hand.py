@@ -81,7 +81,7 @@ def test_list_keeps_the_reason_of_an_end(workspace, launcher):
         (("restart", "camra"), "there is no node 'camra'; did you mean 'camera'?"),
         (("stop", "lamp"), "there is no node 'lamp'; there are: arm, camera, main"),
         (("start", "camera"), "camera runs already (ready)"),
-        (("restart", "main"), "main cannot go on in a new process (restart: never in the launch file); end the run"),
+        (("restart", "main"), "main cannot continue in a new process (restart: never in the launch file); end the run"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_the_reason(launcher, arguments, told):
@@ -96,7 +96,7 @@ def test_run_ends_with_a_required_node_that_cannot_be_started_again(launcher):
     assert done.exit_code in (0, 1), done.output
     shown = launcher.communicate(timeout=60)[0]
     assert launcher.returncode == exit_codes.FAILURE
-    assert "main was stopped by hand; the run cannot go on without it" in shown
+    assert "main was stopped by hand; the run cannot continue without it" in shown
 
 
 def test_run_ends_after_the_restart_of_a_node_that_must_not_go_on(launcher):
@@ -112,7 +112,7 @@ def test_nothing_runs(workspace):
     folder.mkdir(parents=True, mode=0o700)
     done = node("stop", "camera")
     assert done.exit_code == 1
-    assert f"nothing is running that could be asked at {folder}" in done.output
+    assert f"no application is running at {folder}" in done.output
 
 
 @pytest.fixture

@@ -56,16 +56,16 @@ def test_empty_is_as_unset(environment, name):
 @pytest.mark.parametrize(
     ("variables", "note"),
     [
-        ({"XDG_RUNTIME_DIR": "run"}, "XDG_RUNTIME_DIR='run' is ignored: it is no absolute path; sockets lie in /"),
+        ({"XDG_RUNTIME_DIR": "run"}, "XDG_RUNTIME_DIR='run' is ignored: it is not an absolute path; sockets lie in /"),
         ({"XDG_RUNTIME_DIR": "/no/such"}, "XDG_RUNTIME_DIR='/no/such' is ignored: there is no such folder"),
         ({"XDG_RUNTIME_DIR": FILE}, "is ignored: there is no such folder"),
-        ({"TMPDIR": "tmp"}, "TMPDIR='tmp' is ignored: it is no absolute path; temporary files lie in /"),
+        ({"TMPDIR": "tmp"}, "TMPDIR='tmp' is ignored: it is not an absolute path; temporary files lie in /"),
         ({"TMPDIR": "/no/such"}, "TMPDIR='/no/such' is ignored"),
-        ({"HOME": FILE}, f"HOME='{FILE}': nothing can be kept in {FILE}/.cache/paramove"),
-        ({"XDG_CACHE_HOME": FILE}, f"XDG_CACHE_HOME='{FILE}': nothing can be kept in"),
-        ({"HOME": "home"}, "HOME='home' is ignored: it is no absolute path; what is kept lies in /"),
-        ({"TZ": "Mars/Base"}, "TZ='Mars/Base' is no time zone"),
-        ({"TZ": "../../etc/passwd"}, "TZ='../../etc/passwd' is no time zone"),
+        ({"HOME": FILE}, f"HOME='{FILE}': the cache {FILE}/.cache/paramove is not writable"),
+        ({"XDG_CACHE_HOME": FILE}, f"XDG_CACHE_HOME='{FILE}': the cache "),
+        ({"HOME": "home"}, "HOME='home' is ignored: it is not an absolute path; the cache is /"),
+        ({"TZ": "Mars/Base"}, "TZ='Mars/Base' is not a known time zone"),
+        ({"TZ": "../../etc/passwd"}, "TZ='../../etc/passwd' is not a known time zone"),
     ],
 )
 def test_what_is_ignored_is_told_with_its_remedy(environment, variables, note):

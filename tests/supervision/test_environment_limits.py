@@ -52,7 +52,7 @@ class Process:
 def node(spawn, **settings):
     changes = []
     made = SupervisedNode(
-        "camera", NodeSettings(module="m", **settings), spawn, lambda it: changes.append((it.state, it.sentence))
+        "camera", NodeSettings(module="m", **settings), spawn, lambda it: changes.append((it.state, it.detail))
     )
     return made, changes
 
@@ -78,4 +78,4 @@ def test_silence_while_the_supervisor_itself_was_stopped_does_not_count(looks_s,
     for now_s in looks_s:
         made.check(now_s)
     assert (made.process is None) == killed
-    assert (State.READY, "hangs: no status for 10 s, last said: frames, so it is killed") in changes or not killed
+    assert (State.READY, "hangs: no status for 10 s, last message: frames, so it is killed") in changes or not killed

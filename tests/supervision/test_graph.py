@@ -79,7 +79,7 @@ def test_text_fits_a_terminal_and_tells_every_topic(sim):
 
 
 MERMAID = re.compile(
-    r'n_\w+(?:\["[^"\[\]]+"\]|\(\["[^"]+"\]\)(?::::unsaid)?| (?:-->|-\.->)(?:\|"[^"|]+"\|)? n_\w+|:::\w+)'
+    r'n_\w+(?:\["[^"\[\]]+"\]|\(\["[^"]+"\]\)(?::::unpublished)?| (?:-->|-\.->)(?:\|"[^"|]+"\|)? n_\w+|:::\w+)'
     r"|classDef \w+ [\w:,# -]+"
 )
 

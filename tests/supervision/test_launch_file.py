@@ -136,9 +136,9 @@ def test_an_overlay_of_this_launch_file_comes_before_one_for_all(folder):
     ("name", "overlays", "message"),
     [
         ("god", None, "did you mean 'good'?"),
-        ("../good", None, "no name of a launch file"),
+        ("../good", None, "not a name of a launch file"),
         ("good", ["slo"], "no such overlay; did you mean 'slow'?"),
-        ("good; rm -rf /", None, "no name of a launch file"),
+        ("good; rm -rf /", None, "not a name of a launch file"),
     ],
 )
 def test_missing_file_is_told_with_the_nearest_name(folder, name, overlays, message):
@@ -162,14 +162,14 @@ BAD = [
     ("nodes:\n  a: {module: ../m}", "2:7", "nodes.a.module"),
     ("nodes:\n  A b: {module: m}", "2:3", "expected a name such as my_node"),
     ("nodes:\n  a: {module: m}\n  a: {module: n}", "3:3", "duplicate key"),
-    ("nodes:\n  a: {module: m, after: [b]}", "2:26", "'a' comes after 'b', no node; there are: a"),
+    ("nodes:\n  a: {module: m, after: [b]}", "2:26", "'a' is started after 'b', which is not a node; there are: a"),
     (
         "nodes:\n  a: {module: m, after: [b]}\n  b: {module: m, after: [a]}",
         "2:18",
         "wait for each other ('after'): a, b",
     ),
     ("nodes: {}", "1:1", "nodes"),
-    ("seed_parameters: [b.seed]\nnodes: {a: {module: m}}", "1:19", "'b.seed' is no node.parameter"),
+    ("seed_parameters: [b.seed]\nnodes: {a: {module: m}}", "1:19", "'b.seed' is not a node.parameter"),
     ("nodes: {a: {module: !!python/name:os.system x}}", "1:21", "tag"),
     ("nodes: &x {a: {module: m}}", "1:8", "anchor"),
     ("nodes: {a: {module: m}}\nbus: {<<: {clock: x}}", "2:7", "merge keys"),

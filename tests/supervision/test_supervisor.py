@@ -64,7 +64,7 @@ nodes:
     outcome, _, shown = workspace.run()
     assert outcome.code == exit_codes.FAILURE
     assert (
-        "broken ended with exit code 1; given up after 2 restarts in 100 s; the run cannot go on without it"
+        "broken ended with exit code 1; given up after 2 restarts in 100 s; the run cannot continue without it"
         in outcome.reason
     )
     assert "RuntimeError: crash number 3" in shown
@@ -112,7 +112,7 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert "slow was not ready within 2.5 s, last said: warming up the lamp" in outcome.reason
+    assert "slow was not ready within 2.5 s, last message: warming up the lamp" in outcome.reason
 
 
 def test_required_node_that_ends_early_ends_the_run_as_a_failure(workspace):
@@ -123,7 +123,7 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert outcome.reason == "camera has finished; the run cannot go on without it"
+    assert outcome.reason == "camera has finished; the run cannot continue without it"
 
 
 def test_stubborn_node_is_killed_with_its_children(workspace):
@@ -239,7 +239,7 @@ def test_an_outcome_that_finds_no_room_changes_nothing(workspace, caplog):
         facts = YAML(typ="safe").load((folder.path / "run.yaml").read_text())
     assert "outcome" not in facts
     assert facts["launch"] == "test"
-    assert "run.yaml does not tell the outcome: No space left on device" in caplog.text
+    assert re.search("outcome could not be written to .*run.yaml: No space left on device", caplog.text)
 
 
 def test_node_over_its_memory_limit_is_given_up_with_the_figure(workspace):

@@ -35,7 +35,7 @@ def console(width=100, terminal=False):
 
 def test_words_of_another_process_are_passed_over(node):
     node.handle(NodeStatus(node="camera", state=NodeStatus.STATE_FAILED, sentence="old", pid=1))
-    assert (node.state, node.sentence) == (State.READY, "480x360 [red]")
+    assert (node.state, node.detail) == (State.READY, "480x360 [red]")
 
 
 def test_lines(node):

@@ -49,9 +49,9 @@ def test_stopped_process_is_told_at_once_and_may_go_on(workspace):
     pid = workspace.await_happening(launcher, "camera", "ready")["pid"]
     os.kill(pid, signal.SIGSTOP)
     halt = workspace.await_happening(launcher, "camera", "suspended")
-    assert halt["sentence"] == "is stopped (SIGSTOP); killed in 60 s unless it goes on"
+    assert halt["sentence"] == "is stopped (SIGSTOP); killed in 60 s unless it is continued"
     os.kill(pid, signal.SIGCONT)
-    assert workspace.await_happening(launcher, "camera", "resumed")["sentence"] == "goes on"
+    assert workspace.await_happening(launcher, "camera", "resumed")["sentence"] == "is continued"
     launcher.send_signal(signal.SIGTERM)
     ended(launcher)
     assert [event for event, _ in of(workspace, "camera")][-2:] == ["asked", "ended"]
@@ -91,8 +91,10 @@ nodes:
 """)
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert outcome.reason == ("dreamer hangs: no status for 0.5 s, last said: all set; the run cannot go on without it")
-    assert ("fault", "hangs: no status for 0.5 s, last said: all set, so it is killed") in of(workspace, "dreamer")
+    assert outcome.reason == (
+        "dreamer hangs: no status for 0.5 s, last message: all set; the run cannot continue without it"
+    )
+    assert ("fault", "hangs: no status for 0.5 s, last message: all set, so it is killed") in of(workspace, "dreamer")
 
 
 def test_run_ends_when_a_node_is_back_that_must_not_go_on(workspace):
@@ -117,7 +119,7 @@ def test_run_ends_when_such_a_node_does_not_come_back(workspace):
     )
     outcome, _, _ = workspace.run()
     assert outcome.code == exit_codes.FAILURE
-    assert outcome.reason == ("arm ended with exit code 1; it did not come back; the run cannot go on without it")
+    assert outcome.reason == ("arm ended with exit code 1; it did not come back; the run cannot continue without it")
     assert workspace.events.count("arm started") == 2
 
 

@@ -32,4 +32,4 @@ def test_a_run_goes_on_over_a_full_disk_and_the_recording_after_it(launcher, tmp
         assert {gap["recording"] for gap in json.loads((launcher.latest / "run.json").read_text())["gaps"]} >= {
             "recording"
         }
-        assert "goes on in recording.2.mcap: 0 messages" in (launcher.latest / "logs" / "recorder.log").read_text()
+        assert "continues in recording.2.mcap: 0 messages" in (launcher.latest / "logs" / "recorder.log").read_text()

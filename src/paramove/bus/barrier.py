@@ -3,8 +3,8 @@
 barrier = LockstepBarrier(bus)
 if barrier.wait_for_members():
     while not bus.stopped:
-        bus.publish(...)                            # what the world shows at this time
-        for received in barrier.advance(now_ns): ...   # publishes the tick; what the members published in it
+        bus.publish(...)                            # the sensor data of this time
+        for received in barrier.advance(now_ns): ...   # publishes the tick; messages of the members
         # step the world by one period
 """
 
@@ -31,7 +31,7 @@ from paramove.msgs.clock_pb2 import Clock, TickDone
 
 _log = logging.getLogger(__name__)
 
-COMPLAINT_PERIOD_S = 5.0
+WARNING_PERIOD_S = 5.0
 MAX_ANSWER_BYTES = 2**18
 
 
@@ -39,9 +39,9 @@ class LockstepBarrier:
     """The publisher of the clock.
 
     With `bus.settings.lockstep` a tick ends when every member has published DONE. A member whose process ends or that
-    publishes LEAVE is waited for no more and is named in `lost`; when it is started again it joins at the next tick.
-    There is no time limit: a member that hangs is named in the log every 5 s, and the supervisor decides what becomes
-    of it. Without lockstep the clock is only published, and its caller paces it.
+    publishes LEAVE is no longer waited for and is listed in `lost`; once restarted it joins at the next tick.
+    There is no timeout: a member that hangs is logged every 5 s, and the supervisor decides what to do about it.
+    Without lockstep the clock is only published, and its caller paces it.
 
     Args:
         bus: A bus that publishes `clock`.
@@ -51,7 +51,7 @@ class LockstepBarrier:
         members: Nodes that time waits for at present.
         lost: Nodes that have left, in order.
         tick: Number of the latest tick. 0 is the handshake.
-        refused: How many answers were not those of a member.
+        refused: How many answers were rejected because they did not come from a member.
     """
 
     def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:
@@ -80,7 +80,7 @@ class LockstepBarrier:
     def wait_for_members(self) -> bool:
         """Waits until all expected members have joined and are connected; False if the bus was stopped.
 
-        What the simulator publishes before is queued and goes out afterwards, so that nobody misses it.
+        Messages that the simulator publishes before are queued and sent afterwards, so that every member gets them.
         """
         if not self._lockstep:
             return not self._exchange.stopped
@@ -134,15 +134,15 @@ class LockstepBarrier:
         self._exchange.add_socket(self._socket, ownership, foreign)
 
     def _wait(self, missing: set[str] | frozenset[str], what: str) -> None:
-        """Reads answers until there is one or a member ended; complains about whom it waits for."""
-        complaint_s = time.monotonic() + COMPLAINT_PERIOD_S
+        """Reads answers until there is one or a member ended; logs which members it waits for."""
+        warning_due_s = time.monotonic() + WARNING_PERIOD_S
         ready: set[object] = set()
         while not self._exchange.stopped:
-            if self._read_answers() or self._bury_the_dead(ready):
+            if self._read_answers() or self._remove_ended(ready):
                 return
-            ready = self._exchange.wait(COMPLAINT_PERIOD_S)
-            if time.monotonic() > complaint_s:
-                complaint_s += COMPLAINT_PERIOD_S
+            ready = self._exchange.wait(WARNING_PERIOD_S)
+            if time.monotonic() > warning_due_s:
+                warning_due_s += WARNING_PERIOD_S
                 _log.warning("lockstep: time waits for %s to %s", ", ".join(sorted(missing)), what)
 
     def _read_answers(self) -> bool:
@@ -157,7 +157,7 @@ class LockstepBarrier:
             except (RefusedError, DecodeError) as error:
                 self.refused += 1
                 if self.refused == 10 ** (len(str(self.refused)) - 1):
-                    _log.warning("lockstep: answer refused (number %d): %s", self.refused, error)
+                    _log.warning("lockstep: answer rejected (number %d): %s", self.refused, error)
                 continue
             changed |= self._take(answer)
         return changed
@@ -171,7 +171,7 @@ class LockstepBarrier:
                 self._newcomers[node] = answer
             return True
         if node not in self._marks or self._marks[node][member_mark(node)][0] != answer.pid:
-            return False  # of a process that is no member any more
+            return False  # of a process that is no longer a member
         self._marks[node] = to_marks(answer.published)
         if answer.kind == TickDone.KIND_LEAVE:
             self._remove(node, "left")
@@ -204,7 +204,7 @@ class LockstepBarrier:
             self._exchange.watch_descriptor(descriptor, watched=False)
             os.close(descriptor)
 
-    def _bury_the_dead(self, ready: set[object]) -> bool:
+    def _remove_ended(self, ready: set[object]) -> bool:
         """Removes members whose process descriptor is ready, which means ended; whether there was one."""
         names = [node for node, descriptor in self._pidfds.items() if descriptor in ready]
         for node in names:

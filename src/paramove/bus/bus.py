@@ -33,7 +33,7 @@ class Bus:
 
     Args:
         node: Name of the node.
-        settings: What the supervisor tells every node of the bus.
+        settings: Settings that the supervisor gives every node of the bus.
         subscribes: Topics to subscribe to.
         publishes: Topics to publish; the status topic is added.
         run_folder: Where the node may write files.
@@ -41,7 +41,7 @@ class Bus:
     Attributes:
         settings: As given.
         run_folder: As given.
-        dropped: By topic, messages that no loop asked for and that grew too many to keep.
+        dropped: By topic, how many messages were dropped because no loop took them and the queue was full.
 
     Raises:
         TopicTakenError, BusFolderError: see `paramove.bus.endpoint`.
@@ -87,7 +87,7 @@ class Bus:
 
     @property
     def taken_up(self) -> str:
-        """What a loop was given last, such as "gestures, sequence 12" or "tick 3"; "" before."""
+        """The latest event given to a loop, such as "gestures, sequence 12" or "tick 3"; "" before."""
         event = self._taken_up
         if isinstance(event, Tick):
             return f"tick {event.number}"
@@ -105,7 +105,7 @@ class Bus:
 
     @property
     def stopped(self) -> bool:
-        """Whether the node was asked to end."""
+        """Whether the node was requested to end."""
         return self.exchange.stopped
 
     def subscribe(self, topic: Topic) -> None:
@@ -129,7 +129,7 @@ class Bus:
         Args:
             topic: One of those the node publishes.
             message: Of the topic's type.
-            captured_ns: When what it tells of was so, ns of the bus clock; default now.
+            captured_ns: Time at which the content was measured, ns of the bus clock; default now.
 
         Raises:
             KeyError: the node does not publish this topic.
@@ -147,53 +147,53 @@ class Bus:
             self._held.append((topic, message, captured_ns))
 
     @overload
-    def events(self, *wanted: Topic, tick: Literal[False] = False) -> Iterator[Received]: ...
+    def events(self, *selected: Topic, tick: Literal[False] = False) -> Iterator[Received]: ...
     @overload
-    def events(self, *wanted: Topic, tick: Literal[True]) -> Iterator[Received | Tick]: ...
+    def events(self, *selected: Topic, tick: Literal[True]) -> Iterator[Received | Tick]: ...
 
-    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
+    def events(self, *selected: Topic, tick: bool = False) -> Iterator[Received | Tick]:
         """Every message of these topics (default: of all subscribed, also later on), oldest first, until the bus stops.
 
-        Messages of other topics are kept for a later loop, as many as the topic's high water mark.
+        Messages of other topics are queued for a later loop, up to the topic's high water mark.
 
         Args:
-            wanted: Topics.
+            selected: Topics.
             tick: Also yield a `Tick` once a camera period, after the messages of that period.
         """
-        return self._events(wanted, tick, conflate=False)
+        return self._events(selected, tick, conflate=False)
 
-    def latest(self, *wanted: Topic) -> Iterator[Received]:
+    def latest(self, *selected: Topic) -> Iterator[Received]:
         """Like `events`, but of each topic only the latest message that has arrived."""
-        for event in self._events(wanted, tick=False, conflate=True):
+        for event in self._events(selected, tick=False, conflate=True):
             assert isinstance(event, Received)
             yield event
 
-    def starting(self, sentence: str) -> None:
+    def starting(self, message: str) -> None:
         """Publishes what the node is doing before it is ready."""
-        self._status.change(NodeStatus.STATE_STARTING, sentence, self.now_ns)
+        self._status.change(NodeStatus.STATE_STARTING, message, self.now_ns)
 
-    def ready(self, sentence: str) -> None:
+    def ready(self, message: str) -> None:
         """Publishes that the node does its work, and how."""
-        if not self._frozen:  # what lives now lives on: the collector need not look at it again
+        if not self._frozen:  # what is alive now stays alive: the collector can skip it
             self._frozen = True
             gc.collect()
             gc.freeze()
-        self._status.change(NodeStatus.STATE_READY, sentence, self.now_ns)
+        self._status.change(NodeStatus.STATE_READY, message, self.now_ns)
 
-    def degraded(self, sentence: str) -> None:
+    def degraded(self, message: str) -> None:
         """Publishes that the node works with less than it should, and what is missing."""
-        self._status.change(NodeStatus.STATE_DEGRADED, sentence, self.now_ns)
+        self._status.change(NodeStatus.STATE_DEGRADED, message, self.now_ns)
 
-    def failed(self, sentence: str) -> None:
+    def failed(self, message: str) -> None:
         """Publishes that the node cannot do its work, and why."""
-        self._status.change(NodeStatus.STATE_FAILED, sentence, self.now_ns)
+        self._status.change(NodeStatus.STATE_FAILED, message, self.now_ns)
 
-    def ended(self, sentence: str) -> None:
+    def ended(self, message: str) -> None:
         """Publishes that the node is about to end well."""
-        self._status.change(NodeStatus.STATE_STOPPED, sentence, self.now_ns)
+        self._status.change(NodeStatus.STATE_STOPPED, message, self.now_ns)
 
     def stop(self) -> None:
-        """Ends every loop over events. May be called from a signal handler; saying still works until `close`."""
+        """Ends every loop over events. May be called from a signal handler; publishing still works until `close`."""
         self.exchange.stop()
 
     def close(self) -> None:
@@ -217,7 +217,7 @@ class Bus:
     def wait_for_subscriber(self, seconds: float) -> None:
         """Waits until there is a subscriber to the node's status, at most so long.
 
-        For a node that ends as soon as it has begun: else it would take the reason with it.
+        For a node that ends right after it began: otherwise nobody would receive the reason.
         """
         end_s = time.monotonic() + seconds
         while not (self._status.has_subscriber or self.stopped) and (left_s := end_s - time.monotonic()) > 0:
@@ -248,7 +248,7 @@ class Bus:
         self._ticks.may_publish = False
 
     def release(self) -> None:
-        """Publishes what was kept, and everything at once from now on."""
+        """Publishes the queued messages; later ones are published at once."""
         if isinstance(self._ticks, ExternalClock):
             self._ticks.may_publish = True
         held, self._held = self._held, []
@@ -256,7 +256,7 @@ class Bus:
             self.publish_at_once(topic, message, captured_ns)
 
     def publish_at_once(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
-        """Like `publish`, but never kept back."""
+        """Like `publish`, but never queued."""
         now_ns = self.now_ns
         captured_ns = now_ns if captured_ns is None else captured_ns
         self.exchange.publishers[topic.name].publish(message, captured_ns, now_ns)
@@ -276,8 +276,8 @@ class Bus:
             return RealTimeTicks(self.exchange)
         return LockstepTicks(self.exchange, self.node) if self.settings.lockstep else SimulatedTicks(self.exchange)
 
-    def _events(self, wanted: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Received | Tick]:
-        names = {topic.name for topic in wanted}
+    def _events(self, selected: tuple[Topic, ...], tick: bool, conflate: bool) -> Iterator[Received | Tick]:
+        names = {topic.name for topic in selected}
         if not_subscribed := names - set(self._subscribed):
             raise KeyError(
                 f"{self.node} does not subscribe to {', '.join(sorted(not_subscribed))}; add the topic to SUBSCRIBES"
@@ -332,15 +332,15 @@ class Bus:
         return True
 
     def _trim_backlog(self) -> None:
-        """Drops the oldest messages that no loop asked for, beyond what may wait of a topic."""
+        """Drops the oldest messages that no loop took, beyond the high water mark of their topic."""
         if not self._backlog:
             return
         waiting = Counter(received.topic.name for received in self._backlog)
-        kept = []
+        remaining = []
         for received in self._backlog:
             if waiting[received.topic.name] > received.topic.high_water_mark:
                 waiting[received.topic.name] -= 1
                 self.dropped[received.topic.name] += 1
             else:
-                kept.append(received)
-        self._backlog = kept
+                remaining.append(received)
+        self._backlog = remaining

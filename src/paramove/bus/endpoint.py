@@ -1,7 +1,7 @@
 """Where a topic's socket lies in the file system, and who owns it.
 
 libzmq's `ipc://` bind removes whatever lies at its path: a second publisher would silently take the topic over, and a
-regular file would be gone. A lock beside the socket, held for the publisher's life, keeps both from happening.
+regular file would be gone. A lock file next to the socket, held for the publisher's life, prevents both.
 """
 
 from __future__ import annotations
@@ -72,15 +72,15 @@ def prepare_folder(folder: Path) -> None:
     """Makes the bus folder (mode 0700); raises BusFolderError if it belongs to others or is open to them."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = folder.stat()
+        folder_stat = folder.stat()
     except OSError as error:
         raise BusFolderError(
             f"bus folder {folder}: {error.strerror}; choose another one with $XDG_RUNTIME_DIR"
         ) from error
-    if found.st_uid != os.geteuid():
-        raise BusFolderError(f"bus folder {folder} belongs to user {found.st_uid}, not to us ({os.geteuid()})")
-    if found.st_mode & 0o077:
-        mode = stat.S_IMODE(found.st_mode)
+    if folder_stat.st_uid != os.geteuid():
+        raise BusFolderError(f"bus folder {folder} belongs to user {folder_stat.st_uid}, not to us ({os.geteuid()})")
+    if folder_stat.st_mode & 0o077:
+        mode = stat.S_IMODE(folder_stat.st_mode)
         raise BusFolderError(f"bus folder {folder} is open to other users (mode {mode:04o}); run: chmod 700 {folder}")
 
 
@@ -89,7 +89,7 @@ class Ownership:
 
     Raises:
         TopicTakenError: another living process holds it; names its pid.
-        BusFolderError: something that is not our own stale socket lies at the path. It is left alone.
+        BusFolderError: something that is not our own stale socket lies at the path. It is not touched.
     """
 
     def __init__(self, path: Path, holder: str) -> None:
@@ -129,27 +129,27 @@ class Ownership:
 
 
 def _check_free(path: Path) -> None:
-    """Passes if nothing lies at `path` or a socket of ours that nobody listens at; else raises BusFolderError."""
+    """Raises BusFolderError if there is anything at `path` but a socket of ours that no process listens on."""
     try:
-        found = path.lstat()
+        socket_stat = path.lstat()
     except FileNotFoundError:
         return
-    if not stat.S_ISSOCK(found.st_mode):
-        raise BusFolderError(f"{path} exists and is not a socket; it is left alone, move it away")
-    if found.st_uid != os.geteuid():
-        raise BusFolderError(f"socket {path} belongs to user {found.st_uid}, not to us ({os.geteuid()})")
+    if not stat.S_ISSOCK(socket_stat.st_mode):
+        raise BusFolderError(f"{path} exists and is not a socket; it is not touched, move it away")
+    if socket_stat.st_uid != os.geteuid():
+        raise BusFolderError(f"socket {path} belongs to user {socket_stat.st_uid}, not to us ({os.geteuid()})")
     if is_alive(path):
-        raise BusFolderError(f"a process listens at {path} without holding its lock; end that process")
+        raise BusFolderError(f"a process listens on {path} without holding its lock; end that process")
 
 
 def is_alive(path: Path) -> bool:
-    """Whether somebody listens at the socket `path`. Never waits."""
+    """Whether a process listens on the socket `path`. Never waits."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.setblocking(False)
         try:
             probe.connect(os.fspath(path))
         except BlockingIOError:
-            return True  # the subscriber's queue is full: somebody is there
+            return True  # the subscriber's queue is full: a process listens
         except OSError:
             return False
     return True

@@ -16,7 +16,7 @@ header has 56 bytes, little-endian:
     48      4     payload length
     52      4     CRC-32 of the payload and of the 52 bytes above
 
-Checked in the order size, magic, version, schema, length, CRC; whoever receives then looks at the sequence and decodes
+Checked in the order size, magic, version, schema, length, CRC; the subscriber then checks the sequence and decodes
 last. Protobuf alone would accept most damaged messages.
 """
 
@@ -44,7 +44,7 @@ FLAG_LAST_VALUE = 2
 
 
 class Reason(enum.Enum):
-    """Why a message was refused. NUMBER: it holds NaN, infinity, a number beyond all size, or a time that is none."""
+    """Why a message was rejected. NUMBER: it holds NaN, infinity, a number above 1e12, or an invalid time."""
 
     CONNECTION = "connection"
     FRAMES = "frames"
@@ -61,10 +61,10 @@ class Reason(enum.Enum):
 
 
 class RefusedError(Exception):
-    """A message that is not what its topic carries. `reason` is what is counted, the text says what was found."""
+    """A message that its topic cannot carry. `reason` is counted, the text has the values found and expected."""
 
-    def __init__(self, reason: Reason, sentence: str) -> None:
-        super().__init__(sentence)
+    def __init__(self, reason: Reason, message: str) -> None:
+        super().__init__(message)
         self.reason = reason
 
 
@@ -97,7 +97,7 @@ def publisher_id(node: str) -> int:
 
 
 def pack(envelope: Envelope, payload: bytes) -> bytes:
-    """Header bytes for `payload`; the envelope's own `length` is not looked at."""
+    """Header bytes for `payload`; the envelope's own `length` is ignored."""
     schema, publisher, epoch, sequence, published_ns, captured_ns, flags, _ = envelope
     head = _LAYOUT.pack(
         MAGIC, VERSION, flags, schema, publisher, epoch, sequence, published_ns, captured_ns, len(payload)
@@ -119,15 +119,15 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
     """
     if len(header) != SIZE:
         raise RefusedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")
-    magic, version, flags, found, publisher, epoch, sequence, published_ns, captured_ns, length, crc = _WHOLE.unpack(
-        header
+    magic, version, flags, header_schema, publisher, epoch, sequence, published_ns, captured_ns, length, crc = (
+        _WHOLE.unpack(header)
     )
     if magic != MAGIC:
         raise RefusedError(Reason.MAGIC, f"magic is {magic:#06x}, expected {MAGIC:#06x}: not a message of this bus")
     if version != VERSION:
         raise RefusedError(Reason.VERSION, f"envelope version is {version}, this program reads version {VERSION}")
-    if found != schema:
-        raise RefusedError(Reason.SCHEMA, _schema_sentence(found, schema))
+    if header_schema != schema:
+        raise RefusedError(Reason.SCHEMA, _schema_message(header_schema, schema))
     if length != len(payload) or length > max_bytes:
         raise RefusedError(
             Reason.LENGTH, f"payload has {len(payload)} bytes, header says {length}, allowed are {max_bytes}"
@@ -137,10 +137,10 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
     return Envelope(schema, publisher, epoch, sequence, published_ns, captured_ns, flags, length)
 
 
-def _schema_sentence(found: int, expected: int) -> str:
+def _schema_message(received: int, expected: int) -> str:
     """Names both sides of a schema mismatch."""
-    names = [type_of_hash(value) or "a type unknown here" for value in (found, expected)]
+    names = [type_of_hash(value) or "a type unknown here" for value in (received, expected)]
     return (
-        f"schema hash is {found:#018x} ({names[0]}), the topic carries {expected:#018x} ({names[1]}); "
+        f"schema hash is {received:#018x} ({names[0]}), the topic carries {expected:#018x} ({names[1]}); "
         "correct the publisher, or run every process from the same installation"
     )

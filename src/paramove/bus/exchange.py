@@ -1,4 +1,4 @@
-"""All sockets of one process: publishers, subscribers, and the one place where it waits."""
+"""All sockets of one process: publishers, subscribers, and its single poll loop."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Marks = Mapping[str, tuple[int, int]]
 
 WATCH_PERIOD_S = 0.25
 DRAIN_LIMIT = 1000
-"""Messages taken from one topic at once, so that a flood on it cannot keep the process from everything else."""
+"""Messages taken from one topic at once, so that a flood on it does not block the process."""
 
 
 class Exchange:
@@ -113,8 +113,8 @@ class Exchange:
         """
         self.housekeeping()
         until_due_s = min(self._watch_due_s, self._second_due_s) - time.monotonic()
-        found = self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s))))
-        ready: set[object] = {item for item, _ in found}
+        events = self._poller.poll(math.ceil(1000 * max(0.0, min(timeout_s, until_due_s))))
+        ready: set[object] = {item for item, _ in events}
         if ready:
             for publisher in self.publishers.values():
                 if publisher.socket in ready:
@@ -130,7 +130,7 @@ class Exchange:
 
         Args:
             topics: Names of subscribed topics.
-            ready: Something is known to wait on each of them.
+            ready: A poll has shown that each of them has a message.
         """
         for name in topics:
             subscriber, pending = self.subscribers[name], self._pending[name]
@@ -142,16 +142,16 @@ class Exchange:
 
     def take(self, topics: Iterable[str]) -> list[Received]:
         """Everything drained of these topics, in the order of publish time, then of the topics."""
-        found: list[Received] = []
+        taken: list[Received] = []
         for name in topics:
             pending = self._pending[name]
-            found += [received for _, received in pending]
+            taken += [received for _, received in pending]
             pending.clear()
-        return sorted(found, key=_published)
+        return sorted(taken, key=_published)
 
     def take_up_to(self, marks: Marks, topics: Iterable[str]) -> list[Received]:
         """Like `take`, but leaves what was published after the marks. A topic without a mark is taken whole."""
-        found: list[Received] = []
+        taken: list[Received] = []
         for name in topics:
             pending = self._pending[name]
             subscriber = self.subscribers[name]
@@ -162,9 +162,9 @@ class Exchange:
                 # Of the present publisher and published after the mark, or by a new start of it that has no mark yet.
                 if mark is not None and present and (epoch != mark[0] or received.sequence > mark[1]):
                     break
-                found.append(received)
+                taken.append(received)
                 pending.popleft()
-        return sorted(found, key=_published)
+        return sorted(taken, key=_published)
 
     def missing(self, marks: Marks, topics: Iterable[str]) -> list[str]:
         """Those of the topics that have not been received up to their marks."""
@@ -190,7 +190,7 @@ class Exchange:
         return pending.popleft()[1] if pending else None
 
     def reopen(self, name: str) -> None:
-        """Subscribes to a topic anew: the publisher's welcome then shows what was lost."""
+        """Subscribes to a topic again: the publisher's welcome then reveals what was lost."""
         self._poller.unregister(self.subscribers[name].socket)
         self.subscribers[name].reopen()
         self._poller.register(self.subscribers[name].socket, zmq.POLLIN)
@@ -232,7 +232,7 @@ class Exchange:
             )
 
     def housekeeping(self) -> None:
-        """What is due a few times a second; for a loop that is never without messages, so that `wait` is not called."""
+        """Periodic work, a few times a second; for a loop that always has messages and therefore never calls `wait`."""
         self.check_process()
         now_s = time.monotonic()
         if now_s >= self._watch_due_s:

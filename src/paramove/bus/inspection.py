@@ -1,6 +1,6 @@
 """Looks at a running bus from outside, without taking part. For the command line and the dashboard.
 
-Nothing here waits longer than it is told to: a topic whose publisher is dead, busy or absent is shown as what it is.
+Every call returns within its timeout; a publisher that is dead, busy or absent is reported as such.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Measurement:
         welcomed: Whether the publisher answered.
         messages: How many were received; a latched value that was published before counts, too.
         lost: Gaps in the sequence.
-        refused: Messages that were not what the topic carries.
+        refused: Messages that were rejected.
         sequence: Of the latest message of the publisher.
         epoch: Of the publisher.
         bytes_total: Of the payloads.
@@ -93,11 +93,11 @@ def publisher_of(folder: Path, topic: Topic) -> PublisherOnBus:
     return PublisherOnBus(topic, is_held(path), holder_of(path))
 
 
-def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Received]:
+def listen(folder: Path, selected: Sequence[Topic], seconds: float) -> Iterator[Received]:
     """Messages of the topics, decoded, as they arrive within `seconds`."""
     end_s = time.monotonic() + seconds
     with zmq.Context() as context:
-        subscribers = [Subscriber(context, folder, topic) for topic in wanted]
+        subscribers = [Subscriber(context, folder, topic) for topic in selected]
         try:
             while time.monotonic() < end_s:
                 for subscriber in subscribers:
@@ -109,42 +109,42 @@ def listen(folder: Path, wanted: Sequence[Topic], seconds: float) -> Iterator[Re
                 subscriber.close()
 
 
-def measure(folder: Path, wanted: Sequence[Topic], seconds: float) -> list[Measurement]:
+def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Measurement]:
     """Counts what is published on the topics for `seconds`, reading envelopes only: payloads are not decoded."""
     end_s = time.monotonic() + seconds
-    found = [Measurement(topic) for topic in wanted]
+    measurements = [Measurement(topic) for topic in selected]
     with zmq.Context() as context:
-        subscribers = [Subscriber(context, folder, topic) for topic in wanted]
+        subscribers = [Subscriber(context, folder, topic) for topic in selected]
         while time.monotonic() < end_s:
-            for subscriber, measurement in zip(subscribers, found, strict=True):
+            for subscriber, measurement in zip(subscribers, measurements, strict=True):
                 while (raw := subscriber.receive_raw()) is not None:
                     measurement.arrivals_s.append(time.monotonic())
                     measurement.bytes_total += len(raw[1])
             _poll(subscribers, end_s)
-        for subscriber, measurement in zip(subscribers, found, strict=True):
+        for subscriber, measurement in zip(subscribers, measurements, strict=True):
             counter = subscriber.counter
             measurement.welcomed = subscriber.welcomed
             measurement.messages, measurement.lost = counter.messages, counter.lost
             measurement.sequence, measurement.epoch = counter.sequence, counter.epoch or 0
             measurement.refused = counter.refused.total()
             subscriber.close()
-    return found
+    return measurements
 
 
 def statuses(folder: Path, seconds: float) -> dict[str, Any]:
     """Latest `NodeStatus` of each node whose status topic has a living publisher; None if it did not answer in time."""
     alive = [item.topic for item in publishers(folder) if item.alive and item.topic.name.startswith("status/")]
-    found: dict[str, Any] = {topic.name.removeprefix("status/"): None for topic in alive}
+    latest: dict[str, Any] = {topic.name.removeprefix("status/"): None for topic in alive}
     if alive:
         for received in listen(folder, alive, seconds):
-            found[received.topic.name.removeprefix("status/")] = received.message
-            if None not in found.values():
+            latest[received.topic.name.removeprefix("status/")] = received.message
+            if None not in latest.values():
                 break
-    return found
+    return latest
 
 
 def _poll(subscribers: list[Subscriber], end_s: float) -> None:
-    """Waits until something can be read, not beyond `end_s`; opens sockets anew that have gone deaf."""
+    """Waits until something can be read, not beyond `end_s`; reopens sockets that libzmq has given up."""
     poller = zmq.Poller()
     for subscriber in subscribers:
         subscriber.revive()

@@ -1,12 +1,10 @@
 """Lockstep, the member's side: time waits until this process is done with a tick.
 
 1. The member connects to `<bus folder>/lockstep` and greets (JOIN) once the clock's publisher has welcomed it.
-2. The first tick whose marks name the member is a handshake: it only waits until the publisher of every topic it
-receives
-   and that has a mark has welcomed it. So nothing published later is missed. Nothing is published in it.
-3. At every later tick it reads each topic up to the tick's mark, which is what had been published when the tick began.
-What
-   has arrived beyond is kept for the next iteration. So a iteration holds the same messages on any machine.
+2. The first tick whose marks name the member is a handshake: the member publishes nothing and waits until the publisher
+   of every subscribed topic with a mark has welcomed it. So it misses nothing that is published later.
+3. At every later tick it reads each topic up to the tick's mark: the messages published when the tick began. Messages
+   beyond the mark are queued for the next iteration. So an iteration has the same messages on any machine.
 4. When the node comes back for the next iteration it answers DONE with the marks of what it has published itself.
 
 A topic without a mark has a publisher that time does not wait for (a person's page, a node with `lockstep: false`), and
@@ -35,8 +33,8 @@ _log = logging.getLogger(__name__)
 
 SERVICE = "lockstep"
 """Name of the barrier's socket in the bus folder."""
-HEALING_PERIOD_S = 2.0
-"""After so long a message that should be here is asked for again, or given up if its publisher is gone."""
+RETRY_PERIOD_S = 2.0
+"""After so long a missing message is requested again, or given up if its publisher is gone."""
 
 
 def to_marks(marks: Iterable[TopicMark]) -> dict[str, tuple[int, int]]:
@@ -50,38 +48,38 @@ def from_marks(marks: Marks) -> list[TopicMark]:
 
 
 def member_mark(node: str) -> str:
-    """Name of the mark by which a member sees that the barrier counts on it; its epoch is the process id."""
+    """Name of the mark that confirms to a member that it was admitted; its epoch is the process id."""
     return f"{SERVICE}/{node}"
 
 
 def read_up_to(exchange: Exchange, marks: Marks, names: list[str]) -> None:
     """Waits until everything up to the marks has been drained.
 
-    A message that does not come although its publisher lives is asked for again, so that it is counted as lost; if the
+    A message that is missing although its publisher is alive is requested again, so that it is counted as lost; if the
     publisher is gone it is given up. Both are logged: from there on the run may differ from another one.
     """
-    started_s = healed_s = time.monotonic()
+    started_s = retried_s = time.monotonic()
     while not exchange.stopped:
         exchange.drain(names)
         absent = exchange.missing(marks, names)
         if not absent:
             return
         now_s = time.monotonic()
-        if now_s - healed_s > HEALING_PERIOD_S:
-            healed_s = now_s
+        if now_s - retried_s > RETRY_PERIOD_S:
+            retried_s = now_s
             for name in absent:
                 connected = exchange.subscribers[name].connected
                 _log.warning(
                     "lockstep: topic %s not received up to its mark after %.0f s; %s; this run may differ from others",
                     name,
                     now_s - started_s,
-                    "asking again" if connected else "its publisher is gone",
+                    "requesting it again" if connected else "its publisher is gone",
                 )
                 if connected:
                     exchange.reopen(name)
             if not any(exchange.subscribers[name].connected for name in absent):
                 return
-        exchange.wait(HEALING_PERIOD_S)
+        exchange.wait(RETRY_PERIOD_S)
 
 
 class LockstepTicks:
@@ -130,7 +128,7 @@ class LockstepTicks:
         return None
 
     def leave(self) -> None:
-        """Tells the barrier not to wait for this process any more."""
+        """Requests the barrier to stop waiting for this process."""
         if self._joined:
             self._answer(TickDone.KIND_LEAVE, self._tick or 0)
             self._joined = False

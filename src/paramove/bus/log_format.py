@@ -1,4 +1,4 @@
-"""What a line in a node's log looks like; `paramove logs` reads it again.
+"""Format of a line in a node's log, which `paramove logs` parses.
 
     8123.456789 2026-11-21T10:00:00.123456+01:00 WARNING camera: no frame for 1 s
 
@@ -18,7 +18,7 @@ _LINE = re.compile(r"(\d+\.\d{6}) (\S+) (DEBUG|INFO|WARNING|ERROR|CRITICAL) (\w+
 
 @dataclass(frozen=True)
 class Stamped:
-    """A line as it was read; `level` is one of logging's numbers."""
+    """A parsed line; `level` is one of logging's numbers."""
 
     monotonic_s: float
     wall: str
@@ -43,16 +43,16 @@ class NodeFormatter(logging.Formatter):
 
 
 def log_to_stderr(node: str) -> None:
-    """Sends what this process logs to standard error, which the supervisor keeps in a file."""
+    """Sends what this process logs to standard error, which the supervisor writes to a file."""
     handler = logging.StreamHandler()
     handler.setFormatter(NodeFormatter(node))
     logging.basicConfig(level=logging.INFO, handlers=[handler])
 
 
 def parse(line: str) -> Stamped | None:
-    """A line of a log; None if it bears no stamp, such as a line of a traceback."""
-    found = _LINE.fullmatch(line)
-    if found is None:
+    """A line of a log; None if it has no time stamp, such as a line of a traceback."""
+    match = _LINE.fullmatch(line)
+    if match is None:
         return None
-    monotonic_s, wall, level, node, text = found.groups()
+    monotonic_s, wall, level, node, text = match.groups()
     return Stamped(float(monotonic_s), wall, logging.getLevelNamesMapping()[level], node, text)

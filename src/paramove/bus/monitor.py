@@ -16,9 +16,9 @@ _log = logging.getLogger(__name__)
 
 _HEAD = struct.Struct("=hi")
 _READ_AT_ONCE = 2000
-COMPLAINT_PERIOD_S = 60.0
+WARNING_PERIOD_S = 60.0
 HANDSHAKE_MS = 2000
-"""How long a connection may take to show that it speaks ZeroMQ."""
+"""Timeout of a connection's ZeroMQ handshake."""
 
 
 class Monitor:
@@ -56,7 +56,7 @@ class Monitor:
 
 
 class ForeignConnections:
-    """Counts connections to a bound socket that do not show that they speak ZeroMQ: a browser, a scanner, a mistake.
+    """Counts connections to a bound socket that do not speak ZeroMQ, such as a browser or a port scanner.
 
     libzmq ends them by itself; other connections are not affected. They are logged in one line a minute at most.
 
@@ -65,29 +65,29 @@ class ForeignConnections:
         name: Of the topic or service, for the log.
 
     Attributes:
-        count: How many there were; for a short time also one that is about to show it.
+        count: How many there were; includes connections whose handshake is still in progress.
     """
 
     def __init__(self, socket: zmq.Socket[Any], name: str) -> None:
         socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
-        # With a domain, although nobody judges it, libzmq refuses peers of ZMTP 1. It takes any bytes for such a peer
-        # and aborts the whole process when it meets one while the socket closes.
+        # With a domain, even without an authenticator, libzmq rejects peers of ZMTP 1. It takes any bytes for such a
+        # peer and aborts the whole process when it meets one while the socket closes.
         socket.setsockopt(zmq.ZAP_DOMAIN, b"paramove")
         self._monitor = Monitor(socket, zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_ACCEPTED)
         self._name = name
         self.count = 0
         self._before = 0
-        self._told = 0
-        self._complaint_due_s = 0.0
+        self._reported = 0
+        self._warning_due_s = 0.0
 
     def look(self) -> None:
         """Counts what has happened since the last call; to be called a few times a second."""
         for event in self._monitor.events():
             self.count += 1 if event == zmq.EVENT_ACCEPTED else -1
         certain, self._before = min(self.count, self._before), self.count
-        if certain > self._told and time.monotonic() >= self._complaint_due_s:
-            self._complaint_due_s = time.monotonic() + COMPLAINT_PERIOD_S
-            self._told = certain
+        if certain > self._reported and time.monotonic() >= self._warning_due_s:
+            self._warning_due_s = time.monotonic() + WARNING_PERIOD_S
+            self._reported = certain
             _log.warning(
                 "topic %s: %d connections to its socket did not speak ZeroMQ and were ended; only nodes and paramove's "
                 "own commands may connect there",

@@ -8,7 +8,7 @@ The supervisor starts a node as `python -m nodes.<name> --config FILE`. The file
     run_folder: runs/2026-11-21_10-00-00
 
 Exit codes: 0 ended well or by SIGTERM or SIGINT; 2 wrong arguments; 66 a file or device is missing; 70 the node raised
-an exception or ended after it had published that it failed; 75 a topic or the bus folder is held by somebody else; 78
+an exception or ended after it had published that it failed; 75 a topic or the bus folder is held by another process; 78
 the configuration, or a file that it names, is wrong.
 """
 
@@ -33,12 +33,12 @@ from paramove.documents import InputError, OldNames, exit_codes, read_document
 
 _log = logging.getLogger(__name__)
 
-LAST_WORD_S = 1.0
-"""A node that has failed waits so long at most until somebody has received the reason."""
+LAST_STATUS_TIMEOUT_S = 1.0
+"""How long a node that has failed waits for a subscriber to receive the reason."""
 
 
 class NodeConfig(OldNames):
-    """Parameters of a node; each node derives its own. Unknown keys are refused."""
+    """Parameters of a node; each node derives its own. Unknown keys are rejected."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -58,7 +58,7 @@ Config = TypeVar("Config", bound=NodeConfig)
 
 
 class ConfigurationError(InputError):
-    """The node's file is missing or wrong; the text is for people."""
+    """The node's file is missing or wrong; the text is printed for the user."""
 
 
 def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Config]:
@@ -66,11 +66,11 @@ def read_node_file(path: Path, config_type: type[Config]) -> tuple[NodeFile, Con
     try:
         file = NodeFile.model_validate(read_document(path, "configuration of a node", ConfigurationError).data)
     except ValidationError as error:
-        raise ConfigurationError(_sentence(path, error)) from error
+        raise ConfigurationError(_message(path, error)) from error
     try:
         return file, config_type.model_validate(file.parameters)
     except ValidationError as error:
-        raise ConfigurationError(_sentence(path, error, "parameters.")) from error
+        raise ConfigurationError(_message(path, error, "parameters.")) from error
 
 
 def publish_each(bus: Bus, published: Sequence[Topic], messages: Sequence[Iterable[Any]]) -> None:
@@ -114,7 +114,7 @@ def main(
     with bus:
         code = _run(run, bus, config)
         if code != exit_codes.OK:
-            bus.wait_for_subscriber(LAST_WORD_S)
+            bus.wait_for_subscriber(LAST_STATUS_TIMEOUT_S)
         sys.exit(code)
 
 
@@ -141,8 +141,8 @@ def _run(run: Callable[[Bus, Config], None], bus: Bus, config: Config) -> int:
     return exit_codes.OK
 
 
-def _sentence(path: Path, error: ValidationError, prefix: str = "") -> str:
-    """One line per wrong key: where, what was found, what would have worked."""
+def _message(path: Path, error: ValidationError, prefix: str = "") -> str:
+    """One line per wrong key: location, reason and the value found."""
     lines = [
         f"{path}: {prefix}{'.'.join(map(str, item['loc']))}: {item['msg']} (found {item['input']!r:.80})"
         for item in error.errors()

@@ -65,7 +65,7 @@ class Publisher:
         self.socket.setsockopt(zmq.XPUB_VERBOSE, 1)
         self.socket.setsockopt(zmq.SNDHWM, topic.publisher_high_water_mark)
         self.socket.setsockopt(zmq.LINGER, LINGER_MS)
-        # A subscriber only ever sends subscriptions.
+        # A subscriber sends subscriptions only.
         self.socket.setsockopt(zmq.MAXMSGSIZE, 1024)
         self.foreign = ForeignConnections(self.socket, self.name)
         self.socket.bind(f"ipc://{path}")
@@ -78,8 +78,8 @@ class Publisher:
             ValueError: the message is larger than the topic allows.
         """
         if type(message) is not self.topic.type:
-            found = getattr(getattr(message, "DESCRIPTOR", None), "full_name", type(message).__name__)
-            raise TypeError(f"topic {self.topic.name} carries {self.topic.type_name}, not {found}")
+            type_name = getattr(getattr(message, "DESCRIPTOR", None), "full_name", type(message).__name__)
+            raise TypeError(f"topic {self.topic.name} carries {self.topic.type_name}, not {type_name}")
         payload: bytes = message.SerializeToString(deterministic=True)
         if len(payload) > self.topic.max_bytes:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""A bus of recorded or synthetic messages that stores what the node publishes. For replay tests of nodes.
+"""A bus of recorded or synthetic messages that stores the messages of the node. For replay tests of nodes.
 
 bus = RecordedBus([Received(topics.CAMERA_IMAGE, image, 0, 0, 1), Tick(1, 66_666_667)])
 run(bus, Config())
@@ -55,12 +55,12 @@ class RecordedBus:
         recorded: Messages and ticks, in the order in which the node gets them.
         node: Name of the node.
         run_folder: Where the node may write files.
-        protected: Leave out messages with unsound numbers, as the bus does; they are kept in `refused`.
+        protected: Reject messages with unsound numbers, as the bus does; they are listed in `refused`.
 
     Attributes:
         published: Everything the node published, in order.
-        states: States and sentences in order, such as ("ready", "tracking 4 colours").
-        refused: Topic and what is unsound, of each message that was left out.
+        states: States and their messages in order, such as ("ready", "tracking 4 colours").
+        refused: Topic and unsound number of each message that was rejected.
         now_ns: Publish time of the latest message or time of the latest tick.
     """
 
@@ -83,12 +83,12 @@ class RecordedBus:
         self._waiting = list(recorded)
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
-        """Keeps the message, as it is now; raises TypeError if the topic carries another type."""
+        """Stores a copy of the message; raises TypeError if the topic carries another type."""
         if type(message) is not topic.type:
             raise TypeError(f"topic {topic.name} carries {topic.type_name}, not {type(message).__name__}")
-        kept = topic.type()
-        kept.CopyFrom(message)
-        self.published.append(Published(topic, kept, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
+        copy = topic.type()
+        copy.CopyFrom(message)
+        self.published.append(Published(topic, copy, self.now_ns if captured_ns is None else captured_ns, self.now_ns))
 
     def published_on(self, topic: Topic) -> list[Published]:
         """What the node published on one topic."""
@@ -97,13 +97,13 @@ class RecordedBus:
     said = renamed_attribute("said", "published")
     said_on = renamed_attribute("said_on", "published_on")
 
-    def events(self, *wanted: Topic, tick: bool = False) -> Iterator[Received | Tick]:
-        """As `Bus.events`; ends with the recording. Messages of other topics stay for a later loop."""
-        return self._events({topic.name for topic in wanted}, tick)
+    def events(self, *selected: Topic, tick: bool = False) -> Iterator[Received | Tick]:
+        """As `Bus.events`; ends with the recording. Messages of other topics are left for a later loop."""
+        return self._events({topic.name for topic in selected}, tick)
 
-    def latest(self, *wanted: Topic) -> Iterator[Received]:
+    def latest(self, *selected: Topic) -> Iterator[Received]:
         """As `Bus.latest`; the messages between two ticks are one iteration, without ticks each message is its own."""
-        names = {topic.name for topic in wanted}
+        names = {topic.name for topic in selected}
         iteration: dict[str, Received] = {}
         has_ticks = any(isinstance(event, Tick) for event in self._waiting)
         for event in self._events(names, tick=True):
@@ -122,25 +122,25 @@ class RecordedBus:
     def when_readable(self, descriptor: int, call: Callable[[], None]) -> None:
         """There is nothing to wait for in a recording; messages of another thread are fetched at ticks."""
 
-    def starting(self, sentence: str) -> None:
-        """Keeps the state."""
-        self._change("starting", sentence)
+    def starting(self, message: str) -> None:
+        """Stores the state."""
+        self._change("starting", message)
 
-    def ready(self, sentence: str) -> None:
-        """Keeps the state."""
-        self._change("ready", sentence)
+    def ready(self, message: str) -> None:
+        """Stores the state."""
+        self._change("ready", message)
 
-    def degraded(self, sentence: str) -> None:
-        """Keeps the state."""
-        self._change("degraded", sentence)
+    def degraded(self, message: str) -> None:
+        """Stores the state."""
+        self._change("degraded", message)
 
-    def failed(self, sentence: str) -> None:
-        """Keeps the state."""
-        self._change("failed", sentence)
+    def failed(self, message: str) -> None:
+        """Stores the state."""
+        self._change("failed", message)
 
-    def ended(self, sentence: str) -> None:
-        """Keeps the state."""
-        self._change("stopped", sentence)
+    def ended(self, message: str) -> None:
+        """Stores the state."""
+        self._change("stopped", message)
 
     def stop(self) -> None:
         """Ends every loop over events."""
@@ -152,14 +152,14 @@ class RecordedBus:
 
     def hands_out(self, received: Received) -> bool:
         """Whether the node gets a message."""
-        found = unsound(received.message) if self._protected else ""
-        if found:
-            self.refused.append((received.topic.name, found))
-        return not found
+        reason = unsound(received.message) if self._protected else ""
+        if reason:
+            self.refused.append((received.topic.name, reason))
+        return not reason
 
-    def _change(self, state: str, sentence: str) -> None:
-        if self.states[-1:] != [(state, sentence)]:  # as a bus does
-            self.states.append((state, sentence))
+    def _change(self, state: str, message: str) -> None:
+        if self.states[-1:] != [(state, message)]:  # as a bus does
+            self.states.append((state, message))
 
     def _events(self, names: set[str], tick: bool) -> Iterator[Received | Tick]:
         index = 0

@@ -1,10 +1,10 @@
 """A number per message type, carried by every message.
 
 Protobuf decodes almost any bytes as almost any type. The envelope carries this number, so that a message of another
-type is refused before it is decoded. It covers the full name of the type and its generation, not its fields: a schema
-grows by new fields, which protobuf keeps or ignores, so programs of different releases understand each other. What
+type is rejected before it is decoded. It covers the full name of the type and its generation, not its fields: a schema
+grows by new fields, which protobuf preserves or ignores, so programs of different releases understand each other. What
 would break that (a field that changes its number, type or label) is caught by a test against the schemas of every
-release in `tests/data/releases`; whoever really needs it raises the type's generation here.
+release in `tests/data/releases`; an incompatible change raises the type's generation here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Exact counts of what one subscriber got of one topic, from epochs and sequence numbers alone."""
+"""Exact counts of one subscriber's received and lost messages, from epochs and sequence numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paramove.bus.envelope import Envelope, Reason
 
 
 class Arrival(enum.Enum):
-    """What a message is to a subscriber that has seen the ones before it."""
+    """Kind of a message, given the messages received before it."""
 
     NEW = "new"
     REPEATED = "repeated"
@@ -20,9 +20,9 @@ class Arrival(enum.Enum):
 class SequenceCounter:
     """Follows one topic.
 
-    The first thing received of an epoch, usually a welcome, is the base line: nothing published before was meant for
-    this subscriber. From there on every gap is a loss, and a later welcome also shows a loss at the end. A new epoch is
-    a restarted publisher, hence a new base line and no loss.
+    The first message of an epoch, usually a welcome, is the baseline: what was published before it does not count. From
+    there on every gap is a loss, and a later welcome also reveals a loss at the end. A new epoch is a restarted
+    publisher, hence a new baseline and no loss.
 
     Attributes:
         epoch: Of the present publisher; None until something was received.
@@ -30,7 +30,7 @@ class SequenceCounter:
         messages: Messages received, each counted once.
         lost: Messages published and not received.
         repeated: Messages that came again.
-        refused: How many messages were refused, by reason.
+        refused: How many messages were rejected, by reason.
         epochs: How many publishers followed each other.
     """
 

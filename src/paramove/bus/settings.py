@@ -26,7 +26,7 @@ def default_folder(domain: str | None = None) -> Path:
 
 
 def lock_of(folder: Path) -> Path:
-    """The lock that the launcher of a run holds for its bus folder."""
+    """Lock file that the launcher of a run holds for its bus folder."""
     return folder.with_name(f"{folder.name}.lock")
 
 

@@ -1,6 +1,6 @@
-"""Whether the numbers in a message can be numbers of this world: finite, not beyond all size, times that exist.
+"""Checks the numbers in a message: finite, below 1e12, valid times.
 
-Protobuf carries NaN and infinity, and a clamp may iteration NaN into full travel. So no such message reaches a node.
+Protobuf carries NaN and infinity, and a clamp may turn NaN into full travel. So no such message reaches a node.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor  # type: igno
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto  # type: ignore[import-untyped]
 
 LARGEST = 1e12
-"""Of any number; in SI units, pixels or counts nothing real comes near."""
+"""Of any number; real values in SI units, pixels or counts are far smaller."""
 LATEST_S = 9_000_000_000
 """Of times; nanoseconds since the epoch of any clock have to fit into 64 bits."""
 
@@ -24,21 +24,21 @@ _Check = Callable[[Any], str]
 
 
 def unsound(message: Any) -> str:
-    """Where the first bad number of a message is and what it is, such as `points[3].time_s is nan`; "" for none."""
+    """Path and value of the first bad number of a message, such as `points[3].time_s is nan`; "" for none."""
     for check in _checks(message.DESCRIPTOR):
-        found = check(message)
-        if found:
-            return found
+        reason = check(message)
+        if reason:
+            return reason
     return ""
 
 
 @cache
 def _checks(descriptor: Descriptor) -> tuple[_Check, ...]:
-    """What is to be looked at in a message type; a type without numbers costs nothing."""
+    """The checks of a message type; none for a type without numbers."""
     if descriptor.full_name in _TIMES:
         return (_time,)
     form = DescriptorProto()
-    descriptor.CopyToProto(form)  # tells what is repeated in every release of protobuf
+    descriptor.CopyToProto(form)  # has the labels in every release of protobuf
     repeated = {one.name for one in form.field if one.label == FieldDescriptorProto.LABEL_REPEATED}
     made = (_check_of(one, one.name in repeated) for one in descriptor.fields if _is_number(one) or _holds_numbers(one))
     return tuple(made)
@@ -69,15 +69,15 @@ def _of_many(name: str, values: Any, are_numbers: bool) -> str:
     if are_numbers and sum(map(abs, values)) <= LARGEST:
         return ""
     for index, value in enumerate(values):
-        found = _of_number(f"{name}[{index}]", value) if are_numbers else _inside(f"{name}[{index}]", value)
-        if found:
-            return found
+        reason = _of_number(f"{name}[{index}]", value) if are_numbers else _inside(f"{name}[{index}]", value)
+        if reason:
+            return reason
     return ""
 
 
 def _inside(name: str, message: Any) -> str:
-    found = unsound(message)
-    return f"{name}.{found}" if found else ""
+    reason = unsound(message)
+    return f"{name}.{reason}" if reason else ""
 
 
 def _time(message: Any) -> str:

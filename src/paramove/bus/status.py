@@ -13,7 +13,7 @@ from paramove.msgs.node_status_pb2 import NodeStatus, TopicCount
 _log = logging.getLogger(__name__)
 
 
-MAX_SENTENCE = 4000
+MAX_MESSAGE_LENGTH = 4000
 """Characters; an exception may carry a whole document."""
 
 
@@ -30,7 +30,7 @@ class StatusReporter:
         self._publisher = exchange.advertise(status(node))
         self._node = node
         self._state: NodeStatus.State = NodeStatus.STATE_STARTING
-        self._sentence = ""
+        self._message = ""
         self.processing_ns = 0
         self.processed = 0
 
@@ -44,31 +44,31 @@ class StatusReporter:
         """Whether anybody has subscribed; from then on the latest state has been sent, as the topic is latched."""
         return self._publisher.subscriptions > 0
 
-    def change(self, state: NodeStatus.State, sentence: str, now_ns: int) -> None:
-        """Publishes a state and a sentence at once, if they are new."""
-        sentence = sentence[:MAX_SENTENCE]
-        if (state, sentence) == (self._state, self._sentence) and self._publisher.sequence:
+    def change(self, state: NodeStatus.State, message: str, now_ns: int) -> None:
+        """Publishes a state and its message at once, if they are new."""
+        message = message[:MAX_MESSAGE_LENGTH]
+        if (state, message) == (self._state, self._message) and self._publisher.sequence:
             return
-        self._state, self._sentence = state, sentence
-        _log.info("%s: %s", NodeStatus.State.Name(state).removeprefix("STATE_").lower(), sentence)
+        self._state, self._message = state, message
+        _log.info("%s: %s", NodeStatus.State.Name(state).removeprefix("STATE_").lower(), message)
         self.publish(now_ns)
 
     def publish(self, now_ns: int) -> None:
         """Publishes the present state and counts."""
-        message = NodeStatus(
+        status_message = NodeStatus(
             node=self._node,
             state=self._state,
-            sentence=self._sentence,
+            sentence=self._message,
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,
             processed=self.processed,
         )
-        message.captured.FromNanoseconds(now_ns)
+        status_message.captured.FromNanoseconds(now_ns)
         for publisher in self._exchange.publishers.values():
-            message.published.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
+            status_message.published.append(TopicCount(topic=publisher.name, messages=publisher.sequence))
         for subscriber in self._exchange.subscribers.values():
-            message.received.append(_count(subscriber.name, subscriber.counter))
-        self._publisher.publish(message, now_ns, now_ns)
+            status_message.received.append(_count(subscriber.name, subscriber.counter))
+        self._publisher.publish(status_message, now_ns, now_ns)
 
 
 def _count(name: str, counter: SequenceCounter) -> TopicCount:

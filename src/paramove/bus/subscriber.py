@@ -24,11 +24,11 @@ _log = logging.getLogger(__name__)
 
 _NOBLOCK = int(zmq.NOBLOCK)
 _RCVMORE = int(zmq.RCVMORE)
-_PASSED_OVER_AT_ONCE = 200
-"""Refused messages that are read in one call, so that a flood of them cannot keep the process from everything else."""
+_SKIPPED_AT_ONCE = 200
+"""Rejected messages that are read in one call, so that a flood of them does not block the process."""
 
 DEAF_AFTER_S = 0.3
-"""A socket that was disconnected and has not tried again for so long never will."""
+"""A socket that has not tried to reconnect for so long never will."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Received:
     Attributes:
         topic: Row of the table.
         message: Decoded.
-        captured_ns: When what it tells of was so, ns of the bus clock.
+        captured_ns: Time at which the content was measured, ns of the bus clock.
         published_ns: When it was published.
         sequence: Of its publisher's epoch.
-        payload: The encoded message, for those who store it.
+        payload: The encoded message, for a recorder.
     """
 
     topic: Topic
@@ -84,12 +84,12 @@ class Subscriber:
     def receive(self, ready: bool = False) -> Received | None:
         """Next new message, or None if none is waiting.
 
-        Repeated and refused ones are counted and passed over. After many of them it also returns None.
+        Repeated and rejected ones are counted and skipped. After many of them it also returns None.
 
         Args:
             ready: A poll has just shown that something is waiting, so that need not be checked again.
         """
-        for _ in range(_PASSED_OVER_AT_ONCE):
+        for _ in range(_SKIPPED_AT_ONCE):
             raw = self.receive_raw(ready)
             ready = False
             if raw is None:
@@ -97,11 +97,11 @@ class Subscriber:
             envelope, payload = raw
             try:
                 if not self._budget.admits(envelope.epoch, envelope.published_ns):
-                    raise RefusedError(Reason.BUDGET, self._budget_sentence())
+                    raise RefusedError(Reason.BUDGET, self._budget_message())
                 message = self._decode(payload)
             except RefusedError as error:
                 self.counter.messages -= 1
-                self._refuse(error)
+                self._reject(error)
                 continue
             return Received(
                 self.topic, message, envelope.captured_ns, envelope.published_ns, envelope.sequence, payload
@@ -110,14 +110,14 @@ class Subscriber:
 
     def receive_raw(self, ready: bool = False) -> tuple[Envelope, bytes] | None:
         """Like `receive`, with the payload left encoded and however fast they come."""
-        for _ in range(_PASSED_OVER_AT_ONCE):
+        for _ in range(_SKIPPED_AT_ONCE):
             if not ready and not can_read(self.socket):
                 return None
             ready = False
             try:
                 envelope, payload = self._read()
             except RefusedError as error:
-                self._refuse(error)
+                self._reject(error)
                 continue
             except zmq.Again:
                 return None
@@ -125,13 +125,13 @@ class Subscriber:
             if arrival is Arrival.NEW:
                 return envelope, payload
             if arrival is Arrival.OUTDATED:
-                self._log_refusal(RefusedError(Reason.EPOCH, self._two_publishers_message(envelope)))
+                self._log_rejection(RefusedError(Reason.EPOCH, self._two_publishers_message(envelope)))
         return None
 
     def is_deaf(self) -> bool:
         """Whether libzmq has given the connection up for good, so that only `reopen` helps.
 
-        To be asked a few times a second. libzmq drops a connection for ever when a message exceeds MAXMSGSIZE or the
+        To be called a few times a second. libzmq drops a connection for ever when a message exceeds MAXMSGSIZE or the
         other side does not speak its protocol. Also keeps `connected` up to date.
         """
         for event in self._monitor.events():
@@ -144,14 +144,14 @@ class Subscriber:
         return self._disconnected_s is not None and time.monotonic() - self._disconnected_s > DEAF_AFTER_S
 
     def revive(self) -> bool:
-        """Opens the socket anew if libzmq has given it up, and counts that; whether it was so."""
+        """Reopens the socket if libzmq has given it up, and counts that; returns whether it did."""
         if not self.is_deaf():
             return False
-        self._refuse(
+        self._reject(
             RefusedError(
                 Reason.CONNECTION,
                 f"libzmq ended the connection to {holder_of(self._path) or 'its publisher'} for good: a message above "
-                f"{self.topic.max_bytes} bytes, or no ZeroMQ; opened anew",
+                f"{self.topic.max_bytes} bytes, or no ZeroMQ; reopened",
             )
         )
         self.reopen()
@@ -188,7 +188,7 @@ class Subscriber:
         self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
 
     def _read(self) -> tuple[Envelope, bytes]:
-        """The next message, checked but for its sequence and content; raises RefusedError."""
+        """The next message, its sequence and content unchecked; raises RefusedError."""
         socket = self.socket
         head = socket.recv(_NOBLOCK)
         frames = 1
@@ -204,27 +204,27 @@ class Subscriber:
         try:
             message = self.topic.type.FromString(payload)
         except (DecodeError, ValueError) as error:
-            raise RefusedError(Reason.DECODE, f"payload is no {self.topic.type_name}: {error}") from error
-        found = unsound(message)
-        if found:
-            raise RefusedError(Reason.NUMBER, f"{found}; finite numbers expected, correct the publisher")
+            raise RefusedError(Reason.DECODE, f"payload is not a {self.topic.type_name}: {error}") from error
+        unsound_number = unsound(message)
+        if unsound_number:
+            raise RefusedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
         return message
 
-    def _refuse(self, error: RefusedError) -> None:
+    def _reject(self, error: RefusedError) -> None:
         self.counter.refused[error.reason] += 1
-        self._log_refusal(error)
+        self._log_rejection(error)
 
-    def _log_refusal(self, error: RefusedError) -> None:
+    def _log_rejection(self, error: RefusedError) -> None:
         """Of each reason the 1st, 10th, 100th, ... is logged, so that a flood fills no disk."""
         count = self.counter.refused[error.reason]
         if count == 10 ** (len(str(count)) - 1):
-            _log.warning("topic %s: message refused (%s, number %d): %s", self.name, error.reason.value, count, error)
+            _log.warning("topic %s: message rejected (%s, number %d): %s", self.name, error.reason.value, count, error)
 
-    def _budget_sentence(self) -> str:
+    def _budget_message(self) -> str:
         rate_hz = self.topic.budget_hz or 0.0
         return (
             f"{holder_of(self._path) or 'its publisher'} publishes more than {ALLOWANCE * rate_hz:g} a second and "
-            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. What is beyond is dropped; correct the publisher"
+            f"{BURST} at once; the topic's rate is {rate_hz:g} Hz. Excess messages are dropped; correct the publisher"
         )
 
     def _two_publishers_message(self, envelope: Envelope) -> str:

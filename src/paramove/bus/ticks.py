@@ -1,7 +1,6 @@
-"""Time, and what a node gets of it: iterations of messages and ticks.
+"""Time sources: what a node gets in each iteration of its loop.
 
-The loop of a node goes in iterations. A iteration is a list of messages and at most one tick, which comes after them.
-Where time comes from decides what a iteration is:
+An iteration has a list of messages and at most one tick after them. The source of time decides which:
 
     real time     whatever has arrived; ticks are made here, 15 times a second
     simulated     whatever has arrived; a tick for each message of the topic `clock`
@@ -54,7 +53,7 @@ class TickSource(Protocol):
 
     @property
     def may_publish(self) -> bool:
-        """Whether messages go out at once; otherwise the bus keeps them until the next iteration."""
+        """Whether messages go out at once; otherwise the bus queues them until the next iteration."""
 
     def next(self, names: list[str]) -> LoopTick | None:
         """Waits for the next iteration with these topics; None once the bus was stopped. Ends the iteration before."""
@@ -82,7 +81,7 @@ class RealTimeTicks:
             messages = exchange.take(names)
             now_ns = time.monotonic_ns()
             number = (now_ns - self._start_ns) // TICK_PERIOD_NS
-            if number > self._number:  # ticks that were slept through are skipped
+            if number > self._number:  # missed ticks are skipped
                 self._number = number
                 return LoopTick(messages, Tick(number, now_ns))
             if messages:
@@ -93,7 +92,7 @@ class RealTimeTicks:
 
 
 class SimulatedTicks:
-    """Iterations of the topic `clock`, which is not waited for and does not wait."""
+    """Iterations of the topic `clock`, which does not wait for this process."""
 
     may_publish = True
 
@@ -109,7 +108,7 @@ class SimulatedTicks:
             exchange.drain(names)
             messages = exchange.take(names)
             tick = None
-            while (clock := exchange.pop(topics.CLOCK)) is not None:  # ticks that were slept through are skipped
+            while (clock := exchange.pop(topics.CLOCK)) is not None:  # missed ticks are skipped
                 self.now_ns = clock.message.time_ns
                 tick = Tick(clock.message.tick, self.now_ns)
             if messages or tick:

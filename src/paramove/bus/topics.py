@@ -51,9 +51,9 @@ class Topic:
         type: Protobuf class of the message.
         rate_hz: Nominal rate; None where messages come with events.
         profile: See `Profile`.
-        frame: Coordinate frame of spatial content; "" where there is none or the message says it.
-        recorded: Whether the recorder keeps it.
-        max_bytes: Largest payload; a larger one is refused at the publisher and by every subscriber.
+        frame: Coordinate frame of spatial content; "" where there is none or the message has it.
+        recorded: Whether the recorder stores it.
+        max_bytes: Largest payload; a larger one is rejected by the publisher and by every subscriber.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Topic:
 
     @property
     def is_image(self) -> bool:
-        """Whether a message carries pixels, so that few may wait and one may be large."""
+        """Whether a message carries pixels, so that its queue is short and its size limit high."""
         return self.type in (RawImage, CompressedImage)
 
     @property
@@ -89,12 +89,12 @@ class Topic:
 
     @property
     def high_water_mark(self) -> int:
-        """How many messages may wait at the subscriber before the latest is dropped (and counted as lost)."""
+        """Queue size of the subscriber; when it is full the latest message is dropped (and counted as lost)."""
         return 60 if self.is_image else 1000
 
     @property
     def publisher_high_water_mark(self) -> int:
-        """How many may wait at the publisher, for each subscriber. Few images: their memory is the publisher's."""
+        """Queue size of the publisher for each subscriber. Few images: they take the publisher's memory."""
         return 6 if self.is_image else 1000
 
 
@@ -153,7 +153,7 @@ TOPICS: tuple[Topic, ...] = tuple(
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 STEREO_IMAGES_RAW = CAMERA_IMAGES_RAW[:2]
-"""What two cameras see of a tracked arm."""
+"""Images of two cameras, for tracking an arm."""
 ARMINGS = (OPERATOR_ARM, OPERATOR_ARM_AT_START)
 """Arming requests: a driver subscribes to all of them."""
 STOPS = (OPERATOR_STOP, OPERATOR_ESTOP)
@@ -180,14 +180,14 @@ def status(node: str) -> Topic:
 
 
 OLD_NAMES = {f"{camera}/light": f"{camera}/image_raw" for camera in ("camera", *(f"camera_{n}" for n in range(1, 5)))}
-"""Topics that had another name in the release before; the old one is taken for one release, with a warning."""
+"""Topics renamed since the last release; the old name is accepted for one release, with a warning."""
 _OLD_CONSTANTS = {
     "CAMERA_LIGHT": "CAMERA_IMAGE_RAW", "CAMERA_LIGHTS": "CAMERA_IMAGES_RAW", "STEREO_LIGHTS": "STEREO_IMAGES_RAW",
 }  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
-    """The constants by the names that they had in the release before."""
+    """The renamed constants by their old names."""
     if name not in _OLD_CONSTANTS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return globals()[_now_called(f"topics.{name}", _OLD_CONSTANTS[name])]
@@ -207,7 +207,7 @@ def _now_called(old: str, new: str) -> str:
 
 
 def by_name(name: str) -> Topic:
-    """Topic of that name, or of that name before; raises KeyError that names the nearest topics."""
+    """Topic of that name or former name; raises KeyError that names the nearest topics."""
     name = OLD_NAMES.get(name, name)
     if name.startswith(_STATUS_PREFIX):
         return status(name.removeprefix(_STATUS_PREFIX))

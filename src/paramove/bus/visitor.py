@@ -20,7 +20,7 @@ class BusVisitor:
 
     Args:
         folder: Of the run's bus.
-        name: Under which it speaks.
+        name: Name under which it publishes.
     """
 
     def __init__(self, folder: Path, name: str) -> None:

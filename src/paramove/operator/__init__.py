@@ -1,4 +1,4 @@
-"""What asks a person before an arm moves, and what stops it: arming, stopping, jogging from a terminal."""
+"""Arming, stopping and jogging an arm by a person at a terminal."""
 
 import lazy_loader
 

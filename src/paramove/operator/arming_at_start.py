@@ -9,18 +9,18 @@ REAL_ROBOT = (
     "switch; leave this node out or start with the sim overlay"
 )
 BEFORE_ARMED = (SafetyState.STATE_UNSPECIFIED, SafetyState.STATE_DISCONNECTED, SafetyState.STATE_DISARMED)
-TRIES_APART_NS = 1_000_000_000
+RETRY_PERIOD_NS = 1_000_000_000
 
 
 class Operator:
     """Publishes one arming request once the gate is disarmed, again each second until it is armed for the first time.
 
-    Waiting for the gate's own state makes the order in which the nodes start irrelevant. It ends at anything else that
-    the gate reports, such as a stop: then only a person arms. The gate refuses it in that case, too, and wherever it
+    Waiting for the gate's own state makes the order in which the nodes start irrelevant. It ends with any other
+    state of the gate, such as a stop: then only a person arms. The gate rejects it in that case, too, and wherever it
     is not verified that the robot is emulated.
 
     Args:
-        arms_at_start: False: it never arms.
+        arms_at_start: Whether it arms at all.
         restarted: Whether an earlier process of this run was the operator: this one does not arm.
     """
 
@@ -36,7 +36,7 @@ class Operator:
         self._to_arm &= safety.state in BEFORE_ARMED
         if not self._to_arm or safety.state != SafetyState.STATE_DISARMED:
             return None
-        if self._requested_ns is not None and now_ns - self._requested_ns < TRIES_APART_NS:
+        if self._requested_ns is not None and now_ns - self._requested_ns < RETRY_PERIOD_NS:
             return None
         self._requested_ns = now_ns
         request = ArmRequest(source="operator node", armed=True, reason="start of a simulated run")

@@ -1,4 +1,4 @@
-"""One joint moved by small steps, as a person presses keys: from keys to trajectories. Without clock and sockets."""
+"""Jogging: each key moves one joint by a small step, as a trajectory. Without clock and sockets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory, TrajectoryPoint,
 
 SHORTEST_S = 0.5
 FASTEST = float(np.deg2rad(10.0))
-"""On the average of a step, rad/s."""
+"""Mean speed of a step, rad/s."""
 POINTS = 21
 OVERDUE_S = 2.0
 """Beyond the time of a step: the driver waits a second for joints that do not arrive."""
@@ -17,16 +17,16 @@ OVER = (TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, Trajec
 
 
 class Jogging:
-    """`hear` what the arm's driver says; `step` and `choose` as keys are pressed.
+    """Call `handle_…` with the driver's messages; `step` and `choose` as keys are pressed.
 
     Args:
-        name: Begins the ids of the trajectories, and must be another for each run of the program.
+        name: Begins the ids of the trajectories, and must differ in each run of the program.
         step: Of one key, rad.
 
     Attributes:
-        chosen: Place of the joint that is moved.
-        angles: Measured, by joint, rad; empty before the driver has said them.
-        sentence: How the last step fared.
+        chosen: Index of the joint that is moved.
+        angles: Measured, by joint, rad; empty before the driver publishes them.
+        sentence: Result of the last step.
     """
 
     def __init__(self, name: str, step: float) -> None:
@@ -49,31 +49,31 @@ class Jogging:
         """Whether a step is under way."""
         return bool(self._waits_for)
 
-    def choose(self, place: int) -> None:
-        """The joint at this place, from 0, is moved from now on; one that does not exist is passed over."""
-        if 0 <= place < len(self.angles):
-            self.chosen = place
+    def choose(self, index: int) -> None:
+        """Selects the joint with this index, from 0; an index that does not exist is ignored."""
+        if 0 <= index < len(self.angles):
+            self.chosen = index
 
     def handle_states(self, message: JointStates) -> None:
-        """Where the joints are."""
+        """Handles the measured joint angles."""
         self.angles = {joint.name: joint.position for joint in message.joints}
         self.chosen = min(self.chosen, max(len(self.angles) - 1, 0))
 
     def handle_status(self, message: TrajectoryStatus) -> None:
-        """How the driver fares with a step."""
+        """Handles the driver's status of a step."""
         if message.trajectory_id != self._waits_for or message.state not in OVER:
             return
         self._waits_for = ""
         if message.state == TrajectoryStatus.STATE_SUCCEEDED:
             self.sentence = "there"
         else:
-            self._goals.clear()  # it is not where the last step was to lead
+            self._goals.clear()  # the joint is not at the goal of the last step
             self.sentence = message.reason
 
     def tick(self, now_ns: int) -> None:
-        """A step of which the driver tells no end, as it was started again meanwhile, is waited for no longer."""
+        """Gives up a step whose end the driver does not report, because it was restarted."""
         if self.is_moving and now_ns > self._overdue_ns:
-            self._waits_for, self.sentence = "", "the arm's driver says nothing of this step: was it started again?"
+            self._waits_for, self.sentence = "", "no status of this step from the arm's driver: was it restarted?"
             self._goals.clear()
 
     def step(self, direction: int, now_ns: int) -> JointTrajectory | None:
@@ -91,12 +91,12 @@ class Jogging:
         self._waits_for, self.sentence = f"{self._name}-{self._count}", "moving"
         message = JointTrajectory(id=self._waits_for, joints=[self.joint])
         message.captured.FromNanoseconds(now_ns)
-        share = np.linspace(0.0, 1.0, POINTS)
-        course = begin + (end - begin) * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        phase = np.linspace(0.0, 1.0, POINTS)
+        angles = begin + (end - begin) * phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
         duration_s = max(SHORTEST_S, self._step / FASTEST)
         self._overdue_ns = now_ns + int(1e9 * (duration_s + OVERDUE_S))
         message.points.extend(
             TrajectoryPoint(time_s=time_s, position_rad=[angle])
-            for time_s, angle in zip(duration_s * share, course, strict=True)
+            for time_s, angle in zip(duration_s * phase, angles, strict=True)
         )
         return message

@@ -1,4 +1,4 @@
-"""A person's word to arm or disarm from outside of a run, and the safety gate's answer to it."""
+"""A person's arming request from outside of a run, and the safety gate's answer to it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import zmq
 from paramove.bus import BusVisitor, Subscriber, publish_now, topics
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState
 
-LOOKS_EVERY_S = 0.02
+POLL_PERIOD_S = 0.02
 TERMINAL = "terminal"
-"""Source of the word."""
+"""Source of the request."""
 
 
 def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | None:
-    """Say a word to arm or disarm, once, and hear what the gate makes of it.
+    """Publishes one request to arm or disarm and waits for the gate's answer.
 
-    The word is said once: said again, it could arm an arm that a fault has just stopped.
+    It is not repeated: a repetition could arm an arm that a fault has just stopped.
 
     Args:
         folder: Of the run's bus.
@@ -27,11 +27,11 @@ def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | No
         timeout_s: To wait for the gate, and again for its answer.
 
     Returns:
-        The gate's latest state: armed or not as was asked for, or with the faults for which it refuses; that from
-        before the word if it changes nothing. None if there is no gate.
+        The gate's latest state: armed or not as requested, or with the faults for which it rejects; that from
+        before the request if it changes nothing. None if there is no gate.
 
     Raises:
-        TopicTakenError: Another program says the word, such as the operator of a simulated run.
+        TopicTakenError: Another program publishes the topic, such as the operator of a simulated run.
         BusFolderError: The folder cannot be used.
     """
     with BusVisitor(folder, "arm_by_word") as bus:
@@ -48,7 +48,7 @@ def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | No
 
 
 def obeyed(state: SafetyState, armed: bool) -> bool:
-    """Whether the gate is as the word wants it."""
+    """Whether the gate is in the requested state."""
     is_armed = state.state == SafetyState.STATE_ARMED
     return is_armed if armed else state.state == SafetyState.STATE_DISARMED
 
@@ -63,15 +63,15 @@ def _until(
     is_it: Callable[[SafetyState], bool],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> SafetyState | None:
-    """The first state for which `is_it`, else the latest that is heard; None if none is."""
+    """The first state for which `is_it`, otherwise the latest received; None if none was."""
     end_s = time.monotonic() + timeout_s
     latest: SafetyState | None = None
     while time.monotonic() < end_s:
         meanwhile()
         gate.revive()
-        gate.socket.poll(int(1e3 * LOOKS_EVERY_S), zmq.POLLIN)
-        while (heard := gate.receive()) is not None:
-            state: SafetyState = heard.message
+        gate.socket.poll(int(1e3 * POLL_PERIOD_S), zmq.POLLIN)
+        while (received := gate.receive()) is not None:
+            state: SafetyState = received.message
             if is_it(state):
                 return state
             latest = state

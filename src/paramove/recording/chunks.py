@@ -1,4 +1,4 @@
-"""Chunks of MCAP files: what is in them, which may claim to be any size and is never more than is allowed."""
+"""Decompresses chunks of MCAP files, within limits whatever size they claim."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ALWAYS_BYTES = 16 * 2**20
 MAX_RATIO = 100
 """All chunks together may be so many times as large as their file; measured: 2 to 20."""
 WRONG = (McapError, ValueError, EOFError, struct.error, ZstdError, OverflowError, MemoryError, KeyError, RuntimeError)
-"""What a record that is damaged makes its reader raise."""
+"""Exceptions that a reader raises for a damaged record."""
 
 
 def allowance(file_bytes: int) -> int:
@@ -32,19 +32,19 @@ def allowance(file_bytes: int) -> int:
 
 
 def whole(chunk: Chunk, max_bytes: int) -> bytes:
-    """What is in a chunk; raises one of WRONG if it is not what was written, or more than `max_bytes`."""
+    """The records in a chunk; raises one of WRONG if it is damaged, or larger than `max_bytes`."""
     if chunk.uncompressed_size > min(max_bytes, RECORD_BYTES):
         raise ValueError(f"it claims {chunk.uncompressed_size} bytes")
     data = begin(chunk.compression, chunk.data, chunk.uncompressed_size + 1)
     if len(data) != chunk.uncompressed_size:
-        raise ValueError(f"it claims {chunk.uncompressed_size} bytes and has others")
+        raise ValueError(f"it claims {chunk.uncompressed_size} bytes and has {len(data)}")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise ValueError("its checksum is another")
+        raise ValueError("its checksum does not match")
     return data
 
 
 def begin(compression: str, data: bytes, max_bytes: int) -> bytes:
-    """The first bytes of what was compressed, as many as `data` gives and are allowed; raises one of WRONG."""
+    """The first decompressed bytes of `data`, at most `max_bytes`; raises one of WRONG."""
     if compression == "zstd":
         return bytes(ZstdDecompressor().stream_reader(data).read(max_bytes))
     if compression == "lz4":
@@ -62,7 +62,7 @@ def records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Me
         end = at + HEAD_BYTES + length
         if end > len(data):
             break
-        if data[at] == Opcode.MESSAGE:  # nearly all are: read here, which takes a fifth of the time of a stream
+        if data[at] == Opcode.MESSAGE:  # most are; five times as fast as a stream
             if length < MESSAGE_HEAD.size:
                 raise ValueError("a message is shorter than its head")
             channel, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(data, at + HEAD_BYTES)
@@ -75,4 +75,4 @@ def records(data: bytes, cut: bool) -> Iterator[tuple[int, Channel | Schema | Me
             break  # there is no record of kind 0
         at = end
     if at < len(data) and not cut:
-        raise ValueError("a record goes beyond its chunk, or is none")
+        raise ValueError("a record is invalid or longer than its chunk")

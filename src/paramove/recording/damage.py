@@ -50,7 +50,7 @@ class Damage:
         begin: First of them.
         end: One past the last.
         what: In words.
-        messages: How many were in them; None if nothing tells.
+        messages: How many were in them; None if unknown.
     """
 
     begin: int
@@ -77,14 +77,14 @@ class Sound:
 
     @classmethod
     def of(cls, begin: int, messages: list[Message]) -> Sound:
-        """With what is told about `messages`."""
+        """With count and times of `messages`."""
         times = [message.log_time for message in messages] or [0]
         return cls(begin, len(messages), min(times), max(times))
 
 
 @dataclass
 class Survey:
-    """A whole file, read once: what is sound, and the records that explain the rest.
+    """A whole file, read once: sound parts, and the records that are needed to decode the rest.
 
     Attributes:
         parts: Sound chunks, and damages between them, in the order of the file.
@@ -93,7 +93,7 @@ class Survey:
         notes: Metadata, without those that the writer of recordings makes for itself.
         statistics: Of a file that was finished.
         finished: Whether the file ends as a finished one does.
-        indexed: What the index of the latest chunk has to say of each channel: log time and offset of its messages.
+        indexed: Expected index of the latest chunk, by channel: log time and offset of its messages.
         allowed: Bytes to which further chunks may decompress.
     """
 
@@ -112,7 +112,7 @@ class Survey:
         return [part for part in self.parts if isinstance(part, Damage)]
 
     def take(self, record: object, checked: bool) -> None:
-        """Keeps a record that explains others; one out of a chunk, which has a checksum, rather than another."""
+        """Stores a record that is needed to decode others; prefers one from a chunk, which has a checksum."""
         if isinstance(record, Channel):
             self.channels[record.id] = record if checked else self.channels.get(record.id, record)
         elif isinstance(record, Schema):
@@ -122,16 +122,16 @@ class Survey:
         elif isinstance(record, Metadata) and record.name != CHANNELS:
             self.notes.append(record)
         elif isinstance(record, Metadata):
-            self._take_told_again(record)
+            self._take_channels(record)
 
-    def _take_told_again(self, record: Metadata) -> None:
+    def _take_channels(self, record: Metadata) -> None:
         """Channels whose own records are lost; the topic table has their types."""
         for topic, written in record.metadata.items():
             number = int(written)
             if number in self.channels:
                 continue
-            schema = -number  # no number of the file, which may be in use
-            name = topics.by_name(topic).type_name  # a KeyError tells that the record is damaged
+            schema = -number  # not a number of the file, which may be in use
+            name = topics.by_name(topic).type_name  # a KeyError means that the record is damaged
             self.channels[number] = Channel(number, topic, "protobuf", {}, schema)
             self.schemas[schema] = Schema(schema, b"", "protobuf", name)
 
@@ -139,17 +139,17 @@ class Survey:
 def survey(content: Content) -> Survey:
     """Reads everything that is sound; never raises for what is in a file."""
     size = len(content)
-    found = Survey(allowed=allowance(size))
+    result = Survey(allowed=allowance(size))
     at = len(MAGIC) if content[: len(MAGIC)] == MAGIC else 0
-    found.finished = size >= 2 * len(MAGIC) and content[size - len(MAGIC) :] == MAGIC
+    result.finished = size >= 2 * len(MAGIC) and content[size - len(MAGIC) :] == MAGIC
     if at == 0:
         at = _next_chunk(content, 0)
-        found.parts.append(Damage(0, at, "not the beginning of a recording"))
+        result.parts.append(Damage(0, at, "not the beginning of a recording"))
     while at < size:
-        if found.finished and at == size - len(MAGIC):
+        if result.finished and at == size - len(MAGIC):
             break
-        at = _take_record(content, at, found)
-    return found
+        at = _take_record(content, at, result)
+    return result
 
 
 def messages_of(content: Content, sound: Sound) -> Iterator[Message]:
@@ -157,23 +157,23 @@ def messages_of(content: Content, sound: Sound) -> Iterator[Message]:
     yield from (record for _, record in _records_at(content, sound.begin) if isinstance(record, Message))
 
 
-def _take_record(content: Content, at: int, found: Survey) -> int:
-    """Takes the record at `at`, or notes a damage; where to go on."""
+def _take_record(content: Content, at: int, result: Survey) -> int:
+    """Takes the record at `at`, or notes a damage; returns where to continue."""
     if _is_chunk(content, at):
-        return _take_chunk(content, at, found)
+        return _take_chunk(content, at, result)
     end = at + HEAD_BYTES + _length(content, at)
     if at + HEAD_BYTES <= len(content) and end <= min(len(content), at + RECORD_BYTES) and content[at] in _READERS:
         try:
             record = _record(content, at, end)
             if isinstance(record, Footer) and not _summary_is_sound(content, at, record):
-                raise ValueError("the checksum of the summary is another")
-            _keep(record, at, end, found)
+                raise ValueError("the checksum of the summary does not match")
+            _take_other(record, at, end, result)
             return end
         except WRONG:
             pass
     resume = _next_chunk(content, at + 1)
-    cut = resume == len(content) and not found.finished
-    found.parts.append(Damage(at, resume, "it ends in the middle of a record" if cut else "a record is damaged"))
+    cut = resume == len(content) and not result.finished
+    result.parts.append(Damage(at, resume, "it ends in the middle of a record" if cut else "a record is damaged"))
     return resume
 
 
@@ -184,7 +184,7 @@ def _length(content: Content, at: int) -> int:
 
 
 def _record(content: Content, at: int, end: int) -> Any:
-    """The record, which is no chunk; raises one of WRONG if it has another length than it says."""
+    """The record, which is no chunk; raises one of WRONG if its length is wrong."""
     stream, reader = ReadDataStream(BytesIO(content[at + HEAD_BYTES : end])), _READERS[content[at]]
     length = end - at - HEAD_BYTES
     record = Message.read(stream, length) if reader is Message else reader.read(stream)
@@ -198,23 +198,23 @@ def _summary_is_sound(content: Content, at: int, footer: Footer) -> bool:
     return not footer.summary_crc or zlib.crc32(content[footer.summary_start or at : end]) == footer.summary_crc
 
 
-def _keep(record: object, at: int, end: int, found: Survey) -> None:
-    last = found.parts[-1] if found.parts else None
+def _take_other(record: object, at: int, end: int, result: Survey) -> None:
+    last = result.parts[-1] if result.parts else None
     if isinstance(record, Message):
-        found.parts.append(Sound.of(at, [record]))
+        result.parts.append(Sound.of(at, [record]))
     elif (
         isinstance(record, MessageIndex)
-        and not found.indexed
+        and not result.indexed
         and isinstance(last, Damage)
         and last.messages is not None
     ):
-        # The index of a chunk that was lost: it tells how many messages were in it.
-        found.parts[-1] = replace(last, messages=last.messages + len(record.records))
+        # The index of a lost chunk has the number of its messages.
+        result.parts[-1] = replace(last, messages=last.messages + len(record.records))
     elif isinstance(record, MessageIndex):
-        if found.indexed.get(record.channel_id) != list(record.records):
-            found.parts.append(Damage(at, end, "an index is damaged", 0))
+        if result.indexed.get(record.channel_id) != list(record.records):
+            result.parts.append(Damage(at, end, "an index is damaged", 0))
     else:
-        found.take(record, checked=False)
+        result.take(record, checked=False)
 
 
 def _is_chunk(content: Content, at: int) -> bool:
@@ -238,32 +238,32 @@ def _next_chunk(content: Content, at: int) -> int:
     return len(content)
 
 
-def _take_chunk(content: Content, at: int, found: Survey) -> int:
-    """Takes a chunk, or as much of it as was written before the file ends; where to go on."""
+def _take_chunk(content: Content, at: int, result: Survey) -> int:
+    """Takes a chunk, or as much of it as was written before the file ends; returns where to continue."""
     end = at + HEAD_BYTES + _length(content, at)
     cut = end > len(content)
     try:
-        data = _data_of(content, at, found.allowed)
-        found.allowed -= len(data)
+        data = _data_of(content, at, result.allowed)
+        result.allowed -= len(data)
         placed = list(records(data, cut))
     except WRONG:
         placed = []
         if not cut:
-            found.indexed = {}
-            found.parts.append(Damage(at, end, "a chunk is damaged", 0))
+            result.indexed = {}
+            result.parts.append(Damage(at, end, "a chunk is damaged", 0))
             return end
     messages: list[Message] = []
-    found.indexed = {}
+    result.indexed = {}
     for offset, record in placed:
         if isinstance(record, Message):
             messages.append(record)
-            found.indexed.setdefault(record.channel_id, []).append((record.log_time, offset))
+            result.indexed.setdefault(record.channel_id, []).append((record.log_time, offset))
         else:
-            found.take(record, checked=True)
+            result.take(record, checked=True)
     if messages:
-        found.parts.append(Sound.of(at, messages))
+        result.parts.append(Sound.of(at, messages))
     if cut:
-        found.parts.append(Damage(at, len(content), "it ends in the middle of a chunk"))
+        result.parts.append(Damage(at, len(content), "it ends in the middle of a chunk"))
     return min(end, len(content))
 
 
@@ -277,7 +277,7 @@ def _records_at(content: Content, at: int) -> Iterator[tuple[int, Channel | Sche
 
 
 def _data_of(content: Content, at: int, max_bytes: int) -> bytes:
-    """What is in the chunk at `at`; of one that is cut off, as much as its bytes that were written give."""
+    """The data of the chunk at `at`; of one that is cut off, as much as its written bytes give."""
     end = at + HEAD_BYTES + _length(content, at)
     if min(end, len(content)) - at > RECORD_BYTES:
         raise ValueError("a chunk that is too large")
@@ -289,7 +289,7 @@ def _data_of(content: Content, at: int, max_bytes: int) -> bytes:
 
 
 def _data_bytes(content: Content, at: int) -> int:
-    """Length of what a chunk holds, compressed."""
+    """Length of a chunk's compressed data."""
     name = int.from_bytes(content[at + BEFORE_COMPRESSION : at + BEFORE_COMPRESSION + 4], "little")
     return _length(content, at) - CHUNK_HEAD_BYTES - name
 
@@ -310,4 +310,4 @@ _READERS: dict[int, Any] = {
     Opcode.SUMMARY_OFFSET: SummaryOffset,
     Opcode.DATA_END: DataEnd,
 }
-"""Kinds of records outside chunks. Attachments are read, and not kept: our recordings have none."""
+"""Kinds of records outside chunks. Attachments are read and discarded: our recordings have none."""

@@ -1,7 +1,7 @@
-"""A recording in several files: whoever records goes on in a further file after its process was started again.
+"""A recording in several files: a recorder that was restarted continues in a further file.
 
 `recording.mcap`, `recording.2.mcap`, `recording.3.mcap`, …; each with the ending `.part` while it is not finished. No
-file is ever written over or added to, so what a killed process has written stays as it is.
+file is ever written over or added to, so the file of a killed process is never changed.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from paramove.recording.reader import Recorded, read
 
 @dataclass(frozen=True)
 class Gap:
-    """Nothing was recorded between two times of the bus clock, because nobody did."""
+    """Time between two parts, by the bus clock, in which no recorder ran."""
 
     begin_ns: int
     end_ns: int
 
 
 def part_path(path: Path, number: int) -> Path:
-    """File of the part with a number from 1; the first bears the recording's own name."""
+    """File of the part with a number from 1; the first has the recording's own name."""
     return path if number == 1 else path.with_name(f"{path.stem}.{number}{path.suffix}")
 
 
@@ -52,28 +52,28 @@ class PartedRecording:
         self.gaps: list[Gap] = []
         for number in itertools.count(1):
             part = part_path(path, number)
-            found = next((file for file in (part, _unfinished(part)) if file.is_file()), None)
-            if found is None:
+            existing = next((file for file in (part, _unfinished(part)) if file.is_file()), None)
+            if existing is None:
                 break
-            self.parts.append(found)
+            self.parts.append(existing)
 
     def read(self, only: Collection[str] = ()) -> Iterator[Recorded]:
         """The messages of all parts (see `paramove.recording.reader.read`).
 
-        A latched value that a later part was told again is left out.
+        A latched value that a later part received again is left out.
         """
         self.gaps = []
         latest: dict[str, tuple[int, int]] = {}
         for part in self.parts:
             before, first = dict(latest), True
             for recorded in read(part, only):
-                said = (recorded.publish_ns, recorded.sequence)
-                if said <= before.get(recorded.topic, (-1, -1)):
+                stamp = (recorded.publish_ns, recorded.sequence)
+                if stamp <= before.get(recorded.topic, (-1, -1)):
                     continue
                 if before and first:
                     self.gaps.append(Gap(max(time_ns for time_ns, _ in before.values()), recorded.publish_ns))
                 first = False
-                latest[recorded.topic] = max(said, latest.get(recorded.topic, said))
+                latest[recorded.topic] = max(stamp, latest.get(recorded.topic, stamp))
                 yield recorded
 
 

@@ -28,7 +28,7 @@ class Recorded:
         topic: Name of its topic.
         message: The decoded protobuf message.
         log_ns: Time by which the recording is ordered.
-        publish_ns: When it was said.
+        publish_ns: When it was published.
         sequence: Of the publisher.
     """
 
@@ -47,12 +47,12 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
     Args:
         path: The file.
         only: Names of topics; empty for all. A topic that was renamed has its present name.
-        raising: Class of what is raised for a message that is none.
+        raising: Class of the exception for a message that cannot be decoded.
 
     Raises:
         FileNotFoundError: There is no such file.
-        InputError: A message is none of its topic's type, or too large.
-        KeyError: The file holds a topic that the topic table does not know.
+        InputError: A message is not of its topic's type, or too large.
+        KeyError: The file has a topic that is not in the topic table.
     """
     types: dict[int, Any] = {}
     names: dict[int, str] = {}
@@ -75,10 +75,10 @@ def read(path: Path, only: Collection[str] = (), raising: type[InputError] = Inp
 
 def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
     """The records up to the first that is cut off or damaged; chunks are compared with their checksums."""
-    found = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=min(max(size, 1), RECORD_BYTES))
+    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=min(max(size, 1), RECORD_BYTES))
     allowed = allowance(size)
     with contextlib.suppress(*WRONG):
-        for record in found.records:
+        for record in reader.records:
             if isinstance(record, Chunk):
                 data = whole(record, allowed)
                 allowed -= len(data)
@@ -88,7 +88,7 @@ def _records(file: IO[bytes], size: int) -> Iterator[McapRecord]:
 
 
 def _decoded(path: Path, message_type: Any, topic: str, message: Message, raising: type[InputError]) -> Any:
-    """The view of the simulator is kept as JPEG; everything else as it was said."""
+    """Decodes a message. The simulator's view is stored as JPEG, everything else as published."""
     if topic == topics.TRUTH_VIEW.name:
         message_type = topics.CAMERA_IMAGE.type
     try:
@@ -97,6 +97,6 @@ def _decoded(path: Path, message_type: Any, topic: str, message: Message, raisin
         return message_type.FromString(message.data)
     except (DecodeError, ValueError) as error:
         raise raising(
-            f"{path}: message {message.sequence} on {topic} is no {message_type.DESCRIPTOR.full_name} ({error}); "
-            "it was recorded by something else, or damaged: record it again"
+            f"{path}: message {message.sequence} on {topic} is not a {message_type.DESCRIPTOR.full_name} ({error}); "
+            "another program recorded it, or it is damaged: record it again"
         ) from error

@@ -1,9 +1,9 @@
-"""Records what a node hears, for as long as the node runs, whatever the disk does.
+"""Records what a node receives, also while the disk is slow or full.
 
-A thread writes, so that neither a slow disk nor a full one keeps the node from receiving: messages wait in memory
-meanwhile. After every `FLUSH_S` what has come is handed to the system, also in silence, and every `SYNC_S` a further
-thread sees to it that it is on the disk. When nothing can be written any more, the recorder waits for space and goes
-on in a further part; of more than `WAITING_BYTES` the oldest messages are lost by then, and counted.
+A thread writes, so that neither a slow disk nor a full one blocks the node: messages are queued in memory. Every
+`FLUSH_S` they are handed to the operating system, and every `SYNC_S` a further thread syncs the file to the disk. When
+the disk is full, the recorder waits for space and continues in a further part; beyond `WAITING_BYTES` the oldest
+messages are dropped and counted.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Recorder:
     Args:
         bus: Of the node. In lockstep time waits for the disk, but not for one that is full.
         path: Of the first part; see `paramove.recording.parts`.
-        library: What writes it, for people.
+        library: Name of the recording program, for the file's header.
 
     Raises OSError if it cannot be written for another reason than a full disk.
     """
@@ -52,7 +52,7 @@ class Recorder:
         self._waiting: deque[tuple[int, tuple[str, Any, int, int, int]]] = deque()
         self._bytes = 0
         self._lost = 0
-        self._last_ns: int | None = None  # of what was written last
+        self._last_ns: int | None = None  # of the last message written
         self._ends = False
         self._is_low = False
         self._fault = ""
@@ -67,7 +67,7 @@ class Recorder:
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            self._take_fault(error)
+            self._handle_fault(error)
         self._threads = ThreadPoolExecutor(2, "recorder")
         self._running = self._threads.submit(self._run)
         self._running.add_done_callback(lambda _: self._wake())
@@ -77,15 +77,15 @@ class Recorder:
         """Name of the file that was begun last; empty if the disk was full from the beginning."""
         return self._part_name
 
-    def keep(self, heard: Received, message: Any = None) -> None:
+    def keep(self, received: Received, message: Any = None) -> None:
         """Records a message. Never waits for a disk, but in lockstep.
 
         Args:
-            heard: What was heard.
-            message: What to write instead of its message.
+            received: The message.
+            message: Written instead, if given.
         """
-        kept = heard.message if message is None else message
-        size = kept.ByteSize()
+        to_write = received.message if message is None else message
+        size = to_write.ByteSize()
         with self._changed:
             if self._bus.settings.lockstep:
                 self._changed.wait_for(
@@ -94,9 +94,9 @@ class Recorder:
                     )
                 )
             if self._running.done():
-                self._running.result()  # raises what ended the thread
+                self._running.result()  # raises the exception that ended the thread
             self._waiting.append(
-                (size, (heard.topic.name, kept, heard.captured_ns, heard.published_ns, heard.sequence))
+                (size, (received.topic.name, to_write, received.captured_ns, received.published_ns, received.sequence))
             )
             self._bytes += size
             while self._bytes > WAITING_BYTES and len(self._waiting) > 1:
@@ -105,19 +105,19 @@ class Recorder:
             if self._bytes > WAITING_BYTES // 4:
                 self._changed.notify_all()
 
-    def tell(self, sentence: str) -> None:
-        """Says `sentence` as the node's state, or what is wrong with the disk. For every turn of the node's loop."""
+    def tell(self, message: str) -> None:
+        """Publishes `message` as the node's state, or a fault of the disk. To be called in every iteration."""
         if self._fault:
-            self._bus.degraded(f"{self._fault}; waits for space in {self._path.parent} and goes on in a further file")
+            self._bus.degraded(f"{self._fault}; waits for space in {self._path.parent} and continues in a further file")
         elif self._is_low:
             self._bus.degraded(
                 f"less than 1 GB is free in {self._path.parent}: make room there, or recording will stop"
             )
         else:
-            self._bus.ready(sentence)
+            self._bus.ready(message)
 
     def close(self) -> None:
-        """Writes what waits and finishes the part. What a full disk does not take is lost, and logged."""
+        """Writes the queued messages and finishes the part. What a full disk does not take is lost, and logged."""
         self._ends = True
         self._wake()
         try:
@@ -141,9 +141,9 @@ class Recorder:
                     self._changed.wait_for(self._is_due, SYNC_S if self._fault else FLUSH_S)
                     ends = self._ends
                 try:
-                    self._turn(ends)
+                    self._write_queued(ends)
                 except OSError as error:
-                    self._take_fault(error)
+                    self._handle_fault(error)
         finally:
             self._lost += len(self._waiting)
             if self._part is not None:
@@ -159,8 +159,8 @@ class Recorder:
     def _is_due(self) -> bool:
         return self._ends or (self._bytes > WAITING_BYTES // 4 and not self._fault)
 
-    def _turn(self, ends: bool) -> None:
-        """Writes what waits, or tries whether it can be written again."""
+    def _write_queued(self, ends: bool) -> None:
+        """Writes the queued messages; after a fault, once the disk has room again."""
         if self._free_bytes() < ROOM_BYTES and self._fault and not ends:
             return
         if self._part is None or self._fault:
@@ -189,13 +189,13 @@ class Recorder:
             self._syncing = self._threads.submit(self._part.sync)
 
     def _free_bytes(self) -> int:
-        """Of the disk, which is low until somebody has made clearly more room."""
+        """Free bytes of the disk; a low one counts as low until 20 % more than the limit are free."""
         free = shutil.disk_usage(self._path.parent).free
         self._is_low = free < (1.2 if self._is_low else 1.0) * LOW_BYTES
         return free
 
     def _begin_part(self) -> None:
-        """Begins the first part, or a further one after a fault; says what was lost in between."""
+        """Begins the first part, or a further one after a fault; logs what was lost in between."""
         if self._part is not None:
             self._finish_part(self._part)
             self._part = None
@@ -203,11 +203,11 @@ class Recorder:
         self._part_name = self._part.path.name
         if self._fault:
             until = f"{self._waiting[0][1][3] * 1e-9:.3f} s" if self._waiting else "now"
-            self._log_loss(f"goes on in {self._part_name}", self._fault, until)
+            self._log_loss(f"continues in {self._part_name}", self._fault, until)
         self._fault = ""
 
     def _finish_part(self, part: RecordingWriter) -> None:
-        """Finishes a part; one that can never be written to again stays as it is."""
+        """Finishes a part; one that cannot be written stays unfinished."""
         if self._syncing is not None:
             wait([self._syncing])
             self._syncing = None
@@ -219,9 +219,9 @@ class Recorder:
             part.abandon()
             with self._changed:
                 self._lost += part.unwritten
-            _log.error("%s stays unfinished, `paramove recover` makes it whole: %s", part.path, error.strerror)
+            _log.error("%s is unfinished, rebuild it with `paramove recover`: %s", part.path, error.strerror)
 
-    def _take_fault(self, error: OSError) -> None:
+    def _handle_fault(self, error: OSError) -> None:
         if not self._fault:
             _log.error("%s cannot be written: %s", self._part_name or self._path.name, error.strerror)
         self._fault = error.strerror or str(error)

@@ -22,7 +22,7 @@ SECOND_NS = 1_000_000_000
 
 
 class RecoveryError(InputError):
-    """A recording cannot be recovered; says why."""
+    """A recording cannot be recovered; the text has the reason."""
 
 
 class StillWrittenError(RecoveryError):
@@ -31,20 +31,20 @@ class StillWrittenError(RecoveryError):
 
 @dataclass(frozen=True)
 class Recovery:
-    """What was kept of a recording and what was lost.
+    """Recovered and lost messages of a recording.
 
     Attributes:
         source: The recording, which is as it was.
         destination: The recording that was written; None if the source is whole.
-        kept: Messages.
+        kept: Recovered messages.
         lost: Messages that are known to be lost: counted by the indexes that are left.
         lost_is_exact: Whether no more than these can be lost.
-        seconds_kept: From the first to the last message that was kept, without gaps that damages left.
+        seconds_kept: From the first to the last recovered message, without gaps that damages left.
         seconds_lost: Of those gaps, and at the end as far as the file tells.
         damages: Where bytes could not be used.
-        known_until_s: Time of the last message that is left of a recording that was never finished: whether others came
-            after it nothing in the file tells. None if it was finished.
-        last_written: Of the source, on the wall clock: what came until shortly before is in it, if nothing is damaged.
+        known_until_s: Time of the last message in a recording that was never finished, so that later ones may be lost;
+            None if it was finished.
+        last_written: Of the source, on the wall clock: it has all messages until shortly before, if nothing is damaged.
     """
 
     source: Path
@@ -75,30 +75,30 @@ def recover(source: Path, destination: Path | None = None) -> Recovery:
     if not source.is_file():
         raise RecoveryError(f"there is no recording {source}", missing=True)
     with source.open("rb") as file:
-        _refuse_open(file.fileno(), source)
+        _check_not_open(file.fileno(), source)
         if source.stat().st_size == 0:
             raise RecoveryError(f"{source} is empty: nothing was written before its writer ended")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-            found = survey(content)
-            sound = [part for part in found.parts if isinstance(part, Sound)]
-            if found.finished and not found.damages:
-                return _told(source, None, found, sum(part.messages for part in sound), 0)
+            surveyed = survey(content)
+            sound = [part for part in surveyed.parts if isinstance(part, Sound)]
+            if surveyed.finished and not surveyed.damages:
+                return _recovery(source, None, surveyed, sum(part.messages for part in sound), 0)
             if not sound:
-                raise RecoveryError(f"{source} holds no message that can be read: {_words(found)}")
+                raise RecoveryError(f"{source} has no readable message: {_description(surveyed)}")
             goal = destination or recovered_path(source)
             if goal.exists():
                 raise RecordingExistsError(f"{goal} exists; recordings are never overwritten: choose another name")
-            aside = goal.with_name(f"{goal.stem}.{os.getpid()}.recovering.mcap")  # until it is whole
+            temporary = goal.with_name(f"{goal.stem}.{os.getpid()}.recovering.mcap")  # renamed when complete
             try:
-                kept, nameless = _copy(content, found, sound, aside)
-                rename_durably(aside, goal)
+                kept, nameless = _copy(content, surveyed, sound, temporary)
+                rename_durably(temporary, goal)
             finally:
-                for left in (aside, aside.with_name(f"{aside.name}.part")):
+                for left in (temporary, temporary.with_name(f"{temporary.name}.part")):
                     left.unlink(missing_ok=True)
-    return _told(source, goal, found, kept, nameless)
+    return _recovery(source, goal, surveyed, kept, nameless)
 
 
-def _refuse_open(descriptor: int, source: Path) -> None:
+def _check_not_open(descriptor: int, source: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError as error:
@@ -107,28 +107,28 @@ def _refuse_open(descriptor: int, source: Path) -> None:
         return
 
 
-def _copy(content: Content, found: Survey, sound: list[Sound], goal: Path) -> tuple[int, int]:
-    """Writes the messages whose topics are known; how many, and how many others there are."""
+def _copy(content: Content, surveyed: Survey, sound: list[Sound], goal: Path) -> tuple[int, int]:
+    """Writes the messages whose topics are known; returns their number and that of the others."""
     kept = nameless = 0
     with RecordingWriter(goal, LIBRARY) as writer:
-        for note in found.notes:
+        for note in surveyed.notes:
             if note.name != NOTE:
                 writer.note(note.name, dict(note.metadata))
         for part in sound:
             for message in messages_of(content, part):
-                channel = found.channels.get(message.channel_id)
+                channel = surveyed.channels.get(message.channel_id)
                 if channel is None:
                     nameless += 1
                     continue
-                writer.copy(channel, _schema(found, channel.schema_id), message)
+                writer.copy(channel, _schema(surveyed, channel.schema_id), message)
                 kept += 1
-        writer.note(NOTE, {"kept": str(kept), "damages": _words(found)})
+        writer.note(NOTE, {"kept": str(kept), "damages": _description(surveyed)})
     return kept, nameless
 
 
-def _schema(found: Survey, number: int) -> Schema:
+def _schema(surveyed: Survey, number: int) -> Schema:
     """A schema of the file; one whose record is lost is that of the topic table."""
-    schema = found.schemas.get(number, Schema(number, b"", "", ""))
+    schema = surveyed.schemas.get(number, Schema(number, b"", "", ""))
     if not schema.data:
         for topic in topics.TOPICS:
             if topic.type_name == schema.name:
@@ -137,13 +137,13 @@ def _schema(found: Survey, number: int) -> Schema:
     return schema
 
 
-def _told(source: Path, destination: Path | None, found: Survey, kept: int, nameless: int) -> Recovery:
-    lost = nameless + sum(damage.messages or 0 for damage in found.damages)
-    exact = all(damage.messages is not None for damage in found.damages)
-    if found.statistics is not None:
-        lost, exact = max(found.statistics.message_count - kept, 0), True
-    kept_ns, lost_ns = _spans(found)
-    last_ns = max((part.last_ns for part in found.parts if isinstance(part, Sound)), default=0)
+def _recovery(source: Path, destination: Path | None, surveyed: Survey, kept: int, nameless: int) -> Recovery:
+    lost = nameless + sum(damage.messages or 0 for damage in surveyed.damages)
+    exact = all(damage.messages is not None for damage in surveyed.damages)
+    if surveyed.statistics is not None:
+        lost, exact = max(surveyed.statistics.message_count - kept, 0), True
+    kept_ns, lost_ns = _spans(surveyed)
+    last_ns = max((part.last_ns for part in surveyed.parts if isinstance(part, Sound)), default=0)
     return Recovery(
         source=source,
         destination=destination,
@@ -152,18 +152,18 @@ def _told(source: Path, destination: Path | None, found: Survey, kept: int, name
         lost_is_exact=exact,
         seconds_kept=kept_ns / SECOND_NS,
         seconds_lost=lost_ns / SECOND_NS,
-        damages=tuple(found.damages),
-        known_until_s=None if found.finished else last_ns / SECOND_NS,
+        damages=tuple(surveyed.damages),
+        known_until_s=None if surveyed.finished else last_ns / SECOND_NS,
         last_written=datetime.datetime.fromtimestamp(source.stat().st_mtime).astimezone(),
     )
 
 
-def _spans(found: Survey) -> tuple[int, int]:
-    """Time that is covered, and time that damages have taken out, in ns."""
-    last: int | None = found.statistics.message_start_time if found.statistics else None
+def _spans(surveyed: Survey) -> tuple[int, int]:
+    """Recovered time and time lost by damages, ns."""
+    last: int | None = surveyed.statistics.message_start_time if surveyed.statistics else None
     first = last
     lost, damaged = 0, False
-    for part in found.parts:
+    for part in surveyed.parts:
         if isinstance(part, Damage):
             damaged = True
             continue
@@ -174,15 +174,15 @@ def _spans(found: Survey) -> tuple[int, int]:
         if damaged and last is not None:
             lost += max(0, part.first_ns - last)
         last, damaged = max(part.last_ns, last or 0), False
-    if found.statistics and damaged and last is not None:
-        lost += max(0, found.statistics.message_end_time - last)
-        last = max(last, found.statistics.message_end_time)
+    if surveyed.statistics and damaged and last is not None:
+        lost += max(0, surveyed.statistics.message_end_time - last)
+        last = max(last, surveyed.statistics.message_end_time)
     return (0 if first is None or last is None else last - first - lost), lost
 
 
-def _words(found: Survey) -> str:
-    said = [f"bytes {damage.begin}-{damage.end}: {damage.what}" for damage in found.damages[:10]]
-    more = len(found.damages) - 10
-    if not found.finished:
-        said.append("it was never finished")
-    return "; ".join(said + ([f"and {more} more"] if more > 0 else []))
+def _description(surveyed: Survey) -> str:
+    described = [f"bytes {damage.begin}-{damage.end}: {damage.what}" for damage in surveyed.damages[:10]]
+    more = len(surveyed.damages) - 10
+    if not surveyed.finished:
+        described.append("it was never finished")
+    return "; ".join(described + ([f"and {more} more"] if more > 0 else []))

@@ -1,7 +1,7 @@
 """Recordings: MCAP files with protobuf schemas, which Foxglove, rerun and the mcap tools open unmodified.
 
-The file bears the ending `.part` until it is finished, and only its owner may read it. A process that is killed loses
-what came after its last `flush`.
+The file has the suffix `.part` until it is finished, and only its owner may read it. A process that is killed loses the
+messages after its last `flush`.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from mcap.writer import CompressionType, Writer
 from paramove.documents import rename_durably
 
 CHANNELS = "paramove.channels"
-"""Metadata that tells again which channel is which topic: with the chunk that tells it first, all would be lost."""
+"""Metadata that repeats which channel is which topic: otherwise losing the chunk with that record loses all."""
 CHUNK_BYTES = 64 * 1024
 CHUNK_NS = 250_000_000
-"""Of the time of publication; in a longer chunk a damage would cost more."""
+"""Of publication time; damage to a longer chunk would cost more."""
 
 
 class RecordingExistsError(FileExistsError):
-    """A recording is never written over another."""
+    """A recording never overwrites another."""
 
 
 class RecordingWriter:
@@ -37,7 +37,7 @@ class RecordingWriter:
 
     Args:
         path: Of the finished file.
-        library: What wrote it, for people.
+        library: Name of the recording program, for the file's header.
 
     Attributes:
         path: As given.
@@ -46,7 +46,7 @@ class RecordingWriter:
     Raises:
         RecordingExistsError: There is a file of that name already, finished or not.
         OSError: It cannot be written, as on a full disk. Also `write`, `copy`, `flush` and `close` raise it. Nothing is
-            lost then: what was not written waits for the next `flush` or `close`.
+            lost then: unwritten messages stay queued for the next `flush` or `close`.
     """
 
     def __init__(self, path: Path, library: str) -> None:
@@ -68,7 +68,7 @@ class RecordingWriter:
         self.unwritten = 0
         try:
             self.flush()
-        except OSError:  # a full disk: nothing is left that would have to be told from a recording
+        except OSError:  # a full disk: do not leave an empty file
             self.abandon()
             self._part.unlink()
             raise
@@ -80,7 +80,7 @@ class RecordingWriter:
             topic: Name of its topic.
             message: The message.
             log_ns: Time by which the recording is ordered.
-            publish_ns: When it was said.
+            publish_ns: When it was published.
             sequence: Of the publisher.
         """
         self._append(
@@ -97,13 +97,13 @@ class RecordingWriter:
         self._writer.add_metadata(name, values)
 
     def flush(self) -> None:
-        """Ends the chunk and hands everything to the system: it outlives this process."""
+        """Ends the chunk and hands everything to the operating system: it survives the end of this process."""
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._stream.drain()
         self.unwritten = 0
 
     def sync(self) -> None:
-        """Waits until what was flushed is on the disk: it outlives a power failure. For another thread."""
+        """Waits until flushed data is on the disk: it survives a power failure. For another thread."""
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
@@ -167,7 +167,7 @@ class RecordingWriter:
 
 
 class _Stream:
-    """What the MCAP writer writes to: bytes wait until `drain` has brought them into the file, also beyond an error."""
+    """Buffer of the MCAP writer; `drain` writes it to the file and keeps what an error left."""
 
     def __init__(self, file: FileIO) -> None:
         self._file = file
@@ -186,7 +186,7 @@ class _Stream:
         return self._begun + len(self._waiting)
 
     def flush(self) -> None:
-        """A chunk has ended. An error now would take the message with it that begins the next."""
+        """Does nothing at the end of a chunk: an error here would lose the first message of the next."""
 
     def drain(self) -> None:
         while self._waiting:
@@ -203,17 +203,17 @@ def _private(path: str, flags: int) -> int:
 
 def schema_of(file: FileDescriptor) -> FileDescriptorSet:
     """The file of a message and every file it imports, imported ones first."""
-    found: dict[str, FileDescriptor] = {}
+    files_by_name: dict[str, FileDescriptor] = {}
 
     def add(one: FileDescriptor) -> None:
-        if one.name in found:
+        if one.name in files_by_name:
             return
         for needed in one.dependencies:
             add(needed)
-        found[one.name] = one
+        files_by_name[one.name] = one
 
     add(file)
     files = FileDescriptorSet()
-    for one in found.values():
+    for one in files_by_name.values():
         one.CopyToProto(files.file.add())
     return files

@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 def check(launch: Launch, workspace: Workspace) -> dict[str, Interface]:
-    """Checks all that can be known before a process starts; returns the interfaces; raises DocumentError."""
+    """Checks everything that can be checked before a process starts; returns the interfaces; raises DocumentError."""
     interfaces = read_interfaces(launch, workspace)
     check_wiring(launch, interfaces, workspace)
     return interfaces
@@ -38,7 +38,7 @@ def run(
     Args:
         launch: From `launch_file.load`.
         workspace: Where nodes are found; its root is their working directory.
-        make_view: Gets the run folder, so that it can be shown.
+        make_view: Gets the run folder, to display it.
         runs: Where the run folder is made; default `runs` in the workspace's root.
 
     Raises DocumentError, LimitError, DomainError (another run holds the domain) or OSError (run folder).
@@ -75,13 +75,13 @@ def run(
         try:
             folder.write_run(facts)
         except OSError as error:  # a full disk does not change how the run ended
-            _log.warning("%s does not tell the outcome: %s", folder.path / "run.yaml", error.strerror)
+            _log.warning("the outcome could not be written to %s: %s", folder.path / "run.yaml", error.strerror)
     return outcome, folder
 
 
 @contextlib.contextmanager
 def _private_files() -> Iterator[None]:
-    """Whatever the launcher, its nodes and the evaluation after the run make is for their user only: 0700 and 0600."""
+    """Only the user may read files of the launcher, its nodes and the evaluation after the run: 0700 and 0600."""
     before = os.umask(0o077)
     try:
         yield

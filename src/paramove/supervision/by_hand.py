@@ -1,8 +1,8 @@
-"""What a person may do to one node of a running application, and why not the rest.
+"""Requests of a person to list, stop, start or restart nodes of a running application.
 
-A node stopped by hand ends no run, even a required one: somebody wanted it so. But a node with `restart: never` cannot
-be started again within the run, because what it knows ends with it; so it is not restarted, and to stop a required one
-ends the run. A node with `restart_ends_run` ends the run after a restart by hand, too.
+Stopping a node by hand does not end the run, not even that of a required node. But a node with `restart: never` cannot
+be started again within the run, because its state is lost; so it is not restarted, and stopping a required one ends
+the run. A node with `restart_ends_run` ends the run after a restart by hand, too.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from paramove.supervision.supervised_node import ENDED, State, SupervisedNode
 
 
 def answer(nodes: Mapping[str, SupervisedNode], request: Mapping[str, Any], ending: bool) -> Answer:
-    """Does what a request asks for (`list`, `stop`, `start`, `restart`) or says why not.
+    """Executes a request (`list`, `stop`, `start`, `restart`) or answers why it is rejected.
 
     Args:
         nodes: Of the run.
@@ -28,32 +28,32 @@ def answer(nodes: Mapping[str, SupervisedNode], request: Mapping[str, Any], endi
     if do == "list":
         return {"ok": True, "sentence": "", "nodes": [_row(node) for node in nodes.values()]}
     if do not in _ACTIONS:
-        return _no(f"'{do}' is nothing that can be done; there are: list, {', '.join(_ACTIONS)}")
+        return _rejected(f"unknown request '{do}'; there are: list, {', '.join(_ACTIONS)}")
     if not isinstance(name, str) or name not in nodes:
-        return _no(f"there is no node '{name}'; {nearest(str(name), nodes)}")
+        return _rejected(f"there is no node '{name}'; {nearest(str(name), nodes)}")
     if ending:
-        return _no("the run is ending; launch it again")
+        return _rejected("the run is ending; launch it again")
     node = nodes[name]
-    refusal = _ACTIONS[do](node)
-    if refusal:
-        return _no(f"{name} {refusal}")
+    rejection = _ACTIONS[do](node)
+    if rejection:
+        return _rejected(f"{name} {rejection}")
     return {"ok": True, "sentence": f"{name}: {do} by hand", "node": _row(node)}
 
 
 def _stop(node: SupervisedNode) -> str:
     if node.state in ENDED:
-        return f"does not run ({node.state.value})"
+        return f"is not running ({node.state.value})"
     if node.state is State.STOPPING:
-        return "is being stopped already"
+        return "is already being stopped"
     node.stop_by_hand(time.monotonic())
     return ""
 
 
 def _start(node: SupervisedNode) -> str:
     if node.state not in ENDED and node.state is not State.RESTARTING:
-        return f"runs already ({node.state.value})" if node.is_running else f"is {node.state.value} {node.sentence}"
-    if refusal := _once_only(node):
-        return refusal
+        return f"is already running ({node.state.value})" if node.is_running else f"is {node.state.value} {node.detail}"
+    if rejection := _not_restartable(node):
+        return rejection
     node.start_by_hand(time.monotonic())
     return ""
 
@@ -63,8 +63,8 @@ def _restart(node: SupervisedNode) -> str:
         return _start(node)
     if node.state is State.STOPPING:
         return "is being stopped; start it when it has ended"
-    if refusal := _once_only(node):
-        return refusal
+    if rejection := _not_restartable(node):
+        return rejection
     node.stop_by_hand(time.monotonic(), restart=True)
     return ""
 
@@ -72,21 +72,21 @@ def _restart(node: SupervisedNode) -> str:
 _ACTIONS = {"stop": _stop, "start": _start, "restart": _restart}
 
 
-def _once_only(node: SupervisedNode) -> str:
+def _not_restartable(node: SupervisedNode) -> str:
     if node.settings.restart != "never":
         return ""
-    return "cannot go on in a new process (restart: never in the launch file); end the run and launch it again"
+    return "cannot continue in a new process (restart: never in the launch file); end the run and launch it again"
 
 
-def _no(sentence: str) -> Answer:
-    return {"ok": False, "sentence": sentence}
+def _rejected(message: str) -> Answer:
+    return {"ok": False, "sentence": message}
 
 
 def _row(node: SupervisedNode) -> dict[str, Any]:
     return {
         "node": node.name,
         "state": node.state.value,
-        "sentence": node.sentence,
+        "sentence": node.detail,
         "pid": node.pid if node.is_running else None,
         "restarts": node.restarts,
         "exit_reason": node.exit_reason,

@@ -1,7 +1,7 @@
 """One node of a running application stopped, started or restarted by hand: the socket `control` in the bus folder.
 
 A request is a line of JSON, `{"do": "restart", "node": "camera"}`, and so is the answer: `{"ok": true, "sentence": …}`
-or `{"ok": false, "sentence": …}`. The folder belongs to the user alone (0700), so nobody else can ask.
+or `{"ok": false, "sentence": …}`. The folder belongs to the user alone (0700), so other users cannot send requests.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from paramove.bus import socket_path
 NAME = "control"
 LONGEST_REQUEST = 4096
 TIMEOUT_S = 2.0
-"""A client that has not finished its request by then is hung up on."""
+"""A client that has not finished its request by then is disconnected."""
 
 Answer = dict[str, Any]
 
 
 class NoRunError(RuntimeError):
-    """Nothing runs that could be asked; the text says where was looked."""
+    """No running application was found; the text has the folder that was searched."""
 
 
 class ControlServer:
@@ -65,7 +65,7 @@ class ControlServer:
 
     def serve(self) -> None:
         """Answers what has come in."""
-        with contextlib.suppress(OSError):  # nobody, or one who has gone again
+        with contextlib.suppress(OSError):  # no client, or one that has disconnected
             while True:
                 client, _ = self._socket.accept()
                 client.setblocking(False)
@@ -76,7 +76,7 @@ class ControlServer:
                 client.close()
 
     def _is_done(self, client: socket.socket) -> bool:
-        """Reads from a client; answers a whole line; whether the client has been dealt with."""
+        """Reads from a client; answers a whole line; returns whether the client is done."""
         since_s, received = self._clients[client]
         try:
             chunk = client.recv(LONGEST_REQUEST)
@@ -101,8 +101,8 @@ class ControlServer:
 
 
 def ask(folder: Path, request: dict[str, Any]) -> Answer:
-    """Asks the supervisor whose bus folder this is; raises NoRunError if there is none or it does not answer."""
-    nothing = f"nothing is running that could be asked at {folder}; start it with `paramove launch`"
+    """Sends a request to the supervisor of a bus folder; raises NoRunError if there is none or it does not answer."""
+    nothing_runs = f"no application is running at {folder}; start one with `paramove launch`"
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
             client.settimeout(5.0)
@@ -112,8 +112,8 @@ def ask(folder: Path, request: dict[str, Any]) -> Answer:
     except TimeoutError as error:
         raise NoRunError(f"the launcher at {folder} does not answer within 5 s; it hangs or is stopped") from error
     except OSError as error:
-        raise NoRunError(nothing) from error
+        raise NoRunError(nothing_runs) from error
     if not line:
-        raise NoRunError(nothing)
+        raise NoRunError(nothing_runs)
     answer: Answer = json.loads(line)
     return answer

@@ -24,7 +24,7 @@ class DomainError(RuntimeError):
 
 
 class DomainNameError(DomainError):
-    """No domain can be called so."""
+    """Invalid name of a domain."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Domain:
     """Folders of sockets.
 
     Attributes:
-        name: Of the domain, `default` unless PARAMOVE_DOMAIN says otherwise.
+        name: Of the domain, `default` unless PARAMOVE_DOMAIN is set.
         folder: Sockets of the bus.
         truth_folder: Sockets of the ground truth; has a random name below a folder that cannot be listed (mode 0300).
     """
@@ -43,16 +43,18 @@ class Domain:
 
 
 def _made(folder: Path) -> Path:
-    """The folder above the domains, made with mode 0700; raises DomainError if it belongs to somebody else."""
+    """The folder above the domains, made with mode 0700; raises DomainError if it belongs to another user."""
     folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if found.st_uid != os.getuid() or not stat.S_ISDIR(found.st_mode):
-        raise DomainError(f"{folder} is no folder of yours; remove it or set XDG_RUNTIME_DIR to a folder of your own")
+    folder_stat = folder.lstat()
+    if folder_stat.st_uid != os.getuid() or not stat.S_ISDIR(folder_stat.st_mode):
+        raise DomainError(
+            f"{folder} is not a folder of yours; remove it or set XDG_RUNTIME_DIR to a folder of your own"
+        )
     return folder
 
 
 def check_name(name: str) -> None:
-    """Raises DomainNameError if no domain can be called so."""
+    """Raises DomainNameError if the name is invalid."""
     if not re.fullmatch(r"[a-z0-9_-]{1,40}", name):
         remedy = "unset PARAMOVE_DOMAIN or set it to a name such as 'second'"
         raise DomainNameError(f"domain {name!r}: expected up to 40 lower-case letters, digits, '_' or '-'; {remedy}")
@@ -78,9 +80,9 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             lock.seek(0)
-            found = lock.read().strip() or "another process"
+            other = lock.read().strip() or "another process"
             raise DomainError(
-                f"domain '{name}' is held by {found}; end that run or choose another domain with PARAMOVE_DOMAIN=..."
+                f"domain '{name}' is held by {other}; end that run or choose another domain with PARAMOVE_DOMAIN=..."
             ) from error
         lock.truncate(0)
         lock.write(f"pid {os.getpid()} ({holder})")
@@ -98,6 +100,6 @@ def held_domain(name: str, holder: str) -> Iterator[Domain]:
 
 def _remove(folder: Path, hidden: Path) -> None:
     with contextlib.suppress(FileNotFoundError):
-        hidden.chmod(0o700)  # else its owner could not list it either
+        hidden.chmod(0o700)  # otherwise its owner could not list it either
     for one in (folder, hidden):
         shutil.rmtree(one, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""What the environment of a run decides, and what of it is ignored or in the way."""
+"""Environment variables of a run: those that have an effect, are ignored or cause trouble."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paramove.supervision.domain import check_name
 from paramove.workspace import Workspace
 
 OPEN_FILES = 256
-"""A node has two or three for each topic; the recorder, which hears nearly all, about a hundred."""
+"""A node has two or three for each topic; the recorder, which subscribes to nearly all, about a hundred."""
 DEFAULT_DOMAIN = "default"
 NEEDED = "paramove av cv2 dynamixel_sdk google matplotlib mcap mujoco numba numpy PIL platformdirs psutil pydantic rich"
 NEEDED += " ruamel scipy serial typer zmq zstandard"
@@ -29,12 +29,12 @@ NEEDED += " ruamel scipy serial typer zmq zstandard"
 
 @dataclass(frozen=True)
 class Environment:
-    """The environment as a run takes it.
+    """The environment of a run.
 
     Attributes:
         domain: Name of the bus domain.
         sockets: Folder in which the sockets of the bus are made.
-        notes: What is ignored or in the way: variable, value, and remedy, each in a line.
+        notes: Variables that are ignored or cause trouble: name, value and remedy, a line each.
     """
 
     domain: str
@@ -43,7 +43,7 @@ class Environment:
 
 
 def examined(variables: Mapping[str, str], workspace: Path) -> Environment:
-    """Looks at the variables that decide something; raises DomainError for a name that no domain can have."""
+    """Checks the variables that have an effect; raises DomainError for an invalid name of a domain."""
     domain = variables.get("PARAMOVE_DOMAIN") or DEFAULT_DOMAIN
     check_name(domain)
     sockets = default_folder(domain)
@@ -72,7 +72,7 @@ def node_environment(own: Mapping[str, str], workspace: Workspace) -> dict[str, 
 def _unusable(folder: str) -> str:
     """Why nothing can be written into a folder; "" if it can."""
     if not os.path.isabs(folder):
-        return "it is no absolute path"
+        return "it is not an absolute path"
     if not os.path.isdir(folder):
         return "there is no such folder"
     if not os.access(folder, os.W_OK | os.X_OK):
@@ -99,12 +99,12 @@ def _cache_folder(variables: Mapping[str, str]) -> Iterator[str]:
     there = next((folder for folder in (cache, *cache.parents) if folder.exists()), Path("/"))
     home = variables.get("HOME", "")
     if home and not os.path.isabs(home):
-        yield f"HOME={home!r} is ignored: it is no absolute path; what is kept lies in {cache}. Correct it"
+        yield f"HOME={home!r} is ignored: it is not an absolute path; the cache is {cache}. Correct it"
     reason = _unusable(str(there))
     if reason:
         name = "XDG_CACHE_HOME" if variables.get("XDG_CACHE_HOME") else "HOME"
         yield (
-            f"{name}={variables.get(name, '')!r}: nothing can be kept in {cache} ({reason}), so each run trains its "
+            f"{name}={variables.get(name, '')!r}: the cache {cache} is not writable ({reason}), so each run trains its "
             "movement again; set XDG_CACHE_HOME to a folder of yours"
         )
 
@@ -116,24 +116,24 @@ def _time_zone(variables: Mapping[str, str]) -> Iterator[str]:
     try:
         zoneinfo.ZoneInfo(value)
     except (zoneinfo.ZoneInfoNotFoundError, ValueError, OSError):
-        yield f"TZ={value!r} is no time zone that is known here; runs are named by UTC. Unset it or correct it"
+        yield f"TZ={value!r} is not a known time zone; runs are named by UTC. Unset it or correct it"
 
 
 def _hidden_modules(variables: Mapping[str, str], workspace: Path) -> Iterator[str]:
-    """Files that Python finds before the modules that are meant: in the workspace's root, or on PYTHONPATH."""
+    """Files that Python finds before the required modules: in the workspace's root, or on PYTHONPATH."""
     names = {*NEEDED.split(), *sys.stdlib_module_names}
-    places = [(workspace, "the workspace's root", "rename it")]
+    folders = [(workspace, "the workspace's root", "rename it")]
     for entry in variables.get("PYTHONPATH", "").split(os.pathsep):
         if entry and Path(entry).resolve() not in (workspace, workspace / "src"):
-            places.append((Path(entry), "PYTHONPATH", "unset PYTHONPATH"))
-    for folder, where, remedy in places:
+            folders.append((Path(entry), "PYTHONPATH", "unset PYTHONPATH"))
+    for folder, where, remedy in folders:
         try:
-            found = sorted(path for path in folder.iterdir() if path.suffix in (".py", "") and path.stem in names)
+            hiding = sorted(path for path in folder.iterdir() if path.suffix in (".py", "") and path.stem in names)
         except OSError:
             continue
-        for path in found:
+        for path in hiding:
             if path.suffix == ".py" or (path / "__init__.py").is_file():
-                yield f"{path} ({where}) hides the module {path.stem} that is meant; {remedy}"
+                yield f"{path} ({where}) hides the required module {path.stem}; {remedy}"
 
 
 def _owner(workspace: Path) -> Iterator[str]:
@@ -143,7 +143,7 @@ def _owner(workspace: Path) -> Iterator[str]:
 
 
 class LimitError(RuntimeError):
-    """The operating system allows less than a run needs; the text says how to raise the limit."""
+    """The operating system allows less than a run needs; the text has the command that raises the limit."""
 
 
 def allow_open_files(needed: int = OPEN_FILES) -> None:

@@ -1,4 +1,4 @@
-"""What happened in a run, as lines of JSON for those who measure it: `events.jsonl` in the run folder."""
+"""Events of a run as lines of JSON, for measurements: `events.jsonl` in the run folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _log = logging.getLogger(__name__)
 
 
 class EventLog:
-    """Appends events to a file; each is on disk's way before `write` returns, however the launcher ends after it.
+    """Appends events to a file; `write` gives each to the kernel, so that it survives the end of the launcher.
 
     One line is an object with `monotonic_ns` (CLOCK_MONOTONIC, the same for all processes of this machine), `wall`
     (ISO 8601), `event`, and what is known of `node`, `state`, `sentence`, `pid`, `exit_code`, `signal`.
@@ -31,7 +31,7 @@ class EventLog:
         self._cut = b""  # ends a line that a full disk has cut off
 
     def write(self, event: str, **facts: Any) -> None:
-        """Appends one event; facts that are None are left out. A full disk is told once each time and ends no run."""
+        """Appends one event; facts that are None are left out. A full disk is logged once each time."""
         monotonic_ns = time.monotonic_ns()
         wall = datetime.datetime.now().astimezone().isoformat(timespec="microseconds")
         known = {name: value for name, value in facts.items() if value is not None}
@@ -57,7 +57,7 @@ class EventLog:
 
 
 def signal_name(code: int | None) -> str | None:
-    """Name of the signal that an exit code of a process tells of (negative, as in `subprocess`), else None."""
+    """Name of the signal in an exit code of a process (negative, as in `subprocess`), else None."""
     if code is None or code >= 0:
         return None
     try:

@@ -77,9 +77,9 @@ def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
     subscribers: dict[str, list[str]] = {}
     table: dict[str, Topic] = {}
     for name, interface in interfaces.items():
-        for there, side in ((publishers, interface.publishes), (subscribers, interface.subscribes)):
+        for by_topic, side in ((publishers, interface.publishes), (subscribers, interface.subscribes)):
             for topic in side:
-                there.setdefault(on_bus(launch, name, topic), []).append(name)
+                by_topic.setdefault(on_bus(launch, name, topic), []).append(name)
                 table[on_bus(launch, name, topic)] = topic
     rates = {name: topic.rate_hz for name, topic in table.items()}
     modules = {name: launch.file.nodes[name].module for name in interfaces}
@@ -89,19 +89,19 @@ def graph_of(launch: Launch, interfaces: Mapping[str, Interface]) -> Graph:
 
 
 def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
-    """Graph of the nodes on a bus, with rates measured for `seconds`; empty where nothing runs."""
+    """Graph of the nodes on a bus, with rates measured for `seconds`; empty if none runs."""
     publishers: dict[str, list[str]] = {}
     subscribers: dict[str, list[str]] = {}
     states: dict[str, str] = {}
     for node, status in inspection.statuses(folder, 2.0).items():
         states[node] = _state(status)
-        for there, counts in (
+        for by_topic, counts in (
             (publishers, status.published if status else ()),
             (subscribers, status.received if status else ()),
         ):
             for count in counts:
                 if not count.topic.startswith("status/"):
-                    there.setdefault(count.topic, []).append(node)
+                    by_topic.setdefault(count.topic, []).append(node)
     known = {topic.name: topic for topic in topics.TOPICS}
     measured = inspection.measure(
         folder, [known[name] for name in publishers if name in known and not known[name].truth], seconds
@@ -113,7 +113,7 @@ def running_graph(folder: Path, domain: str, seconds: float) -> Graph:
 
 def _state(status: Any) -> str:
     if status is None:
-        return "does not answer"
+        return "not responding"
     return str(type(status).State.Name(status.state)).removeprefix("STATE_").lower()
 
 
@@ -142,7 +142,7 @@ def _flow(nodes: list[str], edges: Iterable[Edge], collectors: frozenset[str]) -
     world = [node for edge in edges if edge.topic == CLOCK.name for node in edge.publishers]
     left = [node for node in nodes if node not in (*collectors, *world)]
     to = {(a, b) for edge in edges for a in edge.publishers for b in edge.subscribers if a != b}
-    begin = world[:1]  # what keeps the time is where data comes from
+    begin = world[:1]  # data comes from the publisher of the clock
     end: list[str] = []
     while left:
         inside = [(a, b) for a, b in to if a in left and b in left]
@@ -222,11 +222,11 @@ def as_mermaid(graph: Graph) -> str:
                 lines.append(f'    {_id(publisher)} {arrow}|"{label}"| {_id(subscriber)}')
     for edge in graph.unpublished:
         ghost = _id(f"nobody_{edge.topic}")
-        lines.append(f'    {ghost}(["{edge.topic}: no publisher"]):::unsaid')
+        lines.append(f'    {ghost}(["{edge.topic}: no publisher"]):::unpublished')
         lines += [f"    {ghost} -.-> {_id(subscriber)}" for subscriber in _without(edge.subscribers, graph)]
     lines += [f"    {_id(node)}:::collector" for node in graph.collectors]
     if graph.unpublished:
-        lines.append("    classDef unsaid stroke:#c00,color:#c00,stroke-dasharray:4 3")
+        lines.append("    classDef unpublished stroke:#c00,color:#c00,stroke-dasharray:4 3")
     if graph.collectors:
         lines.append("    classDef collector stroke-dasharray:4 3")
     return "\n".join(lines) + "\n"

@@ -31,14 +31,14 @@ _STYLE = """
     .label { fill: #ffffff; fill-opacity: 0.94; }
     .line { fill: none; stroke: #2b6cb0; stroke-width: 1.2; }
     .back { stroke: #b7791f; }
-    .unsaid { stroke: #c0392b; stroke-dasharray: 4 3; }
+    .unpublished { stroke: #c0392b; stroke-dasharray: 4 3; }
     .collected { stroke: #9aa5b1; stroke-dasharray: 4 3; }
 """
 
 
 @dataclass
 class _Chart:
-    """Where everything stands: columns and rows of the chart, and what is written in each cell."""
+    """Layout: columns and rows of the chart, and the text of each cell."""
 
     graph: Graph
     names: list[str]
@@ -99,7 +99,7 @@ def _laid_out(graph: Graph) -> _Chart:
 
 
 def _written(graph: Graph, publisher: str, subscriber: str) -> list[str]:
-    """What stands in a cell."""
+    """Text of a cell."""
     if publisher == NO_PUBLISHER:
         return [
             edge.label
@@ -119,7 +119,7 @@ def _written(graph: Graph, publisher: str, subscriber: str) -> list[str]:
 
 def _kind(chart: _Chart, publisher: str, subscriber: str) -> str:
     if publisher == NO_PUBLISHER:
-        return "line unsaid"
+        return "line unpublished"
     if subscriber in chart.graph.collectors:
         return "line collected"
     return "line back" if chart.names.index(subscriber) < chart.names.index(publisher) else "line"

@@ -28,18 +28,18 @@ def main() -> None:
             groups.discard(int(line[1:]))
     end_groups(groups, GRACE_S)
     if groups:
-        _tell(f"paramove: the launcher was killed; its {len(groups)} processes were ended")
+        _print(f"paramove: the launcher was killed; its {len(groups)} processes were ended")
 
 
-def _tell(sentence: str) -> None:
-    """On standard error, which is the launcher's. A terminal that takes nothing within 1 s ends this process."""
+def _print(message: str) -> None:
+    """Prints to standard error, which is the launcher's. A terminal that blocks for 1 s ends this process."""
     signal.alarm(1)
     with contextlib.suppress(OSError):
         os.write(2, f"{sentence}\n".encode())
 
 
 def end_groups(groups: set[int], grace_s: float) -> None:
-    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`; stopped ones go on to end."""
+    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`; stopped ones are continued, so that they can end."""
     deadline_s = time.monotonic() + grace_s
     left = {group for group in groups if _send(group, signal.SIGTERM) and _send(group, signal.SIGCONT)}
     while left and time.monotonic() < deadline_s:

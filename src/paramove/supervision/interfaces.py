@@ -1,4 +1,4 @@
-"""What a node subscribes to, publishes and takes, read from its source without running it."""
+"""Topics and parameters of a node, read from its source without running it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from paramove.supervision.environment import node_environment
 from paramove.workspace import Workspace
 
 OLD_NAMES = {"SUBSCRIBES": "HEARS", "PUBLISHES": "SAYS"}
-"""What nodes of the release before call theirs."""
+"""Names in nodes written for the previous release."""
 
 
 class InterfaceError(ValueError):
@@ -28,14 +28,14 @@ class InterfaceError(ValueError):
 
 @dataclass(frozen=True)
 class Interface:
-    """A node as the others see it.
+    """Topics and parameters of a node.
 
     Attributes:
         path: Source file of the module.
         subscribes: Topics that it subscribes to.
         publishes: Topics that it publishes, without its status.
         parameters: Names of its parameters; None where they cannot be read from the source.
-        has_config: Whether it has a `Config` that can be asked about parameters.
+        has_config: Whether it has a `Config` that can check parameters.
         needs_parameters: Whether some parameter may have no default value.
     """
 
@@ -50,13 +50,13 @@ class Interface:
 def source_of(module: str, workspace: Workspace) -> Path:
     """Source file of a module of the workspace or of the installed library; raises InterfaceError."""
     relative = Path(*module.split("."))
-    for place in (relative.with_suffix(".py"), relative / "__main__.py"):
-        if (candidate := workspace.find(place)).is_file():
+    for file in (relative.with_suffix(".py"), relative / "__main__.py"):
+        if (candidate := workspace.find(file)).is_file():
             return candidate
     if module.startswith("paramove."):
-        found = _installed(module)
-        if found is not None:
-            return found
+        installed = _installed(module)
+        if installed is not None:
+            return installed
     known = [name for name in workspace.names(relative.parent, "*.py") if not name.startswith("_")]
     neighbours = f"; {relative.parent} has: {', '.join(known)}" if known else ""
     raise InterfaceError(
@@ -66,10 +66,10 @@ def source_of(module: str, workspace: Workspace) -> Path:
 
 def _installed(module: str) -> Path | None:
     try:
-        found = importlib.util.find_spec(module)
+        spec = importlib.util.find_spec(module)
     except ModuleNotFoundError:
         return None
-    return Path(found.origin) if found is not None and found.origin else None
+    return Path(spec.origin) if spec is not None and spec.origin else None
 
 
 def read_interface(module: str, workspace: Workspace) -> Interface:
@@ -97,7 +97,7 @@ def read_interface(module: str, workspace: Workspace) -> Interface:
 
 
 class _NotPlainError(Exception):
-    """The expression is more than names of topics."""
+    """The expression has more than names of topics."""
 
 
 def _assigned(tree: ast.Module) -> dict[str, ast.expr]:
@@ -111,12 +111,12 @@ def _assigned(tree: ast.Module) -> dict[str, ast.expr]:
 
 
 def _declared(name: str, assigned: Mapping[str, ast.expr], path: Path) -> str:
-    """The name under which the module has it: `name`, or that of the release before, with a warning."""
+    """The name in the module: `name`, or that of the previous release, with a warning."""
     if name in assigned:
         return name
     old = OLD_NAMES[name]
     if old not in assigned:
-        raise InterfaceError(f"{path}: a node says what it subscribes to and publishes, but {name} is missing")
+        raise InterfaceError(f"{path}: {name} is missing; a node needs SUBSCRIBES and PUBLISHES")
     warnings.warn(f"{path}: {old} is called {name} now; the next release reads that only", stacklevel=2)
     return old
 
@@ -132,11 +132,11 @@ def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> 
         case ast.Name(id=name) if name in assigned:
             return _topics(assigned[name], assigned, path)
         case ast.Attribute(value=ast.Name(id="topics"), attr=name):
-            found = getattr(topics, name, None)
-            if isinstance(found, Topic):
-                return (found,)
-            if isinstance(found, tuple) and all(isinstance(topic, Topic) for topic in found):
-                return found
+            value = getattr(topics, name, None)
+            if isinstance(value, Topic):
+                return (value,)
+            if isinstance(value, tuple) and all(isinstance(topic, Topic) for topic in value):
+                return value
             raise InterfaceError(f"{path}:{expression.lineno}: there is no topic topics.{name} in paramove.bus.topics")
     raise _NotPlainError
 
@@ -157,7 +157,7 @@ def _parameters(config: ast.ClassDef | None) -> tuple[str, ...] | None:
 
 
 def _needs_parameters(config: ast.ClassDef) -> bool:
-    """Whether a field may have no default: none is written, or a `Field(...)` that names none."""
+    """Whether a field may lack a default: it has no value, or a `Field(...)` without one."""
     if not _is_plain(config):
         return True
     for line in config.body:
@@ -175,7 +175,7 @@ def _needs_parameters(config: ast.ClassDef) -> bool:
     return False
 
 
-_ASK = (
+_IMPORT_CODE = (
     "import importlib, json, sys; node = importlib.import_module(sys.argv[1]);"
     "sys.stdout.write('\\n' + json.dumps([[t.name for t in getattr(node, name)] for name in sys.argv[2:]]))"
 )
@@ -186,7 +186,7 @@ def _imported(
     module: str, workspace: Workspace, changed_ns: int, *names: str
 ) -> tuple[tuple[Topic, ...], tuple[Topic, ...]]:
     """SUBSCRIBES and PUBLISHES of a module, imported in another process; again only when its file has changed."""
-    command = [sys.executable, "-c", _ASK, module, *names]
+    command = [sys.executable, "-c", _IMPORT_CODE, module, *names]
     try:
         answer = subprocess.run(
             command,

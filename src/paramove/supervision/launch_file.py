@@ -1,4 +1,4 @@
-"""Launch files read, overlaid, changed by `--set` and checked; every error says where and what would have worked."""
+"""Launch files read, overlaid, changed by `--set` and checked; every error has the position in the file and a remedy."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Launch:
     headless: bool = False
 
     def error(self, path: KeyPath, message: str) -> DocumentError:
-        """An error at the place where `path` was written."""
+        """An error at the position in the file of `path`."""
         return self.document.error(path, message)
 
 
@@ -99,13 +99,13 @@ def _with_overlays(
         if not isinstance(chosen, list) or not all(isinstance(overlay, str) for overlay in chosen):
             raise document.error(("default_overlays",), f"expected a list of names of overlays, found {chosen!r:.80}")
         for index, overlay in enumerate(chosen):
-            place = ("default_overlays", str(index))
+            key_path = ("default_overlays", str(index))
             if not _PLAIN_NAME.fullmatch(overlay):
                 message = f"{overlay!r}: expected the plain name of an overlay in {folders[-1]}, no path"
-                findings.append(document.error(place, message))
+                findings.append(document.error(key_path, message))
             elif not (path := _named(workspace, folders, overlay)).is_file():
                 message = f"there is no overlay '{overlay}' ({path}); {nearest(overlay, _known(workspace, folders))}"
-                findings.append(document.error(place, message))
+                findings.append(document.error(key_path, message))
             else:
                 paths.append(path)
     else:
@@ -130,17 +130,17 @@ def validated(document: Document) -> LaunchFile:
     try:
         return LaunchFile.model_validate(document.data)
     except ValidationError as error:
-        raise DocumentError.of([_finding(document, found) for found in _causes(error.errors())]) from error
+        raise DocumentError.of([_finding(document, details) for details in _causes(error.errors())]) from error
 
 
 def _causes(details: Sequence[ErrorDetails]) -> list[ErrorDetails]:
     """Findings without the keys that are missing only because they are mistyped."""
     mistyped = set()
-    for found in details:
-        if found["type"] == "extra_forbidden":
-            *above, key = (str(part) for part in found["loc"])
+    for one in details:
+        if one["type"] == "extra_forbidden":
+            *above, key = (str(part) for part in one["loc"])
             mistyped |= {(*above, meant) for meant in closest(key, _keys_at(tuple(above)))}
-    return [found for found in details if found["type"] != "missing" or tuple(map(str, found["loc"])) not in mistyped]
+    return [one for one in details if one["type"] != "missing" or tuple(map(str, one["loc"])) not in mistyped]
 
 
 def overlay_folders(launch: str) -> tuple[Path, Path]:
@@ -150,8 +150,8 @@ def overlay_folders(launch: str) -> tuple[Path, Path]:
 
 def _named(workspace: Workspace, folders: Sequence[Path], name: str) -> Path:
     """The file of this name in the first of the folders that has one; in the last where none has."""
-    places = [workspace.find(folder / f"{name}.yaml") for folder in folders]
-    return next((place for place in places if place.is_file()), places[-1])
+    paths = [workspace.find(folder / f"{name}.yaml") for folder in folders]
+    return next((path for path in paths if path.is_file()), paths[-1])
 
 
 def _known(workspace: Workspace, folders: Sequence[Path]) -> list[str]:
@@ -165,12 +165,14 @@ def _typed(workspace: Workspace, folders: Sequence[Path], name: str, kind: str) 
     elif _PLAIN_NAME.fullmatch(name):
         path = _named(workspace, folders, name)
     else:
-        raise LaunchFileMissingError(Position(name), f"no name of a {kind}: expected letters, digits, '_', or a *.yaml")
+        raise LaunchFileMissingError(
+            Position(name), f"not a name of a {kind}: expected letters, digits, '_', or a *.yaml"
+        )
     try:
-        there = path.is_file()
+        exists = path.is_file()
     except ValueError:  # a NUL byte in it
-        there = False
-    if not there:
+        exists = False
+    if not exists:
         message = f"there is no such {kind}; {nearest(path.stem, _known(workspace, folders))}"
         raise LaunchFileMissingError(Position(str(path)), message)
     return path
@@ -196,11 +198,11 @@ def _finding(document: Document, details: ErrorDetails) -> DocumentError:
     if details["type"] == "string_pattern_mismatch":
         is_module = path[-1] in ("module", "after_run")
         message = f"expected {'names joined by dots, such as nodes.camera' if is_module else 'a name such as my_node'}"
-    found = details["input"]
-    message += f", found {found!r:.200}"
+    value = details["input"]
+    message += f", found {value!r:.200}"
     if details["type"] == "literal_error":
-        message += f"; {nearest(str(found), _QUOTED.findall(details['msg']))}"
-    elif details["type"] in ("int_type", "float_type") and isinstance(found, str):
+        message += f"; {nearest(str(value), _QUOTED.findall(details['msg']))}"
+    elif details["type"] in ("int_type", "float_type") and isinstance(value, str):
         message += "; write a number, without quotes"
     return document.error(path, f"{name}: {message}")
 
@@ -231,7 +233,7 @@ def _keys_at(path: KeyPath) -> list[str]:
 def start_waves(file: LaunchFile) -> list[list[str]]:
     """Nodes in the order of their start: each wave needs only nodes of earlier waves.
 
-    Raises DocumentError if nodes wait for each other in a circle, which `load` has refused before.
+    Raises DocumentError if nodes wait for each other in a circle, which `load` rejects.
     """
     waves: list[list[str]] = []
     placed: set[str] = set()

@@ -1,6 +1,6 @@
-"""What a launch file may say, as pydantic models.
+"""Keys and values of a launch file, as pydantic models.
 
-JSON Schemas of launch files and overlays, with which an editor completes and checks while one types.
+JSON Schemas of launch files and overlays, with which an editor completes and checks while you type.
 
 A file names its schema in a comment: `# yaml-language-server: $schema=launch.schema.json`.
 """
@@ -89,7 +89,7 @@ class NodeSettings(_Checked):
 
 
 class LaunchFile(_Checked):
-    """One application: its nodes and how they are kept running."""
+    """One application: its nodes and how they are restarted."""
 
     description: str = Field(default="", description="what the application does, for people")
     bus: BusSettings = Field(default=BusSettings(), description="clock and lockstep")
@@ -116,7 +116,7 @@ def editor_schema(kind: str) -> dict[str, Any]:
 
 
 def schema_as_text(schema: dict[str, Any]) -> str:
-    """The schema as it lies in the repository."""
+    """The schema as stored in the repository."""
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -128,7 +128,7 @@ def _launch() -> dict[str, Any]:
 
 
 def _overlay() -> dict[str, Any]:
-    """Of a launch file everything may be left out, and null removes what the file below says."""
+    """The launch file's schema with every key optional; null removes a key of the file below."""
     schema = copy.deepcopy(_launch())
     schema["title"] = "paramove overlay"
     schema["description"] = "Laid over a launch file: mappings merge, all else is replaced, null removes a key."
@@ -152,7 +152,7 @@ def _or_null(field: dict[str, Any]) -> dict[str, Any]:
 
 
 def _without_titles(schema: Any) -> None:
-    """Removes the titles that pydantic makes of the names of fields; they say nothing more."""
+    """Removes the titles that pydantic makes of the names of fields; they add nothing."""
     if isinstance(schema, dict):
         if isinstance(schema.get("title"), str):
             del schema["title"]

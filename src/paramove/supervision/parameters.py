@@ -1,8 +1,8 @@
 """Parameters of nodes, checked by the nodes' own Config before anything starts.
 
-The modules are imported in one process of its own, because they import heavy libraries. Only nodes are asked that are
-given parameters or need some, for this is most of what a launch waits for before it starts. That nothing is wrong is
-stored, so that nobody waits for it again as long as no code, library or parameter has changed.
+The modules are imported in one process of its own, because they import heavy libraries. Nodes are
+checked only if they are given parameters or need some, because this check takes most of the time before a start. Its
+success is cached, so that it is not repeated until code, a library or a parameter changes.
 """
 
 from __future__ import annotations
@@ -37,59 +37,59 @@ TIMEOUT_S = 120.0
 def wrong_parameters(
     launch: Launch, interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Iterator[DocumentError]:
-    """What the nodes' own Config refuses of their parameters, and modules that cannot be imported."""
-    asked = {
+    """Parameters that the nodes' own Config rejects, and modules that cannot be imported."""
+    to_check = {
         name: (launch.file.nodes[name].module, launch.file.nodes[name].parameters)
         for name, interface in interfaces.items()
         if interface.has_config and (launch.file.nodes[name].parameters or interface.needs_parameters)
     }
-    if not asked:
+    if not to_check:
         return
-    passed = _passed_before(asked, interfaces, workspace)
+    passed = _passed_before(to_check, interfaces, workspace)
     if passed is not None and passed.is_file():
         return
-    answers, ending = _ask(list(asked.values()), workspace)
-    for (name, (module, _)), answer in zip(asked.items(), answers, strict=False):
+    answers, ending = _check_in_process(list(to_check.values()), workspace)
+    for (name, (module, _)), answer in zip(to_check.items(), answers, strict=False):
         if isinstance(answer, str):
             yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {answer}")
             continue
         for finding in answer:
             path = ("nodes", name, "parameters", *finding["path"])
-            yield launch.error(path, _sentence(name, ".".join(finding["path"]), finding))
-    if len(answers) < len(asked):
-        name, (module, _) = list(asked.items())[len(answers)]
+            yield launch.error(path, _message_of(name, ".".join(finding["path"]), finding))
+    if len(answers) < len(to_check):
+        name, (module, _) = list(to_check.items())[len(answers)]
         yield launch.error(("nodes", name, "module"), f"'{module}' cannot be imported: {ending}")
-    if passed is not None and answers == [[]] * len(asked):
-        with contextlib.suppress(OSError):  # where nothing can be stored, it is checked again
+    if passed is not None and answers == [[]] * len(to_check):
+        with contextlib.suppress(OSError):  # not writable: the next launch checks again
             passed.parent.mkdir(parents=True, exist_ok=True)
             passed.touch()
 
 
 def _passed_before(
-    asked: Mapping[str, tuple[str, dict[str, Any]]], interfaces: Mapping[str, Interface], workspace: Workspace
+    to_check: Mapping[str, tuple[str, dict[str, Any]]], interfaces: Mapping[str, Interface], workspace: Workspace
 ) -> Path | None:
-    """A file that exists once these parameters were right for this code; None for nodes whose code may lie anywhere."""
-    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name in asked):
+    """A file that exists once these parameters were right for this code; None if the code of a node may be anywhere."""
+    if not all(interfaces[name].path.is_relative_to(workspace.folders[-1]) for name in to_check):
         return None
-    code = code_digest(*(module for module, _ in asked.values()))
-    key = json.dumps([asked, code, workspace.digest, sys.version, version("pydantic")])
+    code = code_digest(*(module for module, _ in to_check.values()))
+    key = json.dumps([to_check, code, workspace.digest, sys.version, version("pydantic")])
     return user_cache_path("paramove") / "checked" / hashlib.sha256(key.encode()).hexdigest()
 
 
-def _sentence(node: str, parameter: str, finding: dict[str, Any]) -> str:
+def _message_of(node: str, parameter: str, finding: dict[str, Any]) -> str:
     if finding["type"] in ("extra_forbidden", "unexpected_keyword_argument"):  # the second of dataclasses
         return f"'{node}' has no parameter '{parameter}'; {nearest(finding['path'][-1], finding['known'])}"
     if finding["type"] == "missing":
         return f"'{node}' needs the parameter '{parameter}'"
-    return f"'{node}' refuses {parameter or 'its parameters'}: {finding['message']}, found {finding['found']}"
+    return f"'{node}' rejects {parameter or 'its parameters'}: {finding['message']}, found {finding['found']}"
 
 
-def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> tuple[list[Any], str]:
+def _check_in_process(to_check: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> tuple[list[Any], str]:
     """Answers of a process that imports the modules in turn, and how it ended if an answer is missing."""
     try:
         answer = subprocess.run(
             [sys.executable, "-m", __name__],
-            input=json.dumps(asked),
+            input=json.dumps(to_check),
             cwd=workspace.root,
             env=node_environment(os.environ, workspace),
             capture_output=True,
@@ -98,8 +98,8 @@ def _ask(asked: Sequence[tuple[str, dict[str, Any]]], workspace: Workspace) -> t
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        said = error.stdout.decode() if error.stdout else ""
-        return [json.loads(line) for line in said.splitlines()], f"it took more than {TIMEOUT_S:g} s"
+        output = error.stdout.decode() if error.stdout else ""
+        return [json.loads(line) for line in output.splitlines()], f"it took more than {TIMEOUT_S:g} s"
     last = answer.stderr.strip().splitlines()[-1:] or [f"the process ended with exit code {answer.returncode}"]
     return [json.loads(line) for line in answer.stdout.splitlines()], last[0]
 
@@ -108,7 +108,7 @@ def _answer(module: str, parameters: dict[str, Any]) -> str | list[dict[str, Any
     """Findings about the parameters, or why the module cannot be imported."""
     try:
         config = getattr(importlib.import_module(module), "Config", None)
-    except (Exception, SystemExit) as error:  # whatever a module does when it is imported is told, not repeated
+    except (Exception, SystemExit) as error:  # an import may do anything; its error is reported
         return f"{type(error).__name__}: {error}"
     if not isinstance(config, type) or not issubclass(config, BaseModel):
         return []
@@ -156,7 +156,7 @@ def _fields(kind: Any) -> dict[str, Any]:
 
 def main() -> None:
     """Reads modules and parameters from standard input; writes an answer per line as JSON."""
-    answers, sys.stdout = sys.stdout, sys.stderr  # what a module prints is no answer
+    answers, sys.stdout = sys.stdout, sys.stderr  # so that output of a module does not mix with the answers
     for module, parameters in json.load(sys.stdin):
         answers.write(json.dumps(_answer(module, parameters)) + "\n")
         answers.flush()

@@ -46,13 +46,13 @@ class Guard:
 
     def watch(self, group: int) -> None:
         """From now on the process group ends with the launcher."""
-        self._say(f"+{group}")
+        self._send(f"+{group}")
 
     def forget(self, group: int) -> None:
         """The process group has ended."""
-        self._say(f"-{group}")
+        self._send(f"-{group}")
 
-    def _say(self, line: str) -> None:
+    def _send(self, line: str) -> None:
         if self._process.stdin is not None and not self._process.stdin.closed:
             with contextlib.suppress(BrokenPipeError):  # the guard was killed: the kernel's SIGTERM remains
                 self._process.stdin.write(line + "\n")
@@ -99,7 +99,7 @@ class SupervisedProcess:
         guard.watch(self.pid)
 
     def prioritise(self, nice: int) -> None:
-        """Gives the process a nice value; what the system does not allow is left as it is.
+        """Gives the process a nice value; without effect where the system does not allow it.
 
         Linux shares the processor between sessions first (autogroup), and each node has its own: both are set.
         """
@@ -124,9 +124,9 @@ class SupervisedProcess:
         return code
 
     def halted(self) -> bool | None:
-        """True if the process has been stopped (SIGSTOP and its like) since the last call, False if it goes on since.
+        """True if the process was stopped (SIGSTOP and similar) since the last call, False if it was continued.
 
-        None if neither. Both together are told as False.
+        None if neither. Both together count as False.
         """
         halted: bool | None = None
         for flag, meaning in ((os.WSTOPPED, True), (os.WCONTINUED, False)):
@@ -136,7 +136,7 @@ class SupervisedProcess:
         return halted
 
     def terminate(self) -> None:
-        """Asks the process to end. It alone is asked: it knows in which order its own children end."""
+        """Requests the process to end. It alone gets the signal: it ends its own children in order."""
         if self._process.poll() is None:
             self._process.terminate()
             self._process.send_signal(signal.SIGCONT)  # a stopped process cannot end in order

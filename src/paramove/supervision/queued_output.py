@@ -1,4 +1,4 @@
-"""Standard output and standard error that never wait for whoever reads them."""
+"""Standard output and standard error that never block."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _Piece = tuple[int, bytes]
 class QueuedOutput:
     """While the block lasts, `sys.stdout` and `sys.stderr` are a queue, and a thread writes what is in it.
 
-    A terminal that takes nothing (a stalled ssh, a full pipe, Ctrl-S) stops only that thread. A full queue drops its
-    oldest text. If text is left at the end, both streams stay queues: nothing that is printed later waits either.
+    A terminal that blocks (a stalled ssh, a full pipe, Ctrl-S) stops only that thread. A full queue drops its
+    oldest text. If text is left at the end, both streams stay queues: later output does not block either.
 
     Attributes:
         dropped: How many pieces of text the queue has dropped.
@@ -50,14 +50,14 @@ class QueuedOutput:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._put(None)
-        with suppress(KeyboardInterrupt):  # who presses Ctrl-C does not wait for the rest
+        with suppress(KeyboardInterrupt):  # Ctrl-C skips the rest
             self._writer.join(LAST_WAIT_S)
         if not self._writer.is_alive():
             sys.stdout, sys.stderr = self._before
 
     @property
     def closed_by(self) -> signal.Signals | None:
-        """None while somebody can read the standard output; then SIGHUP if it was a terminal, else SIGPIPE."""
+        """None while standard output has a reader; then SIGHUP if it was a terminal, else SIGPIPE."""
         if self._stdout is None:
             return None
         poll = select.poll()
@@ -68,11 +68,11 @@ class QueuedOutput:
 
     @property
     def is_behind(self) -> bool:
-        """Whether text is waiting, so that more of the passing kind is better left out."""
+        """Whether text is waiting, so that transient output should be skipped."""
         return bool(self._pieces)
 
     def _queue(self, stream: TextIO) -> TextIO:
-        """The stream's replacement; a stream that is no file of the system never waits, and stays."""
+        """The stream's replacement; a stream without a file descriptor never blocks, and stays."""
         descriptor = _descriptor(stream)
         if descriptor is None:
             return stream
@@ -95,7 +95,7 @@ class QueuedOutput:
                 piece = self._pieces.popleft()
             if piece is None:
                 return
-            with suppress(OSError):  # closed, or a full disk: there is no other place for this text
+            with suppress(OSError):  # closed, or a full disk: this text is lost
                 _write(*piece)
 
 
@@ -133,5 +133,5 @@ def _write(descriptor: int, data: bytes) -> None:
     while data:
         try:
             data = data[os.write(descriptor, data) :]
-        except BlockingIOError:  # another program that has it open set it so
+        except BlockingIOError:  # another program with the same file set O_NONBLOCK
             select.select([], [descriptor], [])

@@ -1,4 +1,4 @@
-"""What a launch file and the command line say about nodes by name: values set, and names that must exist."""
+"""References to nodes by name in a launch file and on the command line: values set, and names that must exist."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Findings = list[DocumentError]
 def with_values(
     document: Document, settings: Sequence[str], seed: int | None, headless: bool, named: bool = True
 ) -> tuple[Document, Findings]:
-    """The document with the values that `--headless`, `--set` and `--seed` give, and what is wrong with these.
+    """The document with the values that `--headless`, `--set` and `--seed` give, and the errors in these.
 
     Args:
         document: Launch file with its overlays.
@@ -54,9 +54,9 @@ def with_values(
             and _is_connection(document, target)
             and not (named and _value_at(document, node, parameters))
         ):
-            message = f"say with an overlay what is connected there, such as --with real --set {target}=..."
+            message = f"select an overlay that sets what is connected there, such as --with real --set {target}=..."
             findings.append(DocumentError(where, message))
-        elif all(parameters) and parameters:  # else `wrong_references` tells of it
+        elif all(parameters) and parameters:  # otherwise `wrong_references` reports it
             document = document.overlaid(_parameter(node, parameters, value, where))
     return document, findings
 
@@ -87,7 +87,7 @@ def _nodes(document: Document) -> dict[str, Any]:
 
 
 def wrong_references(document: Document) -> Findings:
-    """Names inside the file that name nothing, and circles of `after`; whatever else may be wrong with the file."""
+    """References to missing names, and cycles of `after`; works on a file with other errors, too."""
     findings: Findings = []
     nodes = _nodes(document)
     after = {name: _after(node) for name, node in nodes.items()}
@@ -96,11 +96,13 @@ def wrong_references(document: Document) -> Findings:
             if other not in nodes:
                 path = ("nodes", name, "after", str(index))
                 findings.append(
-                    document.error(path, f"'{name}' comes after '{other}', no node; {nearest(other, nodes)}")
+                    document.error(
+                        path, f"'{name}' is started after '{other}', which is not a node; {nearest(other, nodes)}"
+                    )
                 )
-    for circle in _circles(after):
-        where = ("nodes", circle[0], "after")
-        findings.append(document.error(where, f"these nodes wait for each other ('after'): {', '.join(circle)}"))
+    for cycle in _cycles(after):
+        where = ("nodes", cycle[0], "after")
+        findings.append(document.error(where, f"these nodes wait for each other ('after'): {', '.join(cycle)}"))
     headless = document.data.get("headless")
     targets: list[tuple[str, str, Any]] = [
         (key, str(index), target)
@@ -108,12 +110,12 @@ def wrong_references(document: Document) -> Findings:
         for index, target in enumerate(document.data[key] if isinstance(document.data.get(key), list) else ())
     ]
     targets += [("headless", target, target) for target in (headless if isinstance(headless, dict) else ())]
-    for key, place, target in targets:
+    for key, index_or_name, target in targets:
         node, *parameters = str(target).split(".")
         if node not in nodes or not parameters or not all(parameters):
             remedy = f"write {node}.<parameter>" if node in nodes else nearest(node, nodes)
-            message = f"'{target}' is no node.parameter; {remedy}"
-            findings.append(document.error((key, place), message))
+            message = f"'{target}' is not a node.parameter; {remedy}"
+            findings.append(document.error((key, index_or_name), message))
     return findings
 
 
@@ -122,20 +124,20 @@ def _after(node: Any) -> list[str]:
     return [other for other in after if isinstance(other, str)] if isinstance(after, list) else []
 
 
-def _circles(after: dict[str, list[str]]) -> list[list[str]]:
-    """Nodes that wait for themselves, over others or not; each circle once, in the order of the file."""
+def _cycles(after: dict[str, list[str]]) -> list[list[str]]:
+    """Nodes that wait for themselves, directly or through others; each cycle once, in the order of the file."""
     reached: dict[str, set[str]] = {}
     for name in after:
-        found: set[str] = set()
+        predecessors: set[str] = set()
         waiting = list(after[name])
         while waiting:
             other = waiting.pop()
-            if other not in found:
-                found.add(other)
+            if other not in predecessors:
+                predecessors.add(other)
                 waiting += after.get(other, [])
-        reached[name] = found
-    circles: list[list[str]] = []
+        reached[name] = predecessors
+    cycles: list[list[str]] = []
     for name in after:
-        if name in reached[name] and not any(name in circle for circle in circles):
-            circles.append([other for other in after if other in reached[name] and name in reached.get(other, ())])
-    return circles
+        if name in reached[name] and not any(name in cycle for cycle in cycles):
+            cycles.append([other for other in after if other in reached[name] and name in reached.get(other, ())])
+    return cycles

@@ -47,7 +47,7 @@ class RunFolder:
         raise FileExistsError(f"{runs / stamp} and 998 more exist already")
 
     def log(self, node: str) -> Path:
-        """File of what the node writes to standard output and standard error."""
+        """File with the node's standard output and standard error."""
         return self.logs / f"{node}.log"
 
     def config(self, node: str) -> Path:
@@ -56,7 +56,7 @@ class RunFolder:
 
     @property
     def events(self) -> Path:
-        """File of what happened to the nodes, a line of JSON each (see `EventLog`)."""
+        """File of the events of the nodes, a line of JSON each (see `EventLog`)."""
         return self.path / "events.jsonl"
 
     def write_effective(self, launch: Launch) -> None:
@@ -69,8 +69,8 @@ class RunFolder:
         Args:
             launch: Names nodes and parameters.
             bus_folder: Of the sockets.
-            truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` learn of it.
-            clock: Node that says the clock; in lockstep it is told whom to wait for.
+            truth_folder: Of the sockets of the ground truth; only nodes with `truth: true` get it.
+            clock: Node that publishes the clock; in lockstep it gets the list of members.
         """
         lockstep = launch.file.bus.lockstep
         for name, node in launch.file.nodes.items():
@@ -89,21 +89,21 @@ class RunFolder:
             _write(self.config(name), config)
 
     def write_run(self, facts: dict[str, Any]) -> None:
-        """Writes `run.yaml`: what was run, and once it has ended how it ended."""
+        """Writes `run.yaml`: facts of the run and, once it has ended, its outcome."""
         _write(self.path / "run.yaml", facts)
 
 
 def _point_latest(runs: Path, path: Path) -> None:
-    beside = runs / f".latest-{os.getpid()}"
-    beside.unlink(missing_ok=True)
-    beside.symlink_to(path.name)
-    beside.replace(runs / "latest")
+    temporary = runs / f".latest-{os.getpid()}"
+    temporary.unlink(missing_ok=True)
+    temporary.symlink_to(path.name)
+    temporary.replace(runs / "latest")
 
 
 def _write(path: Path, content: Any) -> None:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False
-    yaml.representer.ignore_aliases = lambda _: True  # readers refuse them
+    yaml.representer.ignore_aliases = lambda _: True  # readers reject them
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     with replacing(path, 0o600) as unfinished, unfinished.open("w", encoding="utf-8") as file:
         yaml.dump(content, file)

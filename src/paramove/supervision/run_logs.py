@@ -1,4 +1,4 @@
-"""The logs of a run: what all its nodes wrote and what the supervisor did to them, in the order of time."""
+"""The logs of a run: lines of all nodes and events of the supervisor, in the order of time."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from paramove.bus import parse
 
 SUPERVISOR = "supervisor"
 LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warn": logging.WARNING, "error": logging.ERROR}
-_WORTH_A_WARNING = frozenset({"suspended", "degraded"})
-_WORTH_AN_ERROR = frozenset({"fault", "failed", "given_up"})
-_SAID_BY_THE_NODE = frozenset({"ready", "degraded", "failed"})
+_WARNING_EVENTS = frozenset({"suspended", "degraded"})
+_ERROR_EVENTS = frozenset({"fault", "failed", "given_up"})
+_LOGGED_BY_THE_NODE = frozenset({"ready", "degraded", "failed"})
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class LogLine:
     """One line.
 
     Attributes:
-        monotonic_s: By which lines are put in order; of a line without a stamp, that of the one before.
-        wall: ISO 8601; empty if nothing before it in its file bore a stamp.
-        node: Whose file it stands in.
+        monotonic_s: By which lines are put in order; a line without a stamp has that of the line before.
+        wall: ISO 8601; empty if no earlier line of its file had a stamp.
+        node: Node whose log has the line.
         level: One of logging's numbers.
         text: As it was written; may hold control characters.
     """
@@ -60,11 +60,11 @@ class RunLogs:
 
         Sets `ended` once the supervisor has written that the run is over.
         """
-        found = self._events()
+        lines = self._events()
         for name in self.names():
             if not self._nodes or name in self._nodes:
-                found += [self._line(name, text) for text in self._grown(self._folder / "logs" / f"{name}.log")]
-        return sorted(found, key=lambda line: line.monotonic_s)
+                lines += [self._line(name, text) for text in self._grown(self._folder / "logs" / f"{name}.log")]
+        return sorted(lines, key=lambda line: line.monotonic_s)
 
     def _grown(self, path: Path) -> list[str]:
         return self._files.setdefault(path, _GrowingFile(path)).lines()
@@ -73,36 +73,36 @@ class RunLogs:
         stamped = parse(text)
         if stamped is not None:
             line = LogLine(stamped.monotonic_s, stamped.wall, name, stamped.level, stamped.text)
-        else:  # a traceback, or what a library printed
+        else:  # a traceback, or output of a library
             before = self._last.get(name, LogLine(0.0, "", name, logging.WARNING, ""))
             line = LogLine(before.monotonic_s, before.wall, name, max(before.level, logging.WARNING), text)
         self._last[name] = line
         return line
 
     def _events(self) -> list[LogLine]:
-        found = []
+        lines = []
         for text in self._grown(self._folder / "events.jsonl"):
             try:
                 event = json.loads(text)
                 self.ended |= event["event"] == "run_ends"
-                if event["event"] not in _SAID_BY_THE_NODE and (not self._nodes or event.get("node") in self._nodes):
-                    found.append(_told(event))
+                if event["event"] not in _LOGGED_BY_THE_NODE and (not self._nodes or event.get("node") in self._nodes):
+                    lines.append(_event_line(event))
             except (ValueError, KeyError, TypeError):
                 continue  # cut off by a full disk
-        return found
+        return lines
 
 
-def _told(event: dict[str, object]) -> LogLine:
+def _event_line(event: dict[str, object]) -> LogLine:
     """A line about an event of the supervisor."""
     name, node = str(event["event"]), event.get("node")
     level = logging.INFO
-    if name in _WORTH_A_WARNING or (name == "ended" and event.get("state") == "restarting"):
+    if name in _WARNING_EVENTS or (name == "ended" and event.get("state") == "restarting"):
         level = logging.WARNING
-    if name in _WORTH_AN_ERROR or (name == "ended" and event.get("state") == "given up"):
+    if name in _ERROR_EVENTS or (name == "ended" and event.get("state") == "given up"):
         level = logging.ERROR
     if name in ("run_stops", "run_ends") and event.get("exit_code") != 0:
         level = logging.WARNING
-    what = event.get("sentence") or ("is asked to end" if name == "asked" else name.replace("_", " "))
+    what = event.get("sentence") or ("is requested to end" if name == "asked" else name.replace("_", " "))
     if name == "started":
         what = f"is started, {what}"
     elif name == "ended" and event.get("state") == "stopped":
@@ -112,7 +112,7 @@ def _told(event: dict[str, object]) -> LogLine:
 
 
 class _GrowingFile:
-    """Hands out whole lines of a file that others append to."""
+    """Yields whole lines of a file that other processes append to."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -1,4 +1,4 @@
-"""Hears what nodes say of themselves and what the robot says, for the supervisor."""
+"""Subscribes to the statuses of nodes and the robot's speech, for the supervisor."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from paramove.msgs.node_status_pb2 import NodeStatus
 
 
 class StatusSubscriber:
-    """Subscribes to the status of every node and to the story of the run. Never waits.
+    """Subscribes to the status of every node, the robot's speech and the application's stage. Never waits.
 
     Args:
         folder: Bus folder.
-        nodes: Names whose status is heard.
+        nodes: Names of the nodes.
         on_status: Gets each NodeStatus.
-        on_story: Gets each sentence of the robot and each new stage of the application.
+        on_story: Gets each spoken sentence of the robot and each new stage of the application.
     """
 
     def __init__(
@@ -32,25 +32,25 @@ class StatusSubscriber:
             self._exchange.subscribe(topic)
         self._on_status = on_status
         self._on_story = on_story
-        self._told = ""
+        self._stage = ""
 
     def listen(self) -> None:
         """Handles all that has come in."""
         self._exchange.wait(0.0)
-        for heard in self._exchange.take(topic.name for topic in self._topics):
-            self._handle(heard)
+        for received in self._exchange.take(topic.name for topic in self._topics):
+            self._handle(received)
 
     def close(self) -> None:
         """Closes all sockets."""
         self._exchange.close()
 
-    def _handle(self, heard: Received) -> None:
-        if heard.topic.type is NodeStatus:
-            self._on_status(heard.message)
-        elif heard.topic is topics.SPEECH:
-            self._on_story(f'robot: "{heard.message.sentence}"')
+    def _handle(self, received: Received) -> None:
+        if received.topic.type is NodeStatus:
+            self._on_status(received.message)
+        elif received.topic is topics.SPEECH:
+            self._on_story(f'robot: "{received.message.sentence}"')
         else:
-            stage = heard.message.Stage.Name(heard.message.stage).removeprefix("STAGE_").lower()
-            if stage != self._told:
-                self._told = stage
+            stage = received.message.Stage.Name(received.message.stage).removeprefix("STAGE_").lower()
+            if stage != self._stage:
+                self._stage = stage
                 self._on_story(f"stage: {stage}")

@@ -17,7 +17,7 @@ LONGEST_BACKOFF_S = 30.0
 
 
 class State(enum.Enum):
-    """Where a node stands."""
+    """State of a node."""
 
     WAITING = "waiting"
     STARTING = "starting"
@@ -33,9 +33,9 @@ class State(enum.Enum):
 
 
 USUAL_ENDS = ("", "finished", "stopped on request")
-"""What nodes say when there is no more to be said of their end."""
+"""Messages of nodes that ended without a special reason."""
 ENDED = frozenset({State.STOPPED, State.FINISHED, State.GIVEN_UP})
-_SAID = {
+_STATE_OF_STATUS = {
     NodeStatus.STATE_READY: State.READY,
     NodeStatus.STATE_DEGRADED: State.DEGRADED,
     NodeStatus.STATE_FAILED: State.FAILED,
@@ -46,8 +46,8 @@ _AT_WORK = (State.READY, State.DEGRADED, State.FAILED)
 MEASURE_PERIOD_S = 1.0
 STOP_S = 5.0
 """From SIGTERM to SIGKILL."""
-LONGEST_LOOK_S = 0.5
-"""Silence between two looks counts for so long at most: a launcher that was stopped itself has heard nobody."""
+MAX_CHECK_INTERVAL_S = 0.5
+"""At most this much time without status counts per check: a launcher that was itself stopped received nothing."""
 
 
 class SupervisedNode:
@@ -60,14 +60,14 @@ class SupervisedNode:
         on_change: Called after each change of `state` or of the reason for it.
 
     Attributes:
-        sentence: What the node said last, or what happened to it in words that follow its name.
-        event: What has just changed: `started`, `ready`, `degraded`, `failed`, `suspended`, `resumed`, `fault` (the
-            supervisor kills it), `ended`, `given_up`, `asked` (to end), `stopped` (it did not run).
+        detail: Latest message of the node, or what happened to it in words that follow its name.
+        event: The latest change: `started`, `ready`, `degraded`, `failed`, `suspended`, `resumed`, `fault` (the
+            supervisor kills it), `ended`, `given_up`, `asked` (requested to end), `stopped` (it did not run).
         exit_code: Of its last end, negative: number of the signal; None before.
         exit_reason: How it ended last and why, in words that follow its name; empty before.
-        came_back: How it ended and what it says since it is up again, once it was restarted; empty before.
+        came_back: How it ended and its message since it is up again, once it was restarted; empty before.
         status: Its last NodeStatus.
-        longest_silence_s: Between two of them while it was at work.
+        longest_silence_s: Longest time between two of them while it was at work.
         process: None while it does not run.
         pid: Of its last process; 0 before the first.
     """
@@ -82,7 +82,7 @@ class SupervisedNode:
         self.name = name
         self.settings = settings
         self.state = State.WAITING
-        self.sentence = f"for {', '.join(settings.after)}" if settings.after else ""
+        self.detail = f"for {', '.join(settings.after)}" if settings.after else ""
         self.restarts = 0
         self.event = ""
         self.exit_code: int | None = None
@@ -98,13 +98,13 @@ class SupervisedNode:
         self._measure_due_s = 0.0
         self._killed_for = ""
         self.longest_silence_s = 0.0
-        self._silent_s = 0.0
-        self._looked_s = 0.0
+        self._no_status_s = 0.0
+        self._checked_s = 0.0
         self._before = State.STARTING  # it was suspended
         self._suspended_s = 0.0
         self._end = ""
-        self._by_hand = ""  # what a person wants: that it is stopped or restarted
-        self._asked_s = 0.0
+        self._by_hand = ""  # request of a person: "stopped" or "restarted"
+        self._requested_s = 0.0
 
     @property
     def is_up(self) -> bool:
@@ -120,7 +120,7 @@ class SupervisedNode:
         """Starts the process. One that cannot be started has ended, and is tried again as any other."""
         self.status = NodeStatus()
         self._killed_for = ""
-        self._silent_s, self._looked_s = 0.0, now_s
+        self._no_status_s, self._checked_s = 0.0, now_s
         self._deadline_s = now_s + self.settings.ready_timeout_s
         try:
             self.process = self._spawn(self.name)
@@ -132,24 +132,24 @@ class SupervisedNode:
         self._become(State.STARTING, f"pid {self.process.pid}", "started")
 
     def handle(self, status: NodeStatus) -> None:
-        """Takes in what the node says of itself; words of an earlier process are passed over."""
+        """Handles a status of the node; those of an earlier process are ignored."""
         if self.process is None or status.pid != self.process.pid:
             return
         self.status = status
         if self.state in _AT_WORK:
-            self.longest_silence_s = max(self.longest_silence_s, self._silent_s)
-        self._silent_s = 0.0
+            self.longest_silence_s = max(self.longest_silence_s, self._no_status_s)
+        self._no_status_s = 0.0
         if self.state in (State.STOPPING, State.SUSPENDED):
             return
-        state = _SAID.get(status.state, self.state)
-        sentence = printable(status.sentence)
+        state = _STATE_OF_STATUS.get(status.state, self.state)
+        message = printable(status.sentence)
         if state is self.state:
-            self.sentence = sentence
+            self.detail = message
             return
         if self.restarts and self.state is State.STARTING:
             how = "is back" if state is not State.FAILED else "is back, but cannot work"
-            self.came_back = f"{self._end} and {how}: {sentence}"
-        self._become(state, sentence, state.value)
+            self.came_back = f"{self._end} and {how}: {message}"
+        self._become(state, message, state.value)
 
     def check(self, now_s: float) -> int | None:
         """Does what is due; returns the exit code if the process has just ended (see `conclude`)."""
@@ -166,7 +166,7 @@ class SupervisedNode:
             if self._by_hand and now_s >= self._deadline_s:
                 self.process.kill()
             return None
-        self._look(self.process.halted(), now_s)
+        self._follow(self.process.halted(), now_s)
         if not self._killed_for:
             self._killed_for = self._fault(self.process.pid, now_s)
             if self._killed_for:
@@ -174,33 +174,33 @@ class SupervisedNode:
                 self.process.kill()
         return None
 
-    def _look(self, halted: bool | None, now_s: float) -> None:
-        """Takes in whether the process was stopped or goes on, and how long it has been silent."""
-        self._silent_s += min(now_s - self._looked_s, LONGEST_LOOK_S)
-        self._looked_s = now_s
+    def _follow(self, halted: bool | None, now_s: float) -> None:
+        """Follows whether the process was stopped or continued, and how long it has published no status."""
+        self._no_status_s += min(now_s - self._checked_s, MAX_CHECK_INTERVAL_S)
+        self._checked_s = now_s
         if halted and self.state is not State.SUSPENDED:
             self._before = self.state
             self._suspended_s = now_s
             timeout_s = self.settings.stopped_timeout_s
-            rest = "" if timeout_s is None else f"; killed in {timeout_s:g} s unless it goes on"
+            rest = "" if timeout_s is None else f"; killed in {timeout_s:g} s unless it is continued"
             self._become(State.SUSPENDED, f"is stopped (SIGSTOP){rest}", "suspended")
         elif halted is False and not self._killed_for:
-            self._silent_s = 0.0
-            self._become(self._before if self.state is State.SUSPENDED else self.state, "goes on", "resumed")
+            self._no_status_s = 0.0
+            self._become(self._before if self.state is State.SUSPENDED else self.state, "is continued", "resumed")
 
     def _fault(self, pid: int, now_s: float) -> str:
-        """Why the process has to be killed, in words that follow its name; empty if it is well."""
+        """Why the process has to be killed, in words that follow its name; empty if it is healthy."""
         settings = self.settings
         if self.state is State.SUSPENDED:
             timeout_s = settings.stopped_timeout_s
             if timeout_s is not None and now_s >= self._suspended_s + timeout_s:
                 return f"was stopped (SIGSTOP) for {timeout_s:g} s"
             return ""
-        said = printable(self.status.sentence) or "nothing"
+        last = printable(self.status.sentence) or "none"
         if self.state is State.STARTING and now_s >= self._deadline_s:
-            return f"was not ready within {settings.ready_timeout_s:g} s, last said: {said}"
-        if self.state in _AT_WORK and self._silent_s >= (settings.silent_timeout_s or float("inf")):
-            return f"hangs: no status for {settings.silent_timeout_s:g} s, last said: {said}"
+            return f"was not ready within {settings.ready_timeout_s:g} s, last message: {last}"
+        if self.state in _AT_WORK and self._no_status_s >= (settings.silent_timeout_s or float("inf")):
+            return f"hangs: no status for {settings.silent_timeout_s:g} s, last message: {last}"
         if settings.memory_limit_mb is not None and now_s >= self._measure_due_s:
             self._measure_due_s = now_s + MEASURE_PERIOD_S
             used_mb = _memory_mb(pid)
@@ -209,14 +209,14 @@ class SupervisedNode:
         return ""
 
     def conclude(self, code: int, now_s: float) -> None:
-        """Draws the consequence of an end that nobody asked for: restart, finished or given up."""
+        """Handles an end that was not requested: restart, finished or given up."""
         self.exit_code = code
         if self._by_hand:
             self._conclude_by_hand(code, now_s)
             return
         self._end = self._killed_for or describe(code)
-        said_why = self.status.state == NodeStatus.STATE_STOPPED and self.status.sentence not in USUAL_ENDS
-        if not self._killed_for and (said_why or self.status.state == NodeStatus.STATE_FAILED):
+        has_reason = self.status.state == NodeStatus.STATE_STOPPED and self.status.sentence not in USUAL_ENDS
+        if not self._killed_for and (has_reason or self.status.state == NodeStatus.STATE_FAILED):
             self._end += f" ({printable(self.status.sentence)})"
         verdict = self._policy.after_exit(FAILURE if self._killed_for else code, now_s)
         if self.settings.restart_ends_run and self.restarts > 0 and not self.came_back:
@@ -229,7 +229,7 @@ class SupervisedNode:
             self._become(State.GIVEN_UP if verdict.failed else State.FINISHED, self.exit_reason, "ended")
 
     def stop_by_hand(self, now_s: float, restart: bool = False) -> None:
-        """Stops the node alone, because a person wants it so; it is killed if it takes too long.
+        """Stops the node alone, on request of a person; it is killed if it takes too long.
 
         Args:
             now_s: On the monotonic clock.
@@ -240,24 +240,24 @@ class SupervisedNode:
             self._become(State.STOPPED, "by hand", "stopped")
             return
         self._by_hand = "restarted" if restart else "stopped"
-        self._asked_s = now_s
+        self._requested_s = now_s
         self._deadline_s = now_s + STOP_S
         self.process.terminate()
         self._become(State.STOPPING, f"to be {self._by_hand} by hand", "asked")
 
     def start_by_hand(self, now_s: float) -> None:
-        """Starts a node that has ended, without waiting and beside the budget of restarts."""
+        """Starts a node that has ended, at once and without using the budget of restarts."""
         self.restarts += 1
         self._end = self.exit_reason
         self.start(now_s)
 
     def _conclude_by_hand(self, code: int, now_s: float) -> None:
-        """Draws the consequence of an end that a person asked for."""
+        """Handles an end that a person requested."""
         restart = self._by_hand == "restarted"
         self._end = f"was {self._by_hand} by hand"
         self.exit_reason = self._end if code == OK else f"{self._end}, {describe(code)}"
         self._by_hand = ""
-        self._become(State.STOPPED, f"by hand, {now_s - self._asked_s:.1f} s after it was asked", "ended")
+        self._become(State.STOPPED, f"by hand, {now_s - self._requested_s:.1f} s after the request", "ended")
         if restart:
             self.restarts += 1
             self.start(now_s)
@@ -265,7 +265,7 @@ class SupervisedNode:
             self._become(State.GIVEN_UP, self.exit_reason, "given_up")
 
     def stop(self) -> None:
-        """Asks the process to end; one that is not running just stops waiting."""
+        """Requests the process to end; a node that is not running stops waiting."""
         self._by_hand = ""
         if self.process is not None:
             self.process.terminate()
@@ -279,14 +279,14 @@ class SupervisedNode:
             self.process.kill()
 
     def stopped(self, code: int, took_s: float) -> None:
-        """Takes in the end of the process that `stop` or `kill` asked for."""
+        """Handles the end of the process after `stop` or `kill`."""
         self.exit_code = code
-        self.exit_reason = f"{describe(code)} {took_s:.1f} s after it was asked"
+        self.exit_reason = f"{describe(code)} {took_s:.1f} s after the request"
         how = "" if code == OK else f"{describe(code)}, "
-        self._become(State.STOPPED, f"{how}{took_s:.1f} s after it was asked", "ended")
+        self._become(State.STOPPED, f"{how}{took_s:.1f} s after the request", "ended")
 
-    def _become(self, state: State, sentence: str, event: str) -> None:
-        self.state, self.sentence, self.event = state, sentence, event
+    def _become(self, state: State, detail: str, event: str) -> None:
+        self.state, self.detail, self.event = state, detail, event
         self._on_change(self)
 
 
@@ -322,8 +322,8 @@ class RestartPolicy:
     def after_exit(self, code: int, now_s: float) -> Verdict:
         """Verdict on an exit with `code` (negative: a signal) at `now_s` on a monotonic clock."""
         failed = code != OK
-        wanted = self.settings.restart == "always" or (self.settings.restart == "on-failure" and failed)
-        if not wanted:
+        to_restart = self.settings.restart == "always" or (self.settings.restart == "on-failure" and failed)
+        if not to_restart:
             return Verdict(None, failed, "")
         if code in NEVER_RESTARTED:
             return Verdict(None, True, "a restart would end the same way")

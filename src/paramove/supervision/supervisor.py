@@ -29,8 +29,8 @@ from paramove.workspace import Workspace
 
 _ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SUSPENDS = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
-TURN_S = 0.05
-"""Longest wait between two looks at the bus; the end of a process is seen at once."""
+POLL_PERIOD_S = 0.05
+"""Longest wait between two reads of the bus; the end of a process is noticed at once."""
 STOP_ALL_S = 10.0
 """For all waves together."""
 
@@ -51,13 +51,13 @@ class View(Protocol):
 
     @property
     def closed_by(self) -> signal.Signals | None:
-        """The signal that stands for why nobody can see the run any more, SIGHUP or SIGPIPE; None before."""
+        """SIGHUP or SIGPIPE once the terminal or pipe that shows the run is closed; None before."""
 
     def changed(self, node: SupervisedNode) -> None:
         """A node's state has changed."""
 
     def story(self, text: str) -> None:
-        """The robot said something, or the application reached a new step."""
+        """The robot spoke, or the application reached a new stage."""
 
     def problem(self, text: str) -> None:
         """Something went wrong; may have several lines."""
@@ -86,7 +86,7 @@ class Supervisor:
 
     def __init__(self, launch: Launch, workspace: Workspace, run_folder: RunFolder, domain: Domain, view: View) -> None:
         self._file = launch.file
-        self._judging = ["--no-video"] if launch.headless else []
+        self._judge_options = ["--no-video"] if launch.headless else []
         self._workspace = workspace.root
         self._folder = run_folder
         self._view = view
@@ -129,13 +129,13 @@ class Supervisor:
         return by_hand.answer(self.nodes, request, self._ending)
 
     def _changed(self, node: SupervisedNode) -> None:
-        """First the log, by which reactions are measured, then the screen."""
+        """Writes the log first, from which reaction times are measured, then updates the view."""
         code = node.exit_code if node.event == "ended" else None
         self._events.write(
             node.event,
             node=node.name,
             state=node.state.value,
-            sentence=node.sentence,
+            sentence=node.detail,
             pid=node.pid or None,
             exit_code=code,
             signal=signal_name(code),
@@ -147,7 +147,7 @@ class Supervisor:
         limit_s = time.monotonic() + (self._file.time_limit_s or float("inf"))
         while True:
             self._start_due()
-            for node, code in self._turn(statuses):
+            for node, code in self._poll(statuses):
                 node.conclude(code, time.monotonic())
                 if node.state is State.GIVEN_UP and node.event == "ended":
                     self._show_log(node)
@@ -160,8 +160,8 @@ class Supervisor:
             if node.state is State.WAITING and all(self.nodes[other].is_up for other in node.settings.after):
                 node.start(time.monotonic())
 
-    def _turn(self, statuses: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
-        """Waits up to `TURN_S` for an end, a stop (SIGSTOP) or a signal, and listens.
+    def _poll(self, statuses: StatusSubscriber) -> list[tuple[SupervisedNode, int]]:
+        """Waits up to `POLL_PERIOD_S` for an end, a stop (SIGSTOP) or a signal, and reads the bus.
 
         Returns the nodes that have just ended, with exit codes.
         """
@@ -171,10 +171,10 @@ class Supervisor:
         for node in self.nodes.values():
             if node.process is not None:
                 poll.register(node.process.pidfd, select.POLLIN)
-        poll.poll(TURN_S * 1e3)
+        poll.poll(POLL_PERIOD_S * 1e3)
         if not self._interrupts.urgent:
             _drain(self._interrupts.wake_fd)
-        self._refuse_suspension()
+        self._ignore_suspension()
         self._control.serve()
         statuses.listen()
         now_s = time.monotonic()
@@ -191,7 +191,7 @@ class Supervisor:
             if node.state is State.FINISHED and node.settings.ends_run:
                 return Outcome(exit_codes.OK, f"{node.name} has finished")
             if node.state in (State.GIVEN_UP, State.FINISHED) and node.settings.required:
-                reason = f"{node.name} {node.sentence}; the run cannot go on without it"
+                reason = f"{node.name} {node.detail}; the run cannot continue without it"
                 return Outcome(exit_codes.FAILURE, reason)
             if node.came_back and node.settings.restart_ends_run:
                 return Outcome(exit_codes.FAILURE, f"{node.name} {node.came_back}; the run has ended")
@@ -202,13 +202,15 @@ class Supervisor:
         if self._stuck():
             return Outcome(exit_codes.FAILURE, f"never started: {', '.join(self._stuck())}")
         if time.monotonic() > limit_s:
-            return Outcome(exit_codes.TIME_LIMIT, f"not at its end within {self._file.time_limit_s:g} s")
+            return Outcome(exit_codes.TIME_LIMIT, f"not finished within {self._file.time_limit_s:g} s")
         return None
 
-    def _refuse_suspension(self) -> None:
+    def _ignore_suspension(self) -> None:
         if self._interrupts.suspended:
             self._interrupts.suspended = False
-            self._view.problem("Ctrl-Z does nothing, as the nodes would go on without supervision; Ctrl-C ends the run")
+            self._view.problem(
+                "Ctrl-Z does nothing, as the nodes would run on without supervision; Ctrl-C ends the run"
+            )
 
     def _stuck(self) -> list[str]:
         """Nodes that wait for one that was given up."""
@@ -233,9 +235,9 @@ class Supervisor:
                 elif time.monotonic() > wave_end_s:
                     for name in wave:
                         self.nodes[name].kill()
-                for node, code in self._turn(statuses):
+                for node, code in self._poll(statuses):
                     if node.state is not State.STOPPING:  # ended by itself while others were being stopped
-                        self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was asked to end")
+                        self._view.problem(f"{node.name} {exit_codes.describe(code)} before it was requested to end")
                     node.stopped(code, time.monotonic() - begun_s)
 
     def _kill_all(self) -> None:
@@ -243,8 +245,8 @@ class Supervisor:
             node.kill()
 
     def _judge(self, module: str, outcome: Outcome) -> Outcome:
-        """Calls `after_run` with the run folder; a run that went well succeeds if it says so."""
-        command = [sys.executable, "-m", module, str(self._folder.path), *self._judging]
+        """Calls `after_run` with the run folder; its exit code decides whether a run without failure succeeds."""
+        command = [sys.executable, "-m", module, str(self._folder.path), *self._judge_options]
         judge = SupervisedProcess(command, folder=self._workspace, environment=self._environment, guard=self._guard)
         code = judge.ended()
         while code is None:
@@ -252,8 +254,8 @@ class Supervisor:
                 judge.kill()
             elif self._interrupts.first is not None:
                 judge.terminate()
-            self._refuse_suspension()
-            select.select([judge.pidfd], [], [], TURN_S)
+            self._ignore_suspension()
+            select.select([judge.pidfd], [], [], POLL_PERIOD_S)
             code = judge.ended()
         if self._interrupts.first is not None:
             return Outcome(
@@ -283,7 +285,7 @@ class Supervisor:
     def _show_log(self, node: SupervisedNode) -> None:
         path = self._folder.log(node.name)
         lines = "\n".join(f"    {line}" for line in last_lines(path, 20))
-        self._view.problem(f"{node.name} {node.sentence}. Last lines of {path}:\n{lines or '    (empty)'}")
+        self._view.problem(f"{node.name} {node.detail}. Last lines of {path}:\n{lines or '    (empty)'}")
 
 
 def stop_waves(file: LaunchFile) -> list[list[str]]:
@@ -304,14 +306,14 @@ def _drain(wake_fd: int) -> None:
 class Interrupts:
     """While the block lasts, the signals that end a run are counted instead of ending the process.
 
-    Those by which a terminal suspends a process do not suspend it: the nodes would go on, with nobody to end them.
+    Those by which a terminal suspends a process are ignored: the nodes would run on without supervision.
 
     Attributes:
         first: The first of these signals, None before.
         urgent: Whether SIGINT or SIGTERM came once more: end everything at once. A closed terminal may send several
             SIGHUP, so these do not count.
-        suspended: Whether somebody has pressed Ctrl-Z; reset by whoever says why that does nothing.
-        wake_fd: Readable after a signal, and when a child process has ended, was stopped (SIGSTOP) or goes on.
+        suspended: Whether somebody has pressed Ctrl-Z; reset by the caller that reports it.
+        wake_fd: Readable after a signal, and when a child process has ended, was stopped (SIGSTOP) or continued.
     """
 
     def __init__(self) -> None:

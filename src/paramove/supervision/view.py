@@ -26,7 +26,7 @@ _STYLES = {
     State.FAILED: "red",
     State.GIVEN_UP: "bold red",
 }
-_NOT_TO_BE_MISSED = (State.RESTARTING, State.GIVEN_UP, State.FAILED, State.DEGRADED)
+_NOTABLE = (State.RESTARTING, State.GIVEN_UP, State.FAILED, State.DEGRADED)
 REFRESH_S = 0.5
 
 
@@ -35,7 +35,7 @@ class LineView:
 
     Args:
         console: Prints.
-        output: To which it does so, if that may have to wait for a terminal.
+        output: Queue of the console's output, where a terminal may block.
     """
 
     def __init__(self, console: Console, output: QueuedOutput | None = None) -> None:
@@ -45,17 +45,17 @@ class LineView:
 
     @property
     def closed_by(self) -> signal.Signals | None:
-        """As the output says."""
+        """As `QueuedOutput.closed_by`."""
         return self._output.closed_by if self._output is not None else None
 
     def changed(self, node: SupervisedNode) -> None:
-        """`12.3 s  camera  ready  sentence`."""
+        """`12.3 s  camera  ready  detail`."""
         style = _STYLES.get(node.state, "")
         state = Text(f"{node.state.value:<11}", style=style)
-        self._line(Text.assemble(f"{node.name:<16} ", state, f" {node.sentence}"))
+        self._line(Text.assemble(f"{node.name:<16} ", state, f" {node.detail}"))
 
     def story(self, text: str) -> None:
-        """The robot's words or a new stage, set off from the states of nodes."""
+        """The robot's speech or a new stage, in bold."""
         self._line(Text(printable(text), style="bold"))
 
     def problem(self, text: str) -> None:
@@ -74,7 +74,7 @@ class LineView:
 
 
 class TableView(LineView):
-    """The story scrolls above a table of the nodes; states are told in the table only."""
+    """The story scrolls above a table of the nodes; states appear in the table only."""
 
     def __init__(self, console: Console, output: QueuedOutput | None = None) -> None:
         super().__init__(console, output)
@@ -85,12 +85,12 @@ class TableView(LineView):
         self._refreshed_s = 0.0
 
     def changed(self, node: SupervisedNode) -> None:
-        """Only what a person should not miss in the table becomes a line."""
-        if node.event in ("suspended", "resumed", "fault") or node.state in _NOT_TO_BE_MISSED:
+        """Prints a line for notable changes only."""
+        if node.event in ("suspended", "resumed", "fault") or node.state in _NOTABLE:
             super().changed(node)
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
-        """Draws the table anew, at most twice a second and no faster than the terminal takes it."""
+        """Redraws the table, at most twice a second and no faster than the terminal takes it."""
         self._nodes = list(nodes)
         now_s = time.monotonic()
         if now_s - self._refreshed_s < REFRESH_S or (self._output is not None and self._output.is_behind):
@@ -99,7 +99,7 @@ class TableView(LineView):
         self._live.update(self._table(self._nodes, now_s), refresh=True)
 
     def close(self) -> None:
-        """Leaves the last table standing."""
+        """Draws the table for the last time."""
         self._live.update(self._table(self._nodes, time.monotonic()), refresh=True)
         self._live.stop()
 
@@ -109,7 +109,7 @@ class TableView(LineView):
             table.add_column(header, no_wrap=True)
         for header in ("per s", "lost", "CPU %", "MB", "restarts"):
             table.add_column(header, justify="right", no_wrap=True)
-        table.add_column("says", ratio=1, no_wrap=True, overflow="ellipsis")
+        table.add_column("message", ratio=1, no_wrap=True, overflow="ellipsis")
         for node in nodes:
             gauge = self._gauges.setdefault(node.name, _Gauge())
             gauge.read(node, now_s)
@@ -119,7 +119,7 @@ class TableView(LineView):
                 Text(node.state.value, style=style),
                 *gauge.cells(),
                 str(node.restarts or ""),
-                Text(node.sentence),
+                Text(node.detail),
             )
         return table
 
@@ -137,7 +137,7 @@ class _Gauge:
         self._cpu = self._megabytes = 0.0
 
     def read(self, node: SupervisedNode, now_s: float) -> None:
-        """Measures anew; the rate is what the node says it handled since the last change of that count."""
+        """Measures again; the rate is from the node's count of handled messages since its last change."""
         if node.process is None:
             self._pid, self._process = 0, None
             return

@@ -41,13 +41,13 @@ def check_wiring(launch: Launch, interfaces: Mapping[str, Interface], workspace:
     Every topic with a subscriber has a publisher, no topic has two, only nodes with `truth: true` know a truth topic,
     topics that the file names exist, and each node's own Config takes its parameters.
 
-    Raises DocumentError with all that is wrong, each at its place in the launch file.
+    Raises DocumentError with every error and its position in the launch file.
     """
     raise_any([*topic_findings(launch, interfaces), *wrong_parameters(launch, interfaces, workspace)])
 
 
 def topic_findings(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
-    """What is wrong with the clock and the topics."""
+    """Errors of the clock and the topics."""
     yield from _clock(launch, interfaces)
     yield from _publishers(launch, interfaces)
     yield from _subscribers(launch, interfaces)
@@ -111,7 +111,7 @@ def _subscribers(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterato
 
 
 def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterator[DocumentError]:
-    """Topics that `remaps` and `optional_topics` name and that are not there, or are of another kind."""
+    """Topics that `remaps` and `optional_topics` name and that do not exist, or are of another type."""
     for name, interface in interfaces.items():
         node = launch.file.nodes[name]
         subscribes = {topic.name for topic in interface.subscribes}
@@ -127,15 +127,15 @@ def _named_topics(launch: Launch, interfaces: Mapping[str, Interface]) -> Iterat
             if topic not in used:
                 yield launch.error(path, f"'{name}' does not use {topic!r}; {nearest(topic, used)}")
                 continue
-            refusal = _refused_target(used[topic], target)
-            if refusal:
-                yield launch.error(path, refusal)
+            problem = _target_problem(used[topic], target)
+            if problem:
+                yield launch.error(path, problem)
 
 
-def _refused_target(topic: Topic, target: str) -> str:
+def _target_problem(topic: Topic, target: str) -> str:
     """Why a topic cannot be remapped to `target`; "" if it can."""
     if not topics.is_name(target):
-        return f"{target!r} is no name of a topic: parts of lower-case letters, digits and '_', joined by '/'"
+        return f"{target!r} is not a name of a topic: parts of lower-case letters, digits and '_', joined by '/'"
     if topic.truth or target.startswith(("truth/", "status/")):
         return f"{topic.name} cannot become {target}: truth and status topics are not remapped"
     known = {other.name: other for other in topics.TOPICS}.get(target, topic)

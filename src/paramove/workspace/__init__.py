@@ -1,7 +1,7 @@
 """The workspace: launch files, nodes, simulation and robot descriptions.
 
 It is layered. Files of the current folder come first; each one that is missing there is taken from the installed
-workspace: that of the clone, or the one that the wheel carries beside this file.
+workspace: that of the clone, or the one that the wheel installs next to this file.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from pathlib import Path
 
 PARTS = ("launch", "nodes", "robot_description", "sim")
 """Folders of a workspace."""
-_CARRIED = Path(__file__).resolve().parent
+_IN_WHEEL = Path(__file__).resolve().parent
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where the files of applications are looked for.
+    """Folders that are searched for the files of applications.
 
     Attributes:
         folders: The first one first. It is the working directory of the nodes, and runs are recorded below it.
@@ -28,11 +28,11 @@ class Workspace:
 
     @classmethod
     def at(cls, folder: Path) -> Workspace:
-        """The workspace for somebody who works in `folder`.
+        """The workspace of the working directory `folder`.
 
         Its first layer is the nearest folder at or above that holds `launch/` and `nodes/`, or else `folder` itself.
         """
-        above = (place for place in (folder, *folder.parents) if _is_whole(place))
+        above = (one for one in (folder, *folder.parents) if _is_whole(one))
         return cls(tuple(dict.fromkeys((next(above, folder), *_installed()))))
 
     @classmethod
@@ -48,12 +48,12 @@ class Workspace:
     @property
     def clone(self) -> Path | None:
         """The clone that the library is installed from in place; None for a wheel."""
-        return self.folders[-1] if self.folders[-1] != _CARRIED else None
+        return self.folders[-1] if self.folders[-1] != _IN_WHEEL else None
 
     def find(self, path: str | Path) -> Path:
         """The file or folder at a relative path in the first layer that has it; in the root where none has it."""
-        places = [folder / path for folder in self.folders]
-        return next((place for place in places if place.exists()), places[0])
+        candidates = [folder / path for folder in self.folders]
+        return next((candidate for candidate in candidates if candidate.exists()), candidates[0])
 
     def names(self, folder: str | Path, pattern: str = "*.yaml") -> list[str]:
         """Names, without suffix, of the files in a folder of any layer."""
@@ -66,17 +66,17 @@ class Workspace:
 
     def files(self) -> dict[str, Path]:
         """Every file of the workspace by its relative path, each in the first layer that has it."""
-        found: dict[str, Path] = {}
+        files: dict[str, Path] = {}
         for layer in reversed(self.folders):
             for part in PARTS:
                 for file in sorted((layer / part).rglob("*")):
                     if file.is_file() and file.suffix != ".pyc":
-                        found[file.relative_to(layer).as_posix()] = file
-        return dict(sorted(found.items()))
+                        files[file.relative_to(layer).as_posix()] = file
+        return dict(sorted(files.items()))
 
     @cached_property
     def digest(self) -> str:
-        """Twelve hexadecimal digits of the names and contents of all files: what else decides a run than its seed."""
+        """Twelve hexadecimal digits of the names and contents of all files: with the seed they determine a run."""
         digest = hashlib.sha256()
         for name, file in self.files().items():
             content = file.read_bytes()
@@ -92,5 +92,5 @@ def _is_whole(folder: Path) -> bool:
 
 
 def _installed() -> list[Path]:
-    """What the wheel carries, or the clone that the library lies in."""
-    return [folder for folder in (_CARRIED, _CARRIED.parents[2]) if _is_whole(folder)][:1]
+    """The workspace in the wheel, or the clone that the library is in."""
+    return [folder for folder in (_IN_WHEEL, _IN_WHEEL.parents[2]) if _is_whole(folder)][:1]

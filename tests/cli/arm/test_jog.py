@@ -151,7 +151,7 @@ def test_an_arm_that_still_stops_is_armed_once_it_rests(folder, monkeypatch):
         done = jogged(monkeypatch, arm, "a")
     assert done.exit_code == 0, done.output
     assert arm.heard == ["arm from the terminal", "pan", "stop", "arm from the terminal"]
-    assert "the arm still stops: it is armed once it rests" in done.stdout
+    assert "the arm is still stopping: it is armed once it rests" in done.stdout
 
 
 def test_a_terminal_that_takes_nothing_keeps_no_key_from_the_arm(folder):
