@@ -183,5 +183,5 @@ def test_a_board_too_small_to_tell_its_tilt():
     which = view.corner_ids
     draw = np.random.default_rng(1)
     points = eye.project(board.corners()[which]) + draw.normal(0, 0.3, (len(which), 2))
-    with pytest.raises(CalibrationError, match="looks too small to tell its tilt"):
+    with pytest.raises(CalibrationError, match="too small to determine its tilt"):
         place_camera(lens, [replace(view, points=points, first_id=40)], board)

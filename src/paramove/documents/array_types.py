@@ -11,4 +11,4 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Image = NDArray[Any]
-"""uint8, [H, W] or [H, W, 3] in the order blue, green, red; OpenCV's own annotations distinguish only integer and floating."""
+"""uint8, [H, W] or [H, W, 3] in the order blue, green, red; OpenCV's annotations know only integer and floating."""

@@ -68,7 +68,9 @@ def _opening(contour: Image, shape: tuple[int, ...]) -> Opening | None:
         return None
     moments = cv2.moments(contour)
     determinant = moments["mu20"] * moments["mu02"] - moments["mu11"] ** 2
-    if area**2 < ROUNDNESS * 4 * np.pi * np.sqrt(determinant) or area < SOLIDITY * cv2.contourArea(cv2.convexHull(contour)):
+    if area**2 < ROUNDNESS * 4 * np.pi * np.sqrt(determinant) or area < SOLIDITY * cv2.contourArea(
+        cv2.convexHull(contour)
+    ):
         return None
     return Opening(
         u_px=2 * moments["m10"] / moments["m00"] + 0.5,

@@ -9,7 +9,7 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize
 from paramove.objects.homography import PlaneHomography
-from paramove.objects.object_motion import Transition, MotionThresholds, ObjectMotion, State
+from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
 from paramove.objects.openings import OpeningTracker
 from paramove.objects.pointing import Pointing, PointingThresholds
 from paramove.objects.sinking import Sample
@@ -36,7 +36,7 @@ class RecognizerOptions:
 class Recognizer:
     """Keeps a small state per object and reports its changes, in the order of names, objects before the hand.
 
-    All durations are observation times: they do not advance while there are no images (the camera restarts, it is dark).
+    All durations are observation times: they do not advance without images (the camera restarts, it is dark).
     """
 
     def __init__(self, options: RecognizerOptions | None = None) -> None:
@@ -73,7 +73,9 @@ class Recognizer:
         gestures: list[Gesture] = []
         for name, transition in self._follow_objects(tracked, hand, now_s):
             gestures.append(self._gesture(tracked, name, transition, homography))
-        gestures += [self._gesture(tracked, "", transition, homography) for transition in self._hand.update(hand, now_s)]
+        gestures += [
+            self._gesture(tracked, "", transition, homography) for transition in self._hand.update(hand, now_s)
+        ]
         pointed_at = self._pointed_at(hand, now_s, homography)
         if pointed_at is not None:
             gestures.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
@@ -99,7 +101,9 @@ class Recognizer:
             if name not in self._objects:
                 self._objects[name] = ObjectMotion(name, self._full_size, self._options.motion)
             near = hand is not None and _touch(hand, self._last_detected[name])
-            transitions += [(name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)]
+            transitions += [
+                (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)
+            ]
         return transitions
 
     def _pointed_at(
@@ -115,7 +119,9 @@ class Recognizer:
         if name is None:
             return None
         position = resting[name]
-        return name, Transition(Gesture.KIND_POINTED_AT, position.u_px, position.v_px, self._objects[name].visible_fraction(position))
+        return name, Transition(
+            Gesture.KIND_POINTED_AT, position.u_px, position.v_px, self._objects[name].visible_fraction(position)
+        )
 
     def _homography(self, calibration: PlaneCalibration | None) -> PlaneHomography | None:
         if calibration is None:

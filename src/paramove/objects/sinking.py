@@ -95,7 +95,7 @@ class Sample:
 def last_position(name: str, samples: Sequence[Sample], full_size: FullSize) -> tuple[float, float]:
     """Middle (u, v), px, of an object that has vanished, at its last full height.
 
-    If it sank into an opening, the result is nearer to the camera than the object was, by the gap between it and the rim.
+    If it sank into an opening, the result is nearer to the camera than the object, by the gap between it and the rim.
 
     Args:
         samples: at least one, in the order of time, up to the last detection.

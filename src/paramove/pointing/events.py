@@ -56,7 +56,12 @@ class PointingEvents:
             return None
         self._last_reported = target.number
         gesture = Gesture(
-            kind=Gesture.KIND_POINTED_AT, located=True, frame=estimate.frame, x=position.x, y=position.y, confidence=confidence
+            kind=Gesture.KIND_POINTED_AT,
+            located=True,
+            frame=estimate.frame,
+            x=position.x,
+            y=position.y,
+            confidence=confidence,
         )
         gesture.captured.CopyFrom(estimate.captured)
         return gesture

@@ -73,7 +73,9 @@ class LastPartModel:
         """Judges points over time (FRAMES, 3 n), m, in the models' frame."""
         examined = self._pointing.examine(window)
         estimate = examined.estimate
-        return Judgement(estimate.theta, estimate.covariance, examined.outlier_score, examined.p_value, examined.log_density)
+        return Judgement(
+            estimate.theta, estimate.covariance, examined.outlier_score, examined.p_value, examined.log_density
+        )
 
     def lead(self, window: Floats, judged: Judgement) -> float:
         """Logarithm of a window's density as pointing over that as reaching; infinite if reaching does not compete."""

@@ -150,7 +150,9 @@ class PointingWindow:
         position = self._placement.in_world(table_place(best.theta))
         slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
         deviation = np.sqrt(np.einsum("pi,pq,qi->i", slopes, best.covariance, slopes))
-        return WindowEstimate(now_ns, best, position, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best))
+        return WindowEstimate(
+            now_ns, best, position, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best)
+        )
 
     def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
         options = self._options

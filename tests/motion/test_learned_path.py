@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.motion.learned_way import AHEAD, LearnedWay, PlacedPerson
+from paramove.motion.learned_path import AHEAD, LearnedPath, PlacedPerson
 from tests.motion.reaching import movement
 
 AXIS = (0.012, 0.0)
@@ -16,7 +16,7 @@ def person() -> PlacedPerson:
     return PlacedPerson(movement(), MIDDLE, AXIS, 40)
 
 
-def way() -> LearnedWay:
+def way() -> LearnedPath:
     return person().approach(MIDDLE)
 
 
@@ -32,7 +32,7 @@ def test_goes_from_the_beginning_to_the_end_beside_a_straight_line() -> None:
 def test_of_a_reach_that_was_not_moved_it_is_the_movement_itself() -> None:
     """About an axis far away an arc is straight, so all that is left is the smoothing of the states."""
     states, opening = movement().approach(movement().centre)
-    learned = LearnedWay.of(states, opening, len(states))
+    learned = LearnedPath.of(states, opening, len(states))
     back = learned.between(states.gripper[0], states.gripper[-1], (-1e5, 0.0))
     gaps = np.linalg.norm(back[:, None] - states.gripper[None], axis=-1)
     assert gaps.min(axis=0).mean() < 0.008
@@ -52,12 +52,12 @@ def test_between_two_points_it_turns_about_the_axis() -> None:
 def test_a_shorter_way_deviates_less_in_proportion() -> None:
     learned = way()
     far = np.array([0.2, 0.0, 0.0]) + np.array([0.0, 0.0, 1.0]) * learned.length
-    for share in (1.0, 0.5):
-        end = np.array([0.2, 0.0, 0.0]) + share * (far - [0.2, 0.0, 0.0])
+    for fraction in (1.0, 0.5):
+        end = np.array([0.2, 0.0, 0.0]) + fraction * (far - [0.2, 0.0, 0.0])
         beside = learned.between(np.array([0.2, 0.0, 0.0]), end, AXIS) - learned.milder(0.0).between(
             np.array([0.2, 0.0, 0.0]), end, AXIS
         )
-        np.testing.assert_allclose(beside[:, :2], share * learned.beside[:, :2], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(beside[:, :2], fraction * learned.beside[:, :2], rtol=0, atol=1e-9)
 
 
 def test_raised_is_higher_in_the_middle_only() -> None:
