@@ -80,7 +80,7 @@ def test_words_say_how_to_lay_it():
 
 @pytest.mark.parametrize(
     ("paper", "square", "found"),
-    [("a5", None, "paper 'a5' is not known: a4"), ("a4", 0.045, "on a4 20 to 31 mm fit"), ("a4", 0.01, "10 mm found")],
+    [("a5", None, "paper 'a5': a4"), ("a4", 0.045, "on a4 20 to 31 mm fit"), ("a4", 0.01, "10 mm found")],
 )
 def test_sheets_that_cannot_be(paper, square, found):
     with pytest.raises(BoardError, match=re.escape(found)):

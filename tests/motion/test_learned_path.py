@@ -23,8 +23,8 @@ def way() -> LearnedPath:
 def test_goes_from_the_beginning_to_the_end_beside_a_straight_line() -> None:
     learned = way()
     np.testing.assert_allclose(learned.progress[[0, -1]], [0.0, 1.0], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(learned.beside[[0, -1]], 0.0, rtol=0, atol=1e-9)
-    assert np.linalg.norm(learned.beside, axis=1).max() > 0.02
+    np.testing.assert_allclose(learned.deviation[[0, -1]], 0.0, rtol=0, atol=1e-9)
+    assert np.linalg.norm(learned.deviation, axis=1).max() > 0.02
     assert learned.opening.min() >= 0.0
     assert learned.opening.max() <= 1.0
 
@@ -54,14 +54,14 @@ def test_a_shorter_way_deviates_less_in_proportion() -> None:
     far = np.array([0.2, 0.0, 0.0]) + np.array([0.0, 0.0, 1.0]) * learned.length
     for fraction in (1.0, 0.5):
         end = np.array([0.2, 0.0, 0.0]) + fraction * (far - [0.2, 0.0, 0.0])
-        beside = learned.between(np.array([0.2, 0.0, 0.0]), end, AXIS) - learned.milder(0.0).between(
+        deviation = learned.between(np.array([0.2, 0.0, 0.0]), end, AXIS) - learned.milder(0.0).between(
             np.array([0.2, 0.0, 0.0]), end, AXIS
         )
-        np.testing.assert_allclose(beside[:, :2], fraction * learned.beside[:, :2], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(deviation[:, :2], fraction * learned.deviation[:, :2], rtol=0, atol=1e-9)
 
 
 def test_raised_is_higher_in_the_middle_only() -> None:
-    lifted = way().raised(0.05).beside - way().beside
+    lifted = way().raised(0.05).deviation - way().deviation
     np.testing.assert_allclose(lifted[[0, -1]], 0.0, rtol=0, atol=1e-12)
     assert lifted[:, 2].max() == pytest.approx(0.05, rel=0.02)
 
@@ -76,7 +76,7 @@ def test_the_person_turns_towards_what_lies_far_aside() -> None:
         np.testing.assert_allclose(other.progress, ways[0].progress, rtol=0, atol=1e-9)
         cosine, sine = np.cos(turn), np.sin(turn)
         rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        np.testing.assert_allclose(other.beside, ways[0].beside @ rotation.T, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(other.deviation, ways[0].deviation @ rotation.T, rtol=0, atol=1e-9)
 
 
 def test_the_middle_of_the_training_lies_where_it_was_placed() -> None:
