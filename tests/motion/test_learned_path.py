@@ -1,4 +1,4 @@
-"""A person's reaching as progress along an arm's own way, deviation from it and opening of the hand."""
+"""A person's reaching as progress along an arm's own path, deviation from it and opening of the hand."""
 
 from __future__ import annotations
 

@@ -152,8 +152,8 @@ class CalibratedCamera:
         return calibration, pose
 
     @classmethod
-    def from_foxglove(cls, calibration: CameraCalibration, place: FrameTransform) -> CalibratedCamera:
-        """The camera of two standard messages, `place` being its pose in the world. Raises InputError."""
+    def from_foxglove(cls, calibration: CameraCalibration, pose: FrameTransform) -> CalibratedCamera:
+        """The camera of two standard messages, `pose` being its pose in the world. Raises InputError."""
         if calibration.D and calibration.distortion_model not in _MODELS.values():
             raise InputError(
                 f"camera {calibration.frame_id!r}: distortion model {calibration.distortion_model!r} found, "
@@ -161,7 +161,7 @@ class CalibratedCamera:
             )
         if len(calibration.K) != 9:
             raise InputError(f"camera {calibration.frame_id!r}: {len(calibration.K)} numbers in K found, 9 expected")
-        turn, shift = place.rotation, place.translation
+        turn, shift = pose.rotation, pose.translation
         quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
         if not 0.99 < np.linalg.norm(quaternion) < 1.01:
             raise InputError(

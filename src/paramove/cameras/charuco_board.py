@@ -201,14 +201,14 @@ class BoardFinder:
         which = ids.ravel()[order].astype(np.int32)
         points = (corners.reshape(-1, 2).astype(np.float64)[order] + 0.5) / times - 0.5
         on_board = np.stack(np.divmod(which, COLUMNS - 1), axis=1)[:, ::-1].astype(np.float64)
-        kept = _crossing(gray, on_board, points)
-        if kept.sum() < MIN_CORNERS:
+        usable = _crossing(gray, on_board, points)
+        if usable.sum() < MIN_CORNERS:
             return None
-        kept[kept] = _agreeing(on_board[kept], points[kept])
-        if kept.sum() < MIN_CORNERS or _on_one_line(which[kept]):
+        usable[usable] = _agreeing(on_board[usable], points[usable])
+        if usable.sum() < MIN_CORNERS or _on_one_line(which[usable]):
             return None
         size = (int(gray.shape[1]), int(gray.shape[0]))
-        return BoardView(name, which[kept], points[kept], size, first)
+        return BoardView(name, which[usable], points[usable], size, first)
 
 
 def _board_of(marker_ids: NDArray[np.int32]) -> int | None:
@@ -242,21 +242,21 @@ def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
     homography, inliers = cv2.findHomography(in_image, on_board, cv2.RANSAC, MAX_MISFIT)
     if homography is None or inliers is None:
         return np.zeros(len(on_board), dtype=np.bool_)
-    kept = np.asarray(inliers.ravel() > 0)
-    while kept.sum() >= MIN_CORNERS:
-        view, _ = cv2.findHomography(on_board[kept], in_image[kept])
+    usable = np.asarray(inliers.ravel() > 0)
+    while usable.sum() >= MIN_CORNERS:
+        view, _ = cv2.findHomography(on_board[usable], in_image[usable])
         projected = cv2.perspectiveTransform(on_board[:, None], view)[:, 0]
         x, y = (on_board - on_board.mean(axis=0)).T
-        bends = kept.sum() >= ENOUGH_TO_BEND
+        bends = usable.sum() >= ENOUGH_TO_BEND
         terms = np.column_stack([np.ones_like(x), x, y, *([x * x, x * y, y * y] if bends else [])])
-        weights = np.linalg.lstsq(terms[kept], (in_image - projected)[kept], rcond=None)[0]
+        weights = np.linalg.lstsq(terms[usable], (in_image - projected)[usable], rcond=None)[0]
         misfit = np.linalg.norm(in_image - projected - terms @ weights, axis=1)
-        limit = max(MIN_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[kept])))
-        worst = int(np.argmax(np.where(kept, misfit, 0.0)))  # one at a time, as it bends the others' fit
+        limit = max(MIN_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[usable])))
+        worst = int(np.argmax(np.where(usable, misfit, 0.0)))  # one at a time, as it bends the others' fit
         if misfit[worst] <= limit:
             break
-        kept[worst] = False
-    return kept
+        usable[worst] = False
+    return usable
 
 
 def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:

@@ -67,7 +67,9 @@ Word = Annotated[str, Field(min_length=1, max_length=80)]
 class Segment(_Checked):
     """One movement in a recording."""
 
-    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(description="file, beside labels.yaml")
+    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="file in the folder of labels.yaml"
+    )
     start: float = Field(ge=0.0, description="s from the first pose of the recording; the first frame of the movement")
     end: float = Field(gt=0.0, description="s; the last frame of the movement")
     action: Word = Field(description="what is done, such as reaching")

@@ -185,7 +185,7 @@ def at_target(progress: Floats, timing: Timing) -> Floats:
 
 
 def grasping(progress: Floats, timing: Timing) -> Floats:
-    """Distance of thumb and index finger: opens on the way, closes at the target, releases, relaxes. Shape (T,)."""
+    """Distance of thumb and index finger: opens on approach, closes at the target, releases, relaxes. Shape (T,)."""
     opening = minimum_jerk(progress, timing.depart, 0.75 * timing.arrive)
     closing = minimum_jerk(progress, timing.close, timing.closed)
     releasing = minimum_jerk(progress, timing.release, timing.release + 0.05)
