@@ -92,7 +92,7 @@ def test_an_image_of_another_size_is_left_out_and_told(parameters):
     video = tracker(parameters)
     assert list(video.see("camera_1", 0, np.zeros((12, 16, 3), np.uint8))) == []
     assert video.trouble() == (
-        "camera_1 gives 16 x 12 px, calibrated are 160 x 120 px: set its resolution or calibrate it anew"
+        "camera_1 gives 16 x 12 px, calibrated are 160 x 120 px: set its resolution or calibrate it again"
     )
 
 

@@ -159,7 +159,9 @@ def test_messages_of_other_motions_and_joints_change_nothing() -> None:
 
 def test_a_task_out_of_reach_is_refused_before_the_arm_moves() -> None:
     steps = (*STEPS, ReachStep(reach=(0.6, 0.0, 0.1)))
-    with pytest.raises(InputError, match=r"task 3 of 3, reach for \(0.600, .*the nearest place that can be reached is"):
+    with pytest.raises(
+        InputError, match=r"task 3 of 3, reach for \(0.600, .*the nearest position that can be reached is"
+    ):
         ReachTask(reaching("open_manipulator_x"), steps, "reach-0")
     with pytest.raises(InputError, match="no tasks: expected a list"):
         ReachTask(reaching("open_manipulator_x"), (), "reach-0")

@@ -93,7 +93,7 @@ def test_a_wrong_file_is_refused_with_what_would_help(tmp_path):
 
 def test_a_wrong_camera_is_refused():
     camera = lens_camera()
-    with pytest.raises(InputError, match="no rotation"):
+    with pytest.raises(InputError, match="not a rotation"):
         CalibratedCamera("a", 640, 480, camera.matrix, LENS, np.diag([1.0, 1.0, 2.0, 1.0]))
     with pytest.raises(InputError, match="distortion of shape"):
         CalibratedCamera("a", 640, 480, camera.matrix, np.zeros(3), camera.camera_from_world)

@@ -152,7 +152,7 @@ def test_different_resolutions(seen, placed):
 
 def test_wrong_squares_are_suspected(seen, placed):
     _, views, table = seen["left"]
-    with pytest.raises(CalibrationError, match=r"wrong size .* says 30 mm, .* board printed with 45 mm: measure"):
+    with pytest.raises(CalibrationError, match=r"wrong size .* 30 mm.* board printed with 45 mm: measure"):
         check_square(Board(0.03), views)
     assert "43.2 mm on a board printed for 45 mm" in check_square(Board(0.0432), views)[0]
     assert check_square(BOARD, views) == []
@@ -183,5 +183,5 @@ def test_a_board_too_small_to_tell_its_tilt():
     which = view.corner_ids
     draw = np.random.default_rng(1)
     points = eye.project(board.corners()[which]) + draw.normal(0, 0.3, (len(which), 2))
-    with pytest.raises(CalibrationError, match="looks too small to tell its tilt"):
+    with pytest.raises(CalibrationError, match="too small to determine its tilt"):
         place_camera(lens, [replace(view, points=points, first_id=40)], board)

@@ -75,7 +75,7 @@ def test_waiting_ends(pictures, monkeypatch):
     live = LiveImages("camera0", timed(itertools.repeat(nothing)), lambda sentence: None)
     with pytest.raises(CalibrationError, match="no new view of the board for 2 s, 0 of 15 taken: more light"):
         live.held()
-    with pytest.raises(CalibrationError, match="the board on the table was not seen lying still for 2 s"):
+    with pytest.raises(CalibrationError, match="the board on the table was not detected lying still for 2 s"):
         live.table()
 
 
@@ -83,5 +83,5 @@ def test_a_board_in_motion_is_not_on_the_table(pictures, monkeypatch):
     monkeypatch.setattr(calibration_images, "TIMEOUT_S", 3.0)
     moving = itertools.cycle([picture for picture in pictures[:4] for _ in range(4)])
     live = LiveImages("camera0", timed(moving), lambda sentence: None)
-    with pytest.raises(CalibrationError, match="was not seen lying still for 3 s"):
+    with pytest.raises(CalibrationError, match="was not detected lying still for 3 s"):
         live.table()

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from paramove.cameras.charuco_board import MARKER_SHARE, MARKERS, Board, BoardError, BoardFinder, dictionary
+from paramove.cameras.charuco_board import MARKER_FRACTION, MARKERS, Board, BoardError, BoardFinder, dictionary
 from paramove.cameras.charuco_sheet import PAPERS, board_sheet, marker_sheet
 from paramove.observation.markers import DEFAULT_MARKERS
 from tests.cameras.board_scene import Sheet, blank, camera, looking, raster, rectangles_mm
@@ -30,7 +30,7 @@ def test_pages_have_their_size_and_squares_are_true(paper):
     np.testing.assert_allclose(np.array(scale) * MM_PER_POINT, 1.0, rtol=1e-8, atol=0)  # the drawing's unit is 1 mm
     sides = np.unique(rectangles_mm(pdf)[:, 2:].round(4))
     square = PAPERS[paper].square_mm
-    np.testing.assert_allclose(sides, [MARKER_SHARE * square / 6, square], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(sides, [MARKER_FRACTION * square / 6, square], rtol=0, atol=1e-4)
     assert (rectangles_mm(pdf)[:, :2] >= 6.0).all(), "printers leave a border of 6 mm white"
 
 
@@ -80,7 +80,7 @@ def test_words_say_how_to_lay_it():
 
 @pytest.mark.parametrize(
     ("paper", "square", "found"),
-    [("a5", None, "paper 'a5' is not known: a4"), ("a4", 0.045, "on a4 20 to 31 mm fit"), ("a4", 0.01, "10 mm found")],
+    [("a5", None, "paper 'a5': a4"), ("a4", 0.045, "on a4 20 to 31 mm fit"), ("a4", 0.01, "10 mm found")],
 )
 def test_sheets_that_cannot_be(paper, square, found):
     with pytest.raises(BoardError, match=re.escape(found)):

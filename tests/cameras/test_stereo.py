@@ -85,7 +85,7 @@ def test_cameras_at_one_place_are_refused():
     turned = camera("turned", looking((1.0, 0.4, 0.503), (0.0, 0.0, 0.1)))
     with pytest.raises(StereoError, match=r"left, turned stand 3\.0 mm apart.* Was one camera calibrated twice\?"):
         StereoRig((LEFT, turned))
-    with pytest.raises(StereoError, match="1 camera found: places in space need at least two"):
+    with pytest.raises(StereoError, match=r"1 camera found: .* need at least two"):
         StereoRig((LEFT,))
 
 

@@ -55,7 +55,7 @@ def test_markers_are_written(tmp_path):
     [
         (("--square", "30"), 78, "--square '30': a length with its unit expected, such as 30mm"),
         (("--square", "90mm"), 78, "squares of 90 mm found; on a4 20 to 31 mm fit"),
-        (("--paper", "foolscap"), 78, "paper 'foolscap' is not known: a4, a3, letter, tabloid expected"),
+        (("--paper", "foolscap"), 78, "paper 'foolscap': a4, a3, letter, tabloid expected"),
     ],
 )
 def test_boards_that_are_refused(tmp_path, words, code, told):
@@ -134,7 +134,7 @@ def copied(folders, tmp_path, wanted):
             "too few views: the board was found in 3 images",
         ),
         (lambda name: name.startswith("view"), "30mm", "the board on the table was not found: lay it down"),
-        (lambda name: name != "empty", "60mm", "wrong size of the squares? --square says 60 mm"),
+        (lambda name: name != "empty", "60mm", "wrong size of the squares? --square is 60 mm"),
         (lambda name: True, "30", "--square '30': a length with its unit expected"),
     ],
     ids=["no board", "few", "no table", "square", "unit"],

@@ -177,7 +177,7 @@ def test_import_refuses_lost_points_with_the_remedy(csv, tmp_path):
 
 def test_wrong_arguments_of_import(csv, tmp_path):
     to = ("--to", tmp_path / "set")
-    assert "does not tell its unit; give --unit" in refused(78, "import", csv, *to)
+    assert "does not define its unit; give --unit" in refused(78, "import", csv, *to)
     assert "there is no file" in refused(66, "import", tmp_path / "no.c3d", *to)
     assert "axes 'up'" in refused(78, "import", csv, *to, "--unit", "mm", "--axes", "up")
     assert "has no point 'RFIN' for index" in refused(78, "import", csv, *to, "--unit", "mm", "--point", "index=RFIN")

@@ -95,7 +95,7 @@ def test_phase_runs_through_three_parts_in_order() -> None:
 
 def test_what_cannot_be_blended_is_refused() -> None:
     line = np.linspace(0.0, 1.0, 100)[:, None]
-    with pytest.raises(ValueError, match="goes out, stays at a place and returns"):
+    with pytest.raises(ValueError, match="goes out, stays at a position and returns"):
         blended(line, line)
     movement = exact.demonstrate("pointing", table_place([0.5, 0.5]), np.random.default_rng(0))
     with pytest.raises(ValueError, match="dimensions, found 21 and 20"):

@@ -42,9 +42,9 @@ def test_longer_losses_and_those_at_the_ends_are_left():
     result, filled, left = fill_gaps(TIME, path, ("a", "b"), 0.1)
     assert filled == []
     assert [str(gap) for gap in left] == [
-        "a in frames 0-2 (it is not seen on both sides)",
+        "a in frames 0-2 (it is not valid on both sides)",
         "b in frames 20-30 (0.11 s)",
-        "b in frames 58-59 (it is not seen on both sides)",
+        "b in frames 58-59 (it is not valid on both sides)",
     ]
     assert np.isnan(result[20:31, 1]).all()
 

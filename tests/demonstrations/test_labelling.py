@@ -44,7 +44,7 @@ def test_lost_points_do_not_hide_movements():
     with pytest.raises(DemonstrationError, match=r"there is no point 'indx'.*did you mean 'index'"):
         movements_by_speed(time, positions, POINTS, "indx")
     positions[:, 4] = np.nan
-    with pytest.raises(DemonstrationError, match="index is seen in 0 frames"):
+    with pytest.raises(DemonstrationError, match="index is valid in 0 frames"):
         movements_by_speed(time, positions, POINTS)
 
 

@@ -43,7 +43,7 @@ def test_good_labels_are_read(tmp_path):
         ("action: pointing", "aktion: pointing", ":9:5: unknown key 'aktion'; did you mean 'action'?"),
         ("start: 0.5", "start: soon", ":5:25: segments.0.start: expected a number, without quotes, found 'soon'"),
         ("start: 0.5", "start: -1", "start: input should be greater than or equal to 0, found -1"),
-        ("start: 0.5", "start: .nan", ":5:32: '.nan' is refused: numbers are finite"),
+        ("start: 0.5", "start: .nan", ":5:32: '.nan' is rejected: numbers are finite"),
         ("end: 2,", "end: 0.25,", "the segment ends at 0.25 s, before its start at 0.5 s"),
         ("theta: [0.1, 2]", "theta: [0.1]", ":5:63: theta has 1 components; 'parameters' names 2: u, v"),
         ("recording: a.mcap", "recording: ../a.mcap", ":5:6: '../a.mcap': expected a file in the folder"),

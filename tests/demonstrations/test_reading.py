@@ -104,7 +104,7 @@ def test_a_long_loss_is_refused_with_its_frames(tmp_path):
     said = refused(labelled(tmp_path, ("a.mcap", 0.5, 1.5), ("a.mcap", 0, 1.8), ("a.mcap", 1.0, 1.5)))
     first, second = said.splitlines()
     assert "labels.yaml:2:5: a.mcap, 0.5 to 1.5 s: lost for longer than max_gap (0.1 s): wrist in frames 40-47" in first
-    assert "wrist in frames 40-47 (0.16 s); index in frames 80-90 (it is not seen on both sides)" in second
+    assert "wrist in frames 40-47 (0.16 s); index in frames 80-90 (it is not valid on both sides)" in second
     assert "Leave the point out with `points`, shorten the segment, or raise max_gap" in second
     assert len(DemonstrationSet.load(labelled(tmp_path, ("a.mcap", 0.5, 1.5), head="max_gap: 0.2\n"))) == 1
 

@@ -33,7 +33,7 @@ def test_a_smooth_path_keeps_its_shape(rate_hz):
 def test_rates_that_leave_nothing_are_refused():
     with pytest.raises(DemonstrationError, match="less than two frames at"):
         timing.resampled(movement(), 0.5)
-    with pytest.raises(ValueError, match="positive and finite"):
+    with pytest.raises(ValueError, match="positive, finite frame rate"):
         timing.resampled(movement(), 0.0)
 
 

@@ -111,7 +111,7 @@ def test_where_a_quadratic_model_turns_back_is_refused() -> None:
     square = int(np.flatnonzero((model.monomials_.exponents == [2, 0, 0]).all(axis=1))[0])
     bent[:, forward, square] -= 0.06
     movement = ModelledMovement(changed(model, coefficients_=bent), solver().length)
-    with pytest.raises(UnreachablePoseError, match="cm beside it; its training reached no such place"):
+    with pytest.raises(UnreachablePoseError, match="cm away; its training reached no such position"):
         movement.parameter_for(movement.reach_state, [[0.5, 0.0, -0.08]])
 
 

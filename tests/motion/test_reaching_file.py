@@ -144,7 +144,7 @@ def test_a_movement_that_only_points_at_its_targets_is_refused(tmp_path: Path) -
     sequences, theta = touches(1)
     model = PolynomialPHMM(20, 2, 3, degree=1, resampled_frames=50, residuals="independent", description=DESCRIPTION)
     model.fit(sequences, theta + np.array([1.5, 0.0, 0.0])).save(tmp_path / "pointing.npz")
-    with pytest.raises(ModelFileError, match=r"reaches its targets, found 1\.4\d* m beside"):
+    with pytest.raises(ModelFileError, match=r"reaches its targets, found 1\.4\d* m from"):
         load_reaching_model(tmp_path / "pointing.npz")
 
 

@@ -152,7 +152,7 @@ def test_the_way_has_the_arch_and_the_progress_of_the_person(name: str) -> None:
 @pytest.mark.parametrize("target", [(0.6, 0.0, 0.1), (0.0, 0.55, 0.05), (0.1, 0.0, 0.8)])
 def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name: str, target: tuple) -> None:
     plan = reaching(name)
-    with pytest.raises(OutOfReachError, match=r"cannot be reached.*nearest place that can be reached is") as refusal:
+    with pytest.raises(OutOfReachError, match=r"cannot be reached.*nearest position that can be reached is") as refusal:
         plan.reach(target)
     nearest = refusal.value.position
     assert nearest is not None

@@ -58,7 +58,7 @@ def test_movement_is_trained_where_nothing_can_be_kept(
     monkeypatch.setattr(setup, "train_reaching_model", lambda seed, cache=None: asked.append((seed, cache)))
     MovementSource(seed=3).trained()
     assert asked == [(3, None)]
-    assert "cannot be kept in" in caplog.text
+    assert "cannot be stored in" in caplog.text
 
 
 def test_a_file_and_a_model_are_too_much() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from paramove.msgs.tracked_objects_pb2 import Opening
-from paramove.objects.openings import STEADY, SeenOpenings, find_openings
+from paramove.objects.openings import STEADY, OpeningTracker, find_openings
 
 CENTRE = (200.0, 150.0)
 
@@ -43,11 +43,11 @@ def _opening(u: float = 200.0, v: float = 150.0, hidden: float = 0.0) -> Opening
     return Opening(u_px=u, v_px=v + 12 * hidden, area_px=680 * (1 - hidden), width_px=36, height_px=24 * (1 - hidden))
 
 
-def _seen(*images: list[Opening]) -> SeenOpenings:
-    seen = SeenOpenings()
+def _seen(*images: list[Opening]) -> OpeningTracker:
+    tracker = OpeningTracker()
     for openings in images:
-        seen.see(openings)
-    return seen
+        tracker.update(openings)
+    return tracker
 
 
 def test_a_hidden_opening_is_remembered_where_it_was_seen_whole() -> None:

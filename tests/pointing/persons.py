@@ -30,7 +30,7 @@ def performed(action: str, places: list[tuple[float, float]], seed: int = 0) -> 
     """A person who does this at places (u, v) of the table one after the other. (T, 7, 3)."""
     rng = np.random.default_rng((71, seed))
     person = Person.drawn(rng)
-    return joined([person.seen(action, table_place(place), rng)[0] for place in places])
+    return joined([person.observed(action, table_place(place), rng)[0] for place in places])
 
 
 def poses(body: np.ndarray, rate_hz: float = RATE_HZ, noise: float = NOISE_M, seed: int = 0) -> Iterator[ArmPose]:

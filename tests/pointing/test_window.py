@@ -192,7 +192,7 @@ def test_the_ball_is_green_when_the_hand_is_at_the_target_and_not_before(window)
 
 @pytest.mark.parametrize(
     ("wrong", "told"),
-    [({"points": ("elbow",)}, "at least two different points"), ({"settled_s": -1.0}, "settled_s is positive")],
+    [({"points": ("elbow",)}, "at least two different points"), ({"settled_s": -1.0}, "settled_s: a positive")],
 )
 def test_wrong_options_are_refused(wrong, told):
     with pytest.raises(InputError, match=told):

@@ -1,4 +1,4 @@
-"""Where images come from and how they are measured: sources, calibration boards, lenses, places, stereo."""
+"""Cameras: image sources, calibration boards, calibration of lens and pose, stereo."""
 
 import lazy_loader
 

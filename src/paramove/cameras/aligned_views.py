@@ -1,4 +1,4 @@
-"""Images of several cameras brought together by their capture times, so that a set shows one moment."""
+"""Images of several cameras synchronized by their capture times, so that a set shows one instant."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from paramove.documents import Image
 
 TIMEOUT_PERIODS = 3.0
-"""A camera that is silent for so many of its periods is gone: nobody waits for it any longer."""
+"""A camera without images for this many of its periods is gone and is not waited for."""
 
 
 @dataclass(frozen=True)
 class Views:
-    """What the cameras showed at one moment.
+    """The images of the cameras at one instant.
 
     Attributes:
         captured_ns: Capture time of the set: the latest of its images.
-        images: One [H, W, 3] for each camera in their order; None where that camera told nothing of this moment.
+        images: One [H, W, 3] for each camera in their order; None where that camera has no image of this instant.
         silent: Names of the cameras that are gone.
     """
 
@@ -27,9 +27,9 @@ class Views:
 
 
 class AlignedViews:
-    """Collects images and gives sets of them.
+    """Collects images into synchronized sets.
 
-    A set is complete when each camera has an image within half a period of the latest. A camera that has been silent
+    A set is complete when each camera has an image within half a period of the latest. A camera without images
     for `TIMEOUT_PERIODS` is not waited for; from its next image on it is part of the sets again.
 
     Args:
@@ -45,51 +45,51 @@ class AlignedViews:
         self._names = tuple(names)
         self._period_ns = round(period_s * 1e9)
         self._waiting: list[tuple[int, Image] | None] = [None] * len(names)
-        self._heard_ns: list[int | None] = [None] * len(names)
+        self._received_ns: list[int | None] = [None] * len(names)
         self._started_ns: int | None = None
-        self._said_ns: int | None = None
+        self._set_ns: int | None = None
 
     def add(self, name: str, captured_ns: int, image: Image) -> Iterator[Views]:
-        """The sets, at most two, that this image completes. An image no newer than the last set is left out (late).
+        """The sets, at most two, that this image completes. A delayed image, no newer than the last set, is left out.
 
         Raises ValueError for an unknown camera.
         """
         if name not in self._names:
             raise ValueError(f"camera {name!r}: one of {', '.join(self._names)} expected")
-        if self._said_ns is not None and captured_ns <= self._said_ns - self._period_ns // 2:
+        if self._set_ns is not None and captured_ns <= self._set_ns - self._period_ns // 2:
             return
         self._started_ns = captured_ns if self._started_ns is None else self._started_ns
-        place = self._names.index(name)
-        held = self._waiting[place]
-        if held is not None and captured_ns > held[0]:  # a second one before the others came: the first moment is over
-            yield from self._said(held[0])
-        self._waiting[place] = (captured_ns, image)
-        self._heard_ns[place] = captured_ns
-        if all(self._is_there(other, captured_ns) for other in range(len(self._names))):
-            yield from self._said(captured_ns)
+        index = self._names.index(name)
+        held = self._waiting[index]
+        if held is not None and captured_ns > held[0]:  # a second one before the others came: the first set is complete
+            yield from self._set_at(held[0])
+        self._waiting[index] = (captured_ns, image)
+        self._received_ns[index] = captured_ns
+        if all(self._is_ready(other, captured_ns) for other in range(len(self._names))):
+            yield from self._set_at(captured_ns)
 
-    def _is_there(self, place: int, now_ns: int) -> bool:
-        """Whether this camera need not be waited for: it has an image of now, or it is gone."""
-        held = self._waiting[place]
-        return (held is not None and held[0] >= now_ns - self._period_ns // 2) or self._is_gone(place, now_ns)
+    def _is_ready(self, index: int, now_ns: int) -> bool:
+        """Whether this camera need not be waited for: it has a current image, or it is gone."""
+        held = self._waiting[index]
+        return (held is not None and held[0] >= now_ns - self._period_ns // 2) or self._is_gone(index, now_ns)
 
-    def _is_gone(self, place: int, now_ns: int) -> bool:
-        heard_ns = self._heard_ns[place]
-        since_ns = self._started_ns if heard_ns is None else heard_ns
+    def _is_gone(self, index: int, now_ns: int) -> bool:
+        received_ns = self._received_ns[index]
+        since_ns = self._started_ns if received_ns is None else received_ns
         return since_ns is not None and now_ns - since_ns > TIMEOUT_PERIODS * self._period_ns
 
-    def _said(self, moment_ns: int) -> Iterator[Views]:
-        """The images within half a period of the moment; newer ones wait on, older ones are forgotten."""
+    def _set_at(self, instant_ns: int) -> Iterator[Views]:
+        """The set of images within half a period of an instant; later ones wait, earlier ones are discarded."""
         near, images = self._period_ns // 2, list[Image | None]()
-        latest_ns = moment_ns
-        for place, held in enumerate(self._waiting):
-            if held is None or held[0] > moment_ns + near:
+        latest_ns = instant_ns
+        for index, held in enumerate(self._waiting):
+            if held is None or held[0] > instant_ns + near:
                 images.append(None)
                 continue
-            self._waiting[place] = None
-            images.append(held[1] if held[0] >= moment_ns - near else None)
+            self._waiting[index] = None
+            images.append(held[1] if held[0] >= instant_ns - near else None)
             latest_ns = max(latest_ns, held[0])
-        if self._said_ns is None or latest_ns > self._said_ns:
-            self._said_ns = latest_ns
-            gone = (name for place, name in enumerate(self._names) if self._is_gone(place, latest_ns))
+        if self._set_ns is None or latest_ns > self._set_ns:
+            self._set_ns = latest_ns
+            gone = (name for index, name in enumerate(self._names) if self._is_gone(index, latest_ns))
             yield Views(latest_ns, tuple(images), tuple(gone))

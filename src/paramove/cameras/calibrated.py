@@ -1,4 +1,4 @@
-"""Calibrated cameras: projection, lens distortion undone, and their files (thesis D.3).
+"""Calibrated cameras: projection, correction of lens distortion, and calibration files (thesis D.3).
 
 The camera frame is OpenCV's: x right, y down, z forward, m. Pixel coordinates are those of pixel centres: the middle of
 the upper left pixel is (0, 0).
@@ -25,14 +25,14 @@ from paramove.documents import Floats, Image, InputError, read_document, replaci
 MAX_CAMERAS = 4
 WORLD_FRAME = "table"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
-"""Numbers of distortion coefficients that OpenCV knows."""
+"""Numbers of distortion coefficients that OpenCV supports."""
 
 _MODELS = {0: "plumb_bob", 4: "plumb_bob", 5: "plumb_bob", 8: "rational_polynomial"}
 
 
 @dataclass(frozen=True, eq=False)
 class CalibratedCamera:
-    """A camera whose lens and place are known.
+    """A camera with known lens and pose.
 
     Attributes:
         name: of the camera, and of its frame.
@@ -41,7 +41,7 @@ class CalibratedCamera:
         distortion: (k,), OpenCV's order k1 k2 p1 p2 k3 ...; k = 0 is a lens without distortion.
         camera_from_world: (4, 4), m.
 
-    Raises InputError for other shapes, numbers that are not finite and rotations that are none.
+    Raises InputError for other shapes, numbers that are not finite and matrices that are no rotation.
     """
 
     name: str
@@ -66,9 +66,11 @@ class CalibratedCamera:
             if getattr(self, name).shape != shape:
                 raise InputError(f"{here}: {name} of shape {getattr(self, name).shape} found, {shape} expected")
         if self.distortion.ndim != 1 or len(self.distortion) not in COEFFICIENTS:
-            raise InputError(f"{here}: distortion of shape {self.distortion.shape} found, {COEFFICIENTS} numbers known")
+            raise InputError(
+                f"{here}: distortion of shape {self.distortion.shape} found, {COEFFICIENTS} numbers supported"
+            )
         if not all(np.isfinite(value).all() for value in (self.matrix, self.distortion, self.camera_from_world)):
-            raise InputError(f"{here}: a number is not finite; calibrate it anew")
+            raise InputError(f"{here}: a number is not finite; calibrate it again")
         if min(self.matrix[0, 0], self.matrix[1, 1]) <= 0.0 or not np.allclose(
             self.matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=1e-9
         ):
@@ -76,7 +78,7 @@ class CalibratedCamera:
         turn = self.camera_from_world[:3, :3]
         is_rotation = np.allclose(turn @ turn.T, np.eye(3), rtol=0.0, atol=1e-5) and np.linalg.det(turn) > 0.0
         if not is_rotation or not np.allclose(self.camera_from_world[3], [0, 0, 0, 1], rtol=0.0, atol=1e-9):
-            raise InputError(f"{here}: camera_from_world holds no rotation and translation")
+            raise InputError(f"{here}: camera_from_world is not a rotation and translation")
 
     def resized(self, width_px: int, height_px: int) -> CalibratedCamera:
         """The camera of the same picture at another size; the borders of the picture stay where they are."""
@@ -86,7 +88,7 @@ class CalibratedCamera:
         return replace(self, width_px=width_px, height_px=height_px, matrix=matrix)
 
     def project(self, points: ArrayLike, *, distorted: bool = True) -> Floats:
-        """Where points of the world are seen: (..., 3), m -> (..., 2), px of the image as captured, or undistorted.
+        """Projects points of the world: (..., 3), m -> (..., 2), px of the image as captured, or undistorted.
 
         A point that is not in front of the camera is NaN.
         """
@@ -108,7 +110,7 @@ class CalibratedCamera:
         return cast(Floats, captured.reshape(ideal.shape))
 
     def undistort(self, image: Image) -> Image:
-        """The image (H, W) or (H, W, C) as a lens without distortion would show it; the same camera matrix."""
+        """The image (H, W) or (H, W, C) with the lens distortion removed; the camera matrix is the same."""
         if image.shape[:2] != (self.height_px, self.width_px):
             raise InputError(
                 f"camera {self.name!r}: an image of {image.shape[1]} x {image.shape[0]} px found, "
@@ -131,7 +133,7 @@ class CalibratedCamera:
         return result
 
     def to_foxglove(self, world_frame: str = WORLD_FRAME) -> tuple[CameraCalibration, FrameTransform]:
-        """The standard messages of lens and place. Raises InputError for a lens that they cannot tell."""
+        """The standard messages of lens and pose. Raises InputError for a lens that they cannot represent."""
         if len(self.distortion) not in _MODELS:
             raise InputError(
                 f"camera {self.name!r}: {len(self.distortion)} distortion coefficients have no name in the message; "
@@ -143,15 +145,15 @@ class CalibratedCamera:
         calibration.distortion_model = _MODELS[len(self.distortion)]
         calibration.R.extend(np.eye(3).ravel())
         calibration.P.extend(np.column_stack([self.matrix, np.zeros(3)]).ravel())
-        place = FrameTransform(parent_frame_id=world_frame, child_frame_id=self.name)
-        place.translation.x, place.translation.y, place.translation.z = self.position
+        pose = FrameTransform(parent_frame_id=world_frame, child_frame_id=self.name)
+        pose.translation.x, pose.translation.y, pose.translation.z = self.position
         quaternion = Rotation.from_matrix(self.camera_from_world[:3, :3].T).as_quat()
-        place.rotation.x, place.rotation.y, place.rotation.z, place.rotation.w = quaternion
-        return calibration, place
+        pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w = quaternion
+        return calibration, pose
 
     @classmethod
-    def from_foxglove(cls, calibration: CameraCalibration, place: FrameTransform) -> CalibratedCamera:
-        """The camera of two standard messages, `place` being its pose in the world. Raises InputError."""
+    def from_foxglove(cls, calibration: CameraCalibration, pose: FrameTransform) -> CalibratedCamera:
+        """The camera of two standard messages, `pose` being its pose in the world. Raises InputError."""
         if calibration.D and calibration.distortion_model not in _MODELS.values():
             raise InputError(
                 f"camera {calibration.frame_id!r}: distortion model {calibration.distortion_model!r} found, "
@@ -159,10 +161,12 @@ class CalibratedCamera:
             )
         if len(calibration.K) != 9:
             raise InputError(f"camera {calibration.frame_id!r}: {len(calibration.K)} numbers in K found, 9 expected")
-        turn, shift = place.rotation, place.translation
+        turn, shift = pose.rotation, pose.translation
         quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
         if not 0.99 < np.linalg.norm(quaternion) < 1.01:
-            raise InputError(f"camera {calibration.frame_id!r}: rotation {quaternion.tolist()} is no unit quaternion")
+            raise InputError(
+                f"camera {calibration.frame_id!r}: rotation {quaternion.tolist()} is not a unit quaternion"
+            )
         camera_from_world = np.eye(4)
         camera_from_world[:3, :3] = Rotation.from_quat(quaternion).as_matrix().T
         camera_from_world[:3, 3] = -camera_from_world[:3, :3] @ [shift.x, shift.y, shift.z]
@@ -190,7 +194,7 @@ def write_cameras(path: Path, cameras: Sequence[CalibratedCamera]) -> None:
 
 
 def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
-    """The cameras of a calibration file. Raises InputError if there is none or it holds something else."""
+    """The cameras of a calibration file. Raises InputError if the file is missing or not a calibration."""
     content = read_document(path, "calibration file", remedy="`paramove calibrate cameras` writes one").data
     listed = content.get("cameras")
     if not isinstance(listed, list) or not listed:
@@ -199,28 +203,28 @@ def read_cameras(path: Path) -> tuple[CalibratedCamera, ...]:
 
 
 def _camera(path: Path, number: int, entry: Any) -> CalibratedCamera:
-    wanted = ("name", "width_px", "height_px", "matrix", "distortion", "camera_from_world")
-    if not isinstance(entry, dict) or set(entry) != set(wanted):
+    expected = ("name", "width_px", "height_px", "matrix", "distortion", "camera_from_world")
+    if not isinstance(entry, dict) or set(entry) != set(expected):
         found = sorted(map(str, entry)) if isinstance(entry, dict) else type(entry).__name__
-        raise InputError(f"{path}: camera {number}: the keys {', '.join(wanted)} expected, {found} found")
+        raise InputError(f"{path}: camera {number}: the keys {', '.join(expected)} expected, {found} found")
     try:
-        arrays = [np.array(entry[key], dtype=np.float64) for key in wanted[3:]]
+        arrays = [np.array(entry[key], dtype=np.float64) for key in expected[3:]]
         return CalibratedCamera(str(entry["name"]), int(entry["width_px"]), int(entry["height_px"]), *arrays)
     except (TypeError, ValueError) as error:
         raise InputError(f"{path}: camera {number}: {error}") from error
 
 
 def measured_file(run_folder: Path, path: Path) -> Path:
-    """The file of the run's folder if there is one, else as given."""
+    """The file in the run's folder if it exists there, else the path as given."""
     return run_folder / path if (run_folder / path).is_file() else path
 
 
 def measured_cameras(run_folder: Path, path: Path) -> list[CalibratedCamera]:
     """The cameras of a calibration file, named camera_1, camera_2, ... in their order, as their topics are.
 
-    Raises InputError for a file that is none, or more than `MAX_CAMERAS`.
+    Raises InputError for a file that is no calibration, or holds more than `MAX_CAMERAS`.
     """
-    found = read_cameras(measured_file(run_folder, path))
-    if len(found) > MAX_CAMERAS:
-        raise InputError(f"{path}: {len(found)} cameras found, at most {MAX_CAMERAS} are used")
-    return [replace(one, name=f"camera_{number}") for number, one in enumerate(found, start=1)]
+    cameras = read_cameras(measured_file(run_folder, path))
+    if len(cameras) > MAX_CAMERAS:
+        raise InputError(f"{path}: {len(cameras)} cameras found, at most {MAX_CAMERAS} are used")
+    return [replace(one, name=f"camera_{number}") for number, one in enumerate(cameras, start=1)]

@@ -1,7 +1,7 @@
-"""Lens and place of cameras from images of the ChArUco board (Zhang 2000, as in OpenCV), with reasons for refusal.
+"""Lens of a camera from images of the ChArUco board (Zhang 2000, as in OpenCV); unsuitable images are rejected.
 
-The lens comes from views of the board at many angles; the place in the table frame from views in which the board lies
-on the table. Image points: the middle of the first pixel is 0.
+The lens comes from views of the board at many angles; `placement` derives the pose in the table frame from views in
+which the board lies on the table. Image points: the middle of the first pixel is 0.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ GOOD_ERROR_PX, POOR_ERROR_PX = 0.5, 1.0
 MIN_TILT_DEG = 7.0
 """Root mean square angle of the boards to their mean direction; a hand that turns the board reaches 20 to 30."""
 MAX_FOCAL_SD = 0.015
-"""Of the focal length. More than that is 15 mm of distance at 1 m."""
+"""Maximum relative standard deviation of the focal length: 15 mm of distance at 1 m."""
 OUTLIER_FACTOR, OUTLIER_PX = 3.0, 1.0
 MAX_OUTLIERS = 0.25
 SCALE_TOLERANCE, SCALE_SUSPICION = 0.005, 0.15
-"""A printer that fits to the page changes sizes by 3 to 6 %. What differs more than 15 % is another board."""
+"""A printer that fits to the page changes sizes by 3 to 6 %. A difference above 15 % means another board."""
 GRID = 4
-"""Cells across and down the image in which corners should have been."""
+"""Cells across and down the image in which corners should be detected."""
 RADIAL_GAIN = 0.8
-"""A third radial coefficient is taken if it lowers the error below this share."""
+"""A third radial coefficient is used if it lowers the error below this fraction."""
 
 
 class CalibrationError(InputError):
-    """Images that cannot calibrate a camera; the message says what is missing and how to get it."""
+    """Images that cannot calibrate a camera; the message names what is missing and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Lens:
         name: Of the camera.
         size: Width and height of the image, px.
         matrix: [3, 3], px. distortion: [5] in OpenCV's order k1 k2 p1 p2 k3.
-        error_px: Root mean square distance of corners to where the model sees them.
+        error_px: Root mean square reprojection error of the corners.
         focal_sd_px, centre_sd_px: Standard deviations of the focal length and of the image's centre.
         tilt_deg: Root mean square angle of the boards to their mean direction.
-        covered: Share of the image, in cells of a 4 x 4 grid, in which corners were seen.
-        used, left_out: Names of the views that were used, and that were not as they do not agree with the others.
+        covered: Fraction of the image, in cells of a 4 x 4 grid, in which corners were detected.
+        used, left_out: Names of the views that were used, and of those rejected as outliers.
     """
 
     name: str
@@ -66,45 +66,46 @@ class Lens:
     left_out: tuple[str, ...]
 
     def advice(self) -> list[str]:
-        """What would make it better; empty if it is good."""
-        said = []
+        """Advice for a better calibration; empty if it is good."""
+        advice = []
         if self.error_px >= GOOD_ERROR_PX:
             degree = "poor" if self.error_px >= POOR_ERROR_PX else "usable, not good"
-            said.append(
+            advice.append(
                 f"{self.error_px:.2f} px is {degree} (good: < {GOOD_ERROR_PX:g} px): hold the board still, with more "
                 "light against blur, glue it to a flat plate, and switch the camera's autofocus off"
             )
         if len(self.used) < GOOD_VIEWS:
-            said.append(f"{len(self.used)} views were used; take {GOOD_VIEWS} or more")
+            advice.append(f"{len(self.used)} views were used; take {GOOD_VIEWS} or more")
         if self.tilt_deg < 2 * MIN_TILT_DEG:
-            said.append(f"the board was tilted by only {self.tilt_deg:.0f} deg: tilt it by 30 to 45 deg to all sides")
+            advice.append(f"the board was tilted by only {self.tilt_deg:.0f} deg: tilt it by 30 to 45 deg to all sides")
         if self.covered < 0.75:
-            said.append(
-                f"corners were seen in {self.covered:.0%} of the image: hold the board near its borders and corners too"
+            advice.append(
+                f"corners were detected in {self.covered:.0%} of the image: hold the board near "
+                "its borders and corners too"
             )
-        return said
+        return advice
 
 
 def check_square(board: Board, views: Sequence[BoardView]) -> list[str]:
-    """Remarks on the size of the squares, by the markers, which tell what the board was printed for.
+    """Remarks on the size of the squares; the ids of the markers encode the size that was printed.
 
     Raises CalibrationError if images show different boards, or one printed for another size.
     """
     firsts = {view.first_id: view for view in views}
     if len(firsts) > 1:
-        shown = " and ".join(f"that of {_size_of(first)} in {view.name}" for first, view in sorted(firsts.items()))
-        raise CalibrationError(f"the images show different boards: {shown}; use one board in all images")
+        boards = " and ".join(f"that of {_size_of(first)} in {view.name}" for first, view in sorted(firsts.items()))
+        raise CalibrationError(f"the images show different boards: {boards}; use one board in all images")
     nominal = Board(board.square, next(iter(firsts))).nominal_square if firsts else None
     if nominal is None or abs(board.square / nominal - 1.0) <= SCALE_TOLERANCE:
         return []
-    found, wanted = f"{board.square * 1000:.4g} mm", f"{nominal * 1000:.4g} mm"
+    given, printed = f"{board.square * 1000:.4g} mm", f"{nominal * 1000:.4g} mm"
     if abs(board.square / nominal - 1.0) > SCALE_SUSPICION:
         raise CalibrationError(
-            f"wrong size of the squares? --square says {found}, and the markers are those of a board printed with "
-            f"{wanted}: measure the side of one black square; for squares of another size print a board with "
+            f"wrong size of the squares? --square is {given}, but the markers are those of a board printed with "
+            f"{printed}: measure the side of one black square; for squares of another size print a board with "
             "`paramove calibrate board --square`"
         )
-    return [f"squares of {found} on a board printed for {wanted}: right if you measured it on the print"]
+    return [f"squares of {given} on a board printed for {printed}: right if you measured it on the print"]
 
 
 def _size_of(first_id: int) -> str:
@@ -115,21 +116,21 @@ def _size_of(first_id: int) -> str:
 def calibrate_lens(name: str, views: Sequence[BoardView], board: Board) -> Lens:
     """Lens of a camera from views of the board at different angles.
 
-    Raises CalibrationError: different resolutions, too few views, all views parallel, a lens that stays unknown.
+    Raises CalibrationError: different resolutions, too few views, all views parallel, a lens that cannot be determined.
     """
     _check_views(name, views)
     tilt = _tilt_deg(views, board)
     if tilt < MIN_TILT_DEG:
         raise CalibrationError(
             f"{name}: in all {len(views)} views the board is parallel (its directions differ by {tilt:.1f} deg, more "
-            f"than {MIN_TILT_DEG:g} needed), so focal length and distance cannot be told apart: tilt the board by 30 "
+            f"than {MIN_TILT_DEG:g} needed), so focal length and distance cannot be separated: tilt the board by 30 "
             "to 45 deg to all sides"
         )
     fitted = _fit(views, board)
-    kept = _agreeing(fitted.view_errors_px)
-    left_out = tuple(view.name for view, keep in zip(views, kept, strict=True) if not keep)
+    inliers = _agreeing(fitted.view_errors_px)
+    left_out = tuple(view.name for view, used in zip(views, inliers, strict=True) if not used)
     if left_out:
-        views = [view for view, keep in zip(views, kept, strict=True) if keep]
+        views = [view for view, used in zip(views, inliers, strict=True) if used]
         fitted = _fit(views, board)
     focal = 0.5 * float(fitted.matrix[0, 0] + fitted.matrix[1, 1])
     _check_lens(name, fitted, focal, views[0].size)
@@ -151,12 +152,14 @@ def calibrate_lens(name: str, views: Sequence[BoardView], board: Board) -> Lens:
 def _check_views(name: str, views: Sequence[BoardView]) -> None:
     sizes = {view.size: view.name for view in views}
     if len(sizes) > 1:
-        shown = ", ".join(f"{width} x {height} px ({image})" for (width, height), image in sizes.items())
-        raise CalibrationError(f"{name}: images of different resolutions: {shown}; take all with the same setting")
+        sizes_found = ", ".join(f"{width} x {height} px ({image})" for (width, height), image in sizes.items())
+        raise CalibrationError(
+            f"{name}: images of different resolutions: {sizes_found}; take all with the same setting"
+        )
     if len(views) < MIN_VIEWS:
         raise CalibrationError(
             f"{name}: too few views: the board was found in {len(views)} images, at least {MIN_VIEWS} needed, "
-            f"{GOOD_VIEWS} are good; see that the whole board is in the image, sharp, and lit evenly"
+            f"{GOOD_VIEWS} are good; keep the whole board in the image, sharp, and evenly lit"
         )
 
 
@@ -189,14 +192,14 @@ class _Fit:
 
 
 def _fit(views: Sequence[BoardView], board: Board) -> _Fit:
-    """With two radial coefficients, or three where the third is seen to matter."""
+    """Fits two radial coefficients, or three where the third lowers the error clearly."""
     plain, bent = (_fitted(views, board, flags) for flags in (cv2.CALIB_FIX_K3, 0))
     surely_better = bent.error_px < RADIAL_GAIN * plain.error_px and plain.error_px > 0.3 * GOOD_ERROR_PX
     return bent if surely_better else plain
 
 
 def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
-    corners = board.corners() - [0.0, 0.0, board.thickness]  # Zhang's method wants the plane z = 0
+    corners = board.corners() - [0.0, 0.0, board.thickness]  # Zhang's method needs the plane z = 0
     on_board = [corners[view.corner_ids].astype(np.float32) for view in views]
     in_image = [view.points.astype(np.float32) for view in views]
     start: Any = None
@@ -214,7 +217,7 @@ def _fitted(views: Sequence[BoardView], board: Board, flags: int) -> _Fit:
 
 
 def _agreeing(errors_px: Floats) -> NDArray[np.bool_]:
-    """Views to keep: all but those that are far worse than the rest (blurred, bent, moved); at most a quarter."""
+    """Inliers among the views. Outliers are far worse than the rest (blurred, bent, moved), at most a quarter."""
     bad = errors_px > max(OUTLIER_PX, OUTLIER_FACTOR * float(np.median(errors_px)))
     too_many = bad.sum() > MAX_OUTLIERS * len(bad) or (~bad).sum() < MIN_VIEWS
     return np.ones(len(bad), dtype=np.bool_) if too_many else ~bad
@@ -227,8 +230,8 @@ def _check_lens(name: str, fitted: _Fit, focal: float, size: tuple[int, int]) ->
     if fitted.focal_sd_px <= MAX_FOCAL_SD * focal and inside and plausible:
         return
     raise CalibrationError(
-        f"{name}: the views do not tell the lens (focal length {focal:.0f} ± {fitted.focal_sd_px:.0f} px, ± "
-        f"{MAX_FOCAL_SD:.1%} wanted; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
+        f"{name}: the views do not determine the lens (focal length {focal:.0f} ± {fitted.focal_sd_px:.0f} px, ± "
+        f"{MAX_FOCAL_SD:.1%} needed; centre {centre_x:.0f}, {centre_y:.0f} of {size[0]} x {size[1]} px; "
         f"error {fitted.error_px:.2f} px): take more views, nearer, tilted by 30 to 45 deg to all sides"
     )
 

@@ -1,7 +1,7 @@
-"""Where the images for a calibration come from: a folder, a video file, or a camera that is watched.
+"""Sources of images for a calibration: a folder, a video file, or a live camera.
 
-Every source gives the views of the board held before the camera, for the lens, and those of the board on the table, for
-the camera's place.
+Every source gives the views of the board held in front of the camera, for the lens, and those of the board on the
+table, for the camera's pose.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from paramove.documents import Image, InputError, opened_video, read_picture
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 TABLE_PREFIX = "table"
 LOOKS_PER_S = 5.0
-"""How often a video or a live camera is looked at for a new view."""
-STILL_SHARE = 0.01
-"""Of the image's width, by which the board may move between two looks to be still; faster ones are blurred."""
-NEW_SHARE = 0.05
-"""Of the image's width, by which the corners of a new view differ from those of all before."""
+"""Rate at which a video or a live camera is searched for a new view."""
+STILL_FRACTION = 0.01
+"""Fraction of the image's width that a still board may move between two looks; faster ones are blurred."""
+NEW_FRACTION = 0.05
+"""Fraction of the image's width by which the corners of a new view differ from those of all previous views."""
 MAX_VIEWS = 40
-"""More views cost time and tell nothing new."""
+"""More views cost time without improving the calibration."""
 TABLE_S = 1.0
-"""For so long, at the end of a video or before a live camera, the board lies still on the table."""
+"""Time for which the board lies still on the table, at the end of a video or in front of a live camera."""
 TABLE_LOOKS = 5
 TIMEOUT_S = 60.0
-"""For so long a live camera is watched without a new view."""
+"""Maximum time that a live camera is watched without a new view."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """Views of a camera. `looked_at`: number of images in which the board was looked for."""
+    """Views of a camera. `looked_at`: number of images that were searched for the board."""
 
     views: tuple[BoardView, ...]
     looked_at: int
@@ -49,7 +49,7 @@ class ImageSource(Protocol):
     name: str
 
     def held(self) -> Found:
-        """Views of the board before the camera, the table's included. Raises InputError."""
+        """Views of the board in front of the camera, the table's included. Raises InputError."""
 
     def table(self) -> Found:
         """Views of the board on the table. Raises InputError."""
@@ -69,21 +69,21 @@ class FolderImages:
         self._views: list[tuple[Path, BoardView | None]] | None = None
 
     def held(self) -> Found:
-        return self._found(lambda path: True)
+        return self._matching(lambda path: True)
 
     def table(self) -> Found:
-        return self._found(lambda path: path.name.lower().startswith(TABLE_PREFIX))
+        return self._matching(lambda path: path.name.lower().startswith(TABLE_PREFIX))
 
-    def _found(self, wanted: Callable[[Path], bool]) -> Found:
+    def _matching(self, selected: Callable[[Path], bool]) -> Found:
         if self._views is None:
             finder = BoardFinder()
             self._views = [(path, finder.find(read_picture(path), path.name)) for path in self._paths]
-        looked_at = [view for path, view in self._views if wanted(path)]
+        looked_at = [view for path, view in self._views if selected(path)]
         return Found(tuple(view for view in looked_at if view is not None), len(looked_at))
 
 
 class VideoImages:
-    """A video in which the board is held at many angles, still for a moment each, and lies on the table at the end.
+    """A video in which the board is held at many angles, briefly still each time, and lies on the table at the end.
 
     Raises InputError if the file is no video.
     """
@@ -117,12 +117,12 @@ class VideoImages:
 
 
 class LiveImages:
-    """A camera that is watched: a view is taken by itself whenever the board is held still in a new way.
+    """A camera that is watched: a view is taken automatically whenever the board is held still in a new pose.
 
     Args:
         name: Of the camera.
         frames: Pairs of time, s, and image, without end.
-        say: Tells the person what to do next.
+        say: Shows the person what to do next.
     """
 
     def __init__(self, name: str, frames: Iterator[tuple[float, Image]], say: Callable[[str], None]) -> None:
@@ -132,9 +132,9 @@ class LiveImages:
         self._finder = BoardFinder()
 
     def held(self) -> Found:
-        """Views of the board before the camera, the table's included. Raises InputError."""
+        """Views of the board in front of the camera, the table's included. Raises InputError."""
         collector, looked_at, latest_s = ViewCollector(), 0, None
-        self._say(f"{self.name}: hold the board before the camera, still for a moment, each time at another angle")
+        self._say(f"{self.name}: hold the board in front of the camera, briefly still, each time at another angle")
         for time_s, view in self._looks():
             looked_at += 1
             latest_s = time_s if latest_s is None else latest_s
@@ -157,13 +157,13 @@ class LiveImages:
         start_s = None
         for looked_at, (time_s, view) in enumerate(self._looks(), 1):
             start_s = time_s if start_s is None else start_s
-            still = view is not None and (not lying or _motion(view, lying[0]) < 0.2 * STILL_SHARE)
+            still = view is not None and (not lying or _motion(view, lying[0]) < 0.2 * STILL_FRACTION)
             lying = [*lying, view] if still and view is not None else []
             if len(lying) > TABLE_LOOKS:
                 return Found(tuple(lying), looked_at)
             if time_s - start_s > TIMEOUT_S:
                 break
-        raise CalibrationError(f"{self.name}: the board on the table was not seen lying still for {TIMEOUT_S:g} s")
+        raise CalibrationError(f"{self.name}: the board on the table was not detected lying still for {TIMEOUT_S:g} s")
 
     def _looks(self) -> Iterator[tuple[float, BoardView | None]]:
         last_s = -np.inf
@@ -174,18 +174,18 @@ class LiveImages:
 
 
 class ViewCollector:
-    """Keeps the views in which the board is still and that differ from those kept before."""
+    """Collects the views in which the board is still and that differ from all collected before."""
 
     def __init__(self) -> None:
         self.views: list[BoardView] = []
         self._before: BoardView | None = None
 
     def offer(self, view: BoardView | None) -> bool:
-        """The view of the next look, None where no board was found. True if it is kept."""
+        """Offers the next view, None where no board was detected. True if it is collected."""
         before, self._before = self._before, view
         if view is None or before is None or len(self.views) >= MAX_VIEWS:
             return False
-        if _motion(view, before) > STILL_SHARE or any(_motion(view, kept) < NEW_SHARE for kept in self.views):
+        if _motion(view, before) > STILL_FRACTION or any(_motion(view, other) < NEW_FRACTION for other in self.views):
             return False
         self.views.append(view)
         return True

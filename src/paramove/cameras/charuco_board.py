@@ -1,8 +1,8 @@
-"""The ChArUco board that cameras are calibrated with: its squares, its markers, and how it is found in an image.
+"""The ChArUco board that cameras are calibrated with: its squares, its markers, and its detection in an image.
 
 The board lies on the table with the lower edge of its sheet along the table's near edge. Its corners are given in the
 frame "table": x forward (up on the sheet), y left, z up; the origin is the middle of the sheet's lower edge, which is
-one square below the chequers.
+one square below the checkerboard.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from paramove.documents import Floats, Image, InputError
 
 COLUMNS, ROWS = 8, 5
 MARKERS = COLUMNS * ROWS // 2
-MARKER_SHARE = 0.75
+MARKER_FRACTION = 0.75
 """Side of a marker by the side of its square: its modules are an eighth of a square."""
 DICTIONARY = cv2.aruco.DICT_4X4_100
 NOMINAL_SQUARES = (0.030, 0.045)
-"""Sides of the squares, m, of boards whose markers tell their size: the first has ids 0 to 19, the second 20 to 39."""
+"""Sides of the squares, m, of boards whose markers encode their size: ids 0 to 19, the second 20 to 39."""
 SIZE_UNTOLD_ID = MARKERS * len(NOMINAL_SQUARES)
 """First id of boards with squares of any other size."""
 SQUARE_LIMITS = (0.004, 0.4)
 MIN_CORNERS = 8
-"""A view with fewer corners tells little of the lens, and a wrong one among them would not be found."""
+"""A view with fewer corners constrains the lens little, and a wrong one among them would not be detected."""
 MIN_ROWS = 2
 ENOUGH_TO_BEND = 14
-"""With fewer corners a smooth bend of the board cannot be told from one that was found wrongly."""
+"""With fewer corners a smooth bend of the board cannot be distinguished from a wrong detection."""
 MIN_MISFIT_PX = (0.3, 0.6)
-"""A corner nearer than this to where the others want it is never doubted; with a bend, and without."""
-BESIDE = 0.09
-"""Where the squares around a corner are looked at, in squares along both sides: before a marker begins."""
+"""A corner with a smaller misfit to the others is never rejected; with a bend, and without."""
+CORNER_OFFSET = 0.09
+"""Where the squares around a corner are sampled, in squares along both sides: before a marker begins."""
 MIN_CONTRAST = 0.3
 """Of the brighter black to the darker white square at a corner, by that of the extremes."""
 MAGNIFICATIONS = (1, 2, 3)
 LARGEST_PX = 4000
 """A magnified image is not wider than this: markers in it are large enough, and it would take seconds."""
 AMPLE_SPACING_PX = 35.0
-"""Between neighbouring corners; where they are farther apart, magnifying finds them no better."""
+"""Between neighbouring corners; where they are farther apart, magnifying does not help."""
 MAX_MISFIT = 0.12
 """Of a corner to the plane's perspective, in squares. A strong wide-angle lens bends the board by 0.05."""
 
 
 class BoardError(InputError):
-    """A board that cannot be; the message says what was found and what would do."""
+    """An impossible board; the message gives the value found and the values allowed."""
 
 
 @dataclass(frozen=True)
@@ -79,15 +79,15 @@ class Board:
 
     @classmethod
     def printed(cls, square: float) -> Board:
-        """The board that is printed for squares of this side, m; its markers tell the size if it is a usual one."""
-        usual = [place for place, nominal in enumerate(NOMINAL_SQUARES) if abs(square - nominal) < 1e-6]
-        return cls(square, MARKERS * (usual[0] if usual else len(NOMINAL_SQUARES)))
+        """The board that is printed for squares of this side, m; its markers encode a standard size."""
+        standard = [index for index, nominal in enumerate(NOMINAL_SQUARES) if abs(square - nominal) < 1e-6]
+        return cls(square, MARKERS * (standard[0] if standard else len(NOMINAL_SQUARES)))
 
     @property
     def nominal_square(self) -> float | None:
-        """Side for which boards with these ids are printed, m; None if the ids do not tell."""
-        place = self.first_id // MARKERS
-        return NOMINAL_SQUARES[place] if place < len(NOMINAL_SQUARES) else None
+        """Side for which boards with these ids are printed, m; None if the ids do not encode it."""
+        index = self.first_id // MARKERS
+        return NOMINAL_SQUARES[index] if index < len(NOMINAL_SQUARES) else None
 
     @property
     def ids(self) -> NDArray[np.int32]:
@@ -98,7 +98,7 @@ class Board:
     def opencv(self) -> Any:
         """The same as a `cv2.aruco.CharucoBoard`: origin in the upper left corner, x right, y down, m."""
         size = (COLUMNS, ROWS)
-        return cv2.aruco.CharucoBoard(size, self.square, MARKER_SHARE * self.square, dictionary(), self.ids)
+        return cv2.aruco.CharucoBoard(size, self.square, MARKER_FRACTION * self.square, dictionary(), self.ids)
 
     def corners(self) -> Floats:
         """Inner corners of the squares, [28, 3], m, in the table frame, row by row from the upper left."""
@@ -113,18 +113,18 @@ class Board:
 
 
 def dictionary() -> Any:
-    """The markers' dictionary: 4 x 4 bits, as few as possible, so that they are found from afar."""
+    """The markers' dictionary: 4 x 4 bits, as few as possible, so that they are detected from afar."""
     return cv2.aruco.getPredefinedDictionary(DICTIONARY)
 
 
 @dataclass(frozen=True)
 class BoardView:
-    """What was found of a board in one image.
+    """The detected corners of a board in one image.
 
     Attributes:
         name: Of the image.
-        corner_ids: Which corners, [N], ascending.
-        points: Where they are, [N, 2], px; the middle of the first pixel is 0.
+        corner_ids: Numbers of the corners, [N], ascending.
+        points: Their positions, [N, 2], px; the middle of the first pixel is 0.
         size: Width and height of the image, px.
         first_id: Of the board's markers.
     """
@@ -137,7 +137,7 @@ class BoardView:
 
     @property
     def nearly_whole(self) -> bool:
-        """Whether at least nine of ten corners were found."""
+        """Whether at least nine of ten corners were detected."""
         return len(self.corner_ids) >= 0.9 * (COLUMNS - 1) * (ROWS - 1)
 
     @property
@@ -149,7 +149,7 @@ class BoardView:
 
 
 class BoardFinder:
-    """Finds the boards of `Board.printed`, whichever lies in the image."""
+    """Detects any of the boards of `Board.printed` in an image."""
 
     def __init__(self) -> None:
         firsts = range(0, SIZE_UNTOLD_ID + 1, MARKERS)
@@ -158,7 +158,7 @@ class BoardFinder:
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         self._markers = cv2.aruco.ArucoDetector(dictionary(), parameters)
         expected = cv2.aruco.CharucoParameters()
-        expected.checkMarkers = False  # OpenCV's check refuses boards that are seen at a slant; `_agreeing` does not
+        expected.checkMarkers = False  # OpenCV's check rejects boards at a slant; `_agreeing` does not
         expected.minMarkers = 1
         self._detectors = {
             first: cv2.aruco.CharucoDetector(board.opencv, expected, parameters)
@@ -166,23 +166,23 @@ class BoardFinder:
         }
 
     def find(self, image: Image, name: str = "image") -> BoardView | None:
-        """The board in an image [H, W] or [H, W, 3] uint8; None if there is none, or too little of it.
+        """The board in an image [H, W] or [H, W, 3] uint8; None if there is none, or too few corners are visible.
 
-        Small markers are found in a magnified image only: magnifications are tried until most of the board is found.
+        Small markers are detected in a magnified image only: magnifications are tried until most corners are detected.
         """
         gray: Any = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         best: BoardView | None = None
         for times in MAGNIFICATIONS:
             if times > 1 and times * max(gray.shape) > LARGEST_PX:
                 break
-            view = self._found(gray, times, name)
+            view = self._detected(gray, times, name)
             if view is not None and (best is None or len(view.corner_ids) >= len(best.corner_ids)):
                 best = view
             if best is not None and (times > 1 or best.spacing_px > AMPLE_SPACING_PX) and best.nearly_whole:
                 break
         return best
 
-    def _found(self, gray: Image, times: int, name: str) -> BoardView | None:
+    def _detected(self, gray: Image, times: int, name: str) -> BoardView | None:
         large: Any = gray
         if times > 1:
             large = cv2.resize(gray, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC)
@@ -201,28 +201,28 @@ class BoardFinder:
         which = ids.ravel()[order].astype(np.int32)
         points = (corners.reshape(-1, 2).astype(np.float64)[order] + 0.5) / times - 0.5
         on_board = np.stack(np.divmod(which, COLUMNS - 1), axis=1)[:, ::-1].astype(np.float64)
-        kept = _crossing(gray, on_board, points)
-        if kept.sum() < MIN_CORNERS:
+        usable = _crossing(gray, on_board, points)
+        if usable.sum() < MIN_CORNERS:
             return None
-        kept[kept] = _agreeing(on_board[kept], points[kept])
-        if kept.sum() < MIN_CORNERS or _on_one_line(which[kept]):
+        usable[usable] = _agreeing(on_board[usable], points[usable])
+        if usable.sum() < MIN_CORNERS or _on_one_line(which[usable]):
             return None
         size = (int(gray.shape[1]), int(gray.shape[0]))
-        return BoardView(name, which[kept], points[kept], size, first)
+        return BoardView(name, which[usable], points[usable], size, first)
 
 
 def _board_of(marker_ids: NDArray[np.int32]) -> int | None:
-    """First id of the board that most of the markers belong to; None if they are on no board, as those on an arm."""
+    """First id of the board that most of the markers belong to; None for other markers, such as those on an arm."""
     counts = np.bincount(marker_ids // MARKERS)[: SIZE_UNTOLD_ID // MARKERS + 1]
     return int(np.argmax(counts)) * MARKERS if counts.any() else None
 
 
 def _crossing(gray: Image, on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
-    """At which corners two black and two white squares meet, [N]: not where a finger hides one of them."""
+    """Whether two black and two white squares meet at each corner, [N]: not where a finger hides one of them."""
     homography, _ = cv2.findHomography(on_board, in_image, cv2.RANSAC, 3.0)
     if homography is None:
         return np.zeros(len(on_board), dtype=np.bool_)
-    aside = BESIDE * np.array([[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]])
+    aside = CORNER_OFFSET * np.array([[-1.0, -1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, 1.0]])
     around = cv2.perspectiveTransform((on_board[:, None] + aside).reshape(-1, 1, 2), homography).reshape(-1, 4, 2)
     around = around + in_image[:, None] - cv2.perspectiveTransform(on_board[:, None], homography)
     levels = cv2.remap(gray, around.astype(np.float32), np.empty(0), cv2.INTER_LINEAR).astype(np.float64)
@@ -234,29 +234,29 @@ def _crossing(gray: Image, on_board: Floats, in_image: Floats) -> NDArray[np.boo
 
 
 def _agreeing(on_board: Floats, in_image: Floats) -> NDArray[np.bool_]:
-    """Which corners agree with a view of a plane, [N].
+    """Whether each corner agrees with a view of a plane, [N].
 
-    First with a perspective view, up to what a lens bends; then with one bent smoothly: what is left of the distances
-    is fitted by a quadratic of the place on the board, and what then is far off was found wrongly.
+    First with a perspective view, within the tolerance of a lens; then with a smooth bend: the remaining distances are
+    fitted by a quadratic of the position on the board, and corners with a large misfit are rejected.
     """
     homography, inliers = cv2.findHomography(in_image, on_board, cv2.RANSAC, MAX_MISFIT)
     if homography is None or inliers is None:
         return np.zeros(len(on_board), dtype=np.bool_)
-    kept = np.asarray(inliers.ravel() > 0)
-    while kept.sum() >= MIN_CORNERS:
-        view, _ = cv2.findHomography(on_board[kept], in_image[kept])
-        seen = cv2.perspectiveTransform(on_board[:, None], view)[:, 0]
+    usable = np.asarray(inliers.ravel() > 0)
+    while usable.sum() >= MIN_CORNERS:
+        view, _ = cv2.findHomography(on_board[usable], in_image[usable])
+        projected = cv2.perspectiveTransform(on_board[:, None], view)[:, 0]
         x, y = (on_board - on_board.mean(axis=0)).T
-        bends = kept.sum() >= ENOUGH_TO_BEND
+        bends = usable.sum() >= ENOUGH_TO_BEND
         terms = np.column_stack([np.ones_like(x), x, y, *([x * x, x * y, y * y] if bends else [])])
-        weights = np.linalg.lstsq(terms[kept], (in_image - seen)[kept], rcond=None)[0]
-        misfit = np.linalg.norm(in_image - seen - terms @ weights, axis=1)
-        limit = max(MIN_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[kept])))
-        worst = int(np.argmax(np.where(kept, misfit, 0.0)))  # one at a time, as it bends the others' fit
+        weights = np.linalg.lstsq(terms[usable], (in_image - projected)[usable], rcond=None)[0]
+        misfit = np.linalg.norm(in_image - projected - terms @ weights, axis=1)
+        limit = max(MIN_MISFIT_PX[0 if bends else 1], 4.0 * float(np.median(misfit[usable])))
+        worst = int(np.argmax(np.where(usable, misfit, 0.0)))  # one at a time, as it bends the others' fit
         if misfit[worst] <= limit:
             break
-        kept[worst] = False
-    return kept
+        usable[worst] = False
+    return usable
 
 
 def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:
@@ -265,6 +265,6 @@ def _on_one_line(corner_ids: NDArray[np.int32]) -> bool:
 
 
 def views_of(images: Sequence[tuple[str, Image]]) -> list[BoardView | None]:
-    """What is found in each of the named images."""
+    """The view of the board in each of the named images."""
     finder = BoardFinder()
     return [finder.find(image, name) for name, image in images]

@@ -1,7 +1,7 @@
 """Printable sheets, as PDF in true scale: the calibration board, and markers for a person's arm.
 
-Everything is drawn as vectors in millimetres; one matrix makes points of them. The sheet says which way it is to be
-laid on the table, and carries a line of 100 mm that tells whether the printer kept the scale.
+Everything is drawn as vectors in millimetres; one matrix converts them to points. The sheet shows how to lay it on the
+table, and has a line of 100 mm to check the printer's scale.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import cv2
 
-from paramove.cameras.charuco_board import COLUMNS, MARKER_SHARE, ROWS, Board, BoardError, dictionary
+from paramove.cameras.charuco_board import COLUMNS, MARKER_FRACTION, ROWS, Board, BoardError, dictionary
 
 POINTS_PER_MM = 72.0 / 25.4
 UNPRINTED_MM = 6.0
 """Border that common printers leave white."""
 HEAD_MM = 19.0
-"""Least height above the chequers, for the ruler and its words."""
+"""Minimum height above the checkerboard, for the ruler and its text."""
 MIN_SQUARE_MM = 20.0
-"""Below the chequers is as much room as a square is high; the words need this much."""
+"""The margin below the checkerboard is one square high; the text needs this much."""
 RULER_MM = 100.0
 MODULES = 6
 """Of a marker's side: 4 bits and a black border."""
@@ -49,14 +49,14 @@ def board_sheet(paper: str = "a4", square: float | None = None) -> bytes:
     Raises BoardError for an unknown paper and for squares that do not fit it.
     """
     if paper not in PAPERS:
-        raise BoardError(f"paper {paper!r} is not known: {', '.join(PAPERS)} expected")
+        raise BoardError(f"unknown paper {paper!r}: {', '.join(PAPERS)} expected")
     sheet = PAPERS[paper]
     square_mm = sheet.square_mm if square is None else 1000.0 * square
     maximum = min((sheet.width_mm - 2 * UNPRINTED_MM) / COLUMNS, (sheet.height_mm - HEAD_MM) / (ROWS + 1))
     if not MIN_SQUARE_MM <= square_mm <= maximum:
         raise BoardError(
             f"squares of {square_mm:g} mm found; on {paper} {MIN_SQUARE_MM:g} to {int(maximum)} mm fit, "
-            "with the words around them"
+            "with the text around them"
         )
     drawing = _chequers(Board.printed(square_mm / 1000.0), sheet)
     drawing += _ruler(sheet, ROWS * square_mm + square_mm)
@@ -73,9 +73,9 @@ def marker_sheet(numbers: Mapping[str, int], side: float = 0.045, paper: str = "
     Raises BoardError for an unknown paper and for markers that do not fit it.
     """
     if paper not in PAPERS:
-        raise BoardError(f"paper {paper!r} is not known: {', '.join(PAPERS)} expected")
+        raise BoardError(f"unknown paper {paper!r}: {', '.join(PAPERS)} expected")
     sheet, side_mm = PAPERS[paper], 1000.0 * side
-    cell = side_mm * (1.0 + 2.0 / MODULES)  # a white module around it, without which it is not found
+    cell = side_mm * (1.0 + 2.0 / MODULES)  # a white module around it, needed for its detection
     pitch, maximum = cell + 4.0, min((sheet.width_mm - 16.0) / len(numbers), (sheet.height_mm - 40.0) / 2) - 4.0
     largest = int(maximum / (1.0 + 2.0 / MODULES))
     if not 10.0 <= side_mm <= largest:
@@ -113,8 +113,8 @@ def _chequers(board: Board, sheet: Paper) -> list[str]:
 
 def _marker(number: int, x: float, y: float, square_mm: float) -> list[str]:
     """Black modules of a marker in the middle of a square with its lower left corner in (x, y)."""
-    gap = 0.5 * (1.0 - MARKER_SHARE) * square_mm
-    return _modules(number, x + gap, y + gap, MARKER_SHARE * square_mm / MODULES)
+    gap = 0.5 * (1.0 - MARKER_FRACTION) * square_mm
+    return _modules(number, x + gap, y + gap, MARKER_FRACTION * square_mm / MODULES)
 
 
 def _modules(number: int, x: float, y: float, module: float) -> list[str]:
@@ -129,7 +129,7 @@ def _modules(number: int, x: float, y: float, module: float) -> list[str]:
 
 
 def _ruler(sheet: Paper, above_mm: float) -> list[str]:
-    """A line of 100 mm with a stroke every 10 mm, in the margin above the chequers."""
+    """A line of 100 mm with a stroke every 10 mm, in the margin above the checkerboard."""
     x, y = sheet.width_mm / 2 - RULER_MM / 2, above_mm + 5.0
     strokes = [f"{x:.4f} {y:.4f} m {x + RULER_MM:.4f} {y:.4f} l"]
     for tenth in range(11):
@@ -196,10 +196,10 @@ def _document(sheet: Paper, drawing: Sequence[str], title: str) -> bytes:
         b"<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
         f"<< /Title ({title}) >>".encode("ascii"),
     ]
-    document, places = b"%PDF-1.4\n", []
+    document, offsets = b"%PDF-1.4\n", []
     for number, body in enumerate(objects, 1):
-        places.append(len(document))
+        offsets.append(len(document))
         document += f"{number} 0 obj\n".encode("ascii") + body + b"\nendobj\n"
-    table = f"xref\n0 {len(objects) + 1}\n0000000000 65535 f \n" + "".join(f"{at:010d} 00000 n \n" for at in places)
+    table = f"xref\n0 {len(objects) + 1}\n0000000000 65535 f \n" + "".join(f"{at:010d} 00000 n \n" for at in offsets)
     trailer = f"trailer\n<< /Size {len(objects) + 1} /Root 1 0 R /Info 6 0 R >>\nstartxref\n{len(document)}\n%%EOF\n"
     return document + (table + trailer).encode("ascii")

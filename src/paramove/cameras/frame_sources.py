@@ -1,4 +1,4 @@
-"""Where frames come from: a topic, a file, or a V4L2 device. One protocol, so a camera node has one code path."""
+"""Sources of frames: a topic, a file, or a V4L2 device. One protocol, so a camera node has one code path."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _log = logging.getLogger(__name__)
 
 SOURCES = "topic:camera/image_raw, file:PATH, device:PATH, folder:PATH@RATE or recording:PATH#TOPIC"
 TIMEOUT_NS = 1_000_000_000
-"""A source that is silent for longer has a fault."""
+"""A source without frames for longer has a fault."""
 
 
 class SourceError(FrameError, InputError):
-    """A source that cannot be opened; the message says what was found and what helps."""
+    """A source that cannot be opened; the message gives what was found and the remedy."""
 
-    def __init__(self, sentence: str, missing: bool = False) -> None:
-        InputError.__init__(self, sentence, missing)
+    def __init__(self, message: str, missing: bool = False) -> None:
+        InputError.__init__(self, message, missing)
         self.kind = "missing" if missing else "source"
 
 
 class Capture(Protocol):
-    """What is needed of cv2.VideoCapture."""
+    """The part of cv2.VideoCapture that is used."""
 
     def isOpened(self) -> bool: ...  # noqa: N802
     def grab(self) -> bool: ...
@@ -43,7 +43,7 @@ class Capture(Protocol):
 
 
 class FrameSource(Protocol):
-    """Gives frames when asked, once a tick, or (a topic) once a message."""
+    """Gives a frame on request, once a tick, or (a topic) once a message."""
 
     from_topic: bool
     """True if frames come as messages, False if they are read at each tick."""
@@ -64,12 +64,12 @@ class TopicFrames:
         self._latest_ns: int | None = None
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
-        """`now_ns` is the message's capture time; without a message it is looked whether they still come."""
+        """`now_ns` is the message's capture time; without a message, checks the time since the last one."""
         if raw is None:
             self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
             if now_ns - self._latest_ns > TIMEOUT_NS:
                 raise FrameError(
-                    "no image on camera/image_raw for more than 1 s: see what publishes it (the simulator)", "silent"
+                    "no image on camera/image_raw for more than 1 s: check its publisher (the simulator)", "silent"
                 )
             return None
         self._latest_ns = now_ns
@@ -77,7 +77,7 @@ class TopicFrames:
         return Frame(image_of_raw(raw), now_ns, self._index - 1)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Does nothing: there is no resource to release."""
 
 
 class FileFrames:
@@ -127,15 +127,15 @@ class FileFrames:
 
 
 class DeviceFrames:
-    """Frames of a V4L2 device, read by a thread that keeps only the latest, so that an old frame never waits.
+    """Frames of a V4L2 device, read by a thread that stores only the latest, so that frames are not delayed.
 
     A device that was unplugged may block a read for ten seconds or hand out its last frame again (opencv #5221,
-    #14044): silence is noticed here after `timeout_ns` of the caller's clock, repetition by `FrameChecks`. Every
-    `timeout_ns` the device is opened again.
+    #14044): missing frames are detected here after `timeout_ns` of the caller's clock, repeated ones by `FrameChecks`.
+    Every `timeout_ns` the device is opened again.
 
     Args:
         path: /dev/v4l/by-id/... (stays the same when plugged in elsewhere), /dev/videoN, or N.
-        width_px, height_px, rate_hz: asked of the device.
+        width_px, height_px, rate_hz: requested from the device.
         open_capture: opens a path; tests give a fake device.
     """
 
@@ -151,7 +151,7 @@ class DeviceFrames:
         open_capture: Callable[[str], Capture] | None = None,
     ) -> None:
         self._path = f"/dev/video{path}" if path.isdigit() else path
-        self._wanted = {
+        self._settings = {
             cv2.CAP_PROP_FRAME_WIDTH: float(width_px),
             cv2.CAP_PROP_FRAME_HEIGHT: float(height_px),
             cv2.CAP_PROP_FPS: rate_hz,
@@ -164,26 +164,28 @@ class DeviceFrames:
         self._reader = _Reader(self._open())
 
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
-        """The latest frame, None if there is no new one yet. Raises FrameError if none has come for long."""
+        """The latest frame, None if there is no new one yet. Raises FrameError after `timeout_ns` without one."""
         self._latest_ns = now_ns if self._latest_ns is None else self._latest_ns
         image = self._reader.take()
         if image is None:
-            silent_ns = now_ns - self._latest_ns
-            if silent_ns < self._timeout_ns:
+            no_data_ns = now_ns - self._latest_ns
+            if no_data_ns < self._timeout_ns:
                 return None
             self._reopen(now_ns)
-            raise FrameError(f"camera {self._path} has given no frame for {silent_ns / 1e9:.1f} s: replug it", "silent")
+            raise FrameError(
+                f"camera {self._path} has given no frame for {no_data_ns / 1e9:.1f} s: replug it", "silent"
+            )
         self._latest_ns = now_ns
         self._index += 1
         return Frame(image, now_ns, self._index - 1)
 
     def close(self) -> None:
-        """Stop reading and give the device back."""
+        """Stop reading and release the device."""
         self._reader.stop()
 
     def _open(self) -> Capture:
         capture = self._open_capture(self._path)
-        for prop, value in self._wanted.items():
+        for prop, value in self._settings.items():
             capture.set(prop, value)
         return capture
 
@@ -194,7 +196,7 @@ class DeviceFrames:
 
 
 class _Reader:
-    """A thread that reads frames and keeps the latest. It ends when a read fails."""
+    """A thread that reads frames and stores the latest. It ends when a read fails."""
 
     def __init__(self, capture: Capture) -> None:
         self._capture = capture
@@ -223,14 +225,14 @@ class _Reader:
                     break
                 with self._lock:
                     self._latest = image
-        except cv2.error as error:  # unplugged during a read; the silence is told by the other side
+        except cv2.error as error:  # unplugged during a read; `frame` reports that no frames come
             _log.warning("reading the camera: %s", error.err)
         finally:
             self._capture.release()
 
 
 def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
-    """The source that the text names. Raises InputError if there is none like it or it cannot be opened."""
+    """The source that the text names. Raises InputError if it is unknown or cannot be opened."""
     kind, _, rest = source.partition(":")
     if kind == "topic" and rest == "camera/image_raw":
         return TopicFrames()
@@ -252,7 +254,7 @@ def open_source(source: str, width_px: int, height_px: int) -> FrameSource:
 
 
 def _open_v4l2(path: str) -> Capture:
-    """Raises SourceError that names what is there, the remedy for missing rights, or who holds the device."""
+    """Raises SourceError with the devices found, the remedy for missing permissions, or the holder of the device."""
     device = Path(path)
     if not device.exists():
         found = sorted(str(p) for p in [*Path("/dev").glob("video*"), *Path("/dev/v4l/by-id").glob("*")])

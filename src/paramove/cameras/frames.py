@@ -1,6 +1,6 @@
-"""Frames of a camera: their form, their checks, and how they travel in messages.
+"""Frames of a camera: their format, their checks, and their encoding in messages.
 
-Whatever a frame comes from (see `frame_sources`), it takes the same way: `Frame` -> `FrameChecks` -> `encode`.
+Frames of every source (see `frame_sources`) are processed alike: `Frame` -> `FrameChecks` -> `encode`.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from paramove.documents import JPEG, Image, InputError, decoded
 CAMERA_FRAME = "camera_optical"
 DARK_LEVEL = 16.0
 """Mean of 255 below which noise hides the colours. A lens cap gives 0 to 5, the demo's darkest scene 50."""
-SATURATED_SHARE = 0.95
+SATURATED_FRACTION = 0.95
 _TO_BGR = {"bgr8": None, "8UC3": None, "rgb8": cv2.COLOR_RGB2BGR}
 
 
 class FrameError(RuntimeError):
-    """A frame that cannot be used, or none; the message says what was expected, what was found and what helps.
+    """A missing or unusable frame; the message gives what was expected, what was found and the remedy.
 
     Attributes:
-        kind: Of fault, the same for every frame that suffers from it.
+        kind: The kind of fault, the same for all frames with this fault.
     """
 
-    def __init__(self, sentence: str, kind: str = "unusable") -> None:
-        super().__init__(sentence)
+    def __init__(self, message: str, kind: str = "unusable") -> None:
+        super().__init__(message)
         self.kind = kind
 
 
@@ -48,12 +48,12 @@ class Frame:
 
 
 class FrameChecks:
-    """Refuses frames of the wrong size, black or saturated frames, and a picture that does not change any more.
+    """Rejects frames of the wrong size, black or saturated frames, and an image that no longer changes.
 
     Args:
         width_px, height_px: Expected size.
-        frozen_after: So many equal frames in a row are a frozen camera: sensor noise makes real ones differ. 5 are a
-            third of a second, before what moves would seem to rest. 0 allows equal frames, for drawn videos.
+        frozen_after: This many equal frames in a row mean a frozen camera: sensor noise makes real ones differ. 5 are
+            a third of a second, before a moving object would seem to rest. 0 allows equal frames, for drawn videos.
     """
 
     def __init__(self, width_px: int, height_px: int, frozen_after: int = 5) -> None:
@@ -95,7 +95,7 @@ class FrameChecks:
                 "dark",
             )
         saturated = float((sparse.min(axis=2) >= 254).mean())
-        if saturated > SATURATED_SHARE:
+        if saturated > SATURATED_FRACTION:
             raise FrameError(
                 f"frame {frame.index} is saturated ({saturated:.0%} of the pixels are white): shorten the exposure",
                 "saturated",

@@ -1,4 +1,4 @@
-"""Frames replayed at their own pace: a folder of pictures, or the images of a recording."""
+"""Frames replayed at their recorded rate: a folder of pictures, or the images of a recording."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from paramove.documents import InputError, read_picture
 from paramove.recording import Recorded, read
 
 PICTURES = (".jpg", ".jpeg", ".png", ".bmp")
-TICK_SHARE = 0.25
-"""Of a frame: so much earlier than due it is given, as ticks are rounded to milliseconds."""
+TICK_FRACTION = 0.25
+"""Fraction of a frame's period by which it may be early, as ticks are rounded to milliseconds."""
 
 
 class FolderFrames:
@@ -28,8 +28,8 @@ class FolderFrames:
     def __init__(self, folder: Path, rate_hz: float) -> None:
         self._files = sorted(file for file in folder.glob("*") if file.suffix.lower() in PICTURES)
         if not self._files:
-            found = "it holds none" if folder.is_dir() else "there is no such folder"
-            raise InputError(f"{folder}: a folder of pictures ({', '.join(PICTURES)}) expected, {found}", missing=True)
+            reason = "it holds none" if folder.is_dir() else "there is no such folder"
+            raise InputError(f"{folder}: a folder of pictures ({', '.join(PICTURES)}) expected, {reason}", missing=True)
         if not 0.1 <= rate_hz <= 1000.0:
             raise InputError(f"{folder}: 0.1 to 1000 pictures per second expected, found {rate_hz}")
         self._folder, self._rate_hz = folder, rate_hz
@@ -39,7 +39,7 @@ class FolderFrames:
     def frame(self, now_ns: int, raw: RawImage | None = None) -> Frame | None:
         """The latest picture that is due. Raises FrameError for one that cannot be read."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
-        index = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + TICK_SHARE)
+        index = int((now_ns - self._start_ns) * 1e-9 * self._rate_hz + TICK_FRACTION)
         if index < self._next:
             return None
         if index >= len(self._files):
@@ -52,7 +52,7 @@ class FolderFrames:
         return Frame(image, now_ns, index)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Does nothing: there is no resource to release."""
 
 
 class RecordingFrames:
@@ -73,7 +73,7 @@ class RecordingFrames:
         except KeyError as error:
             raise InputError(f"{path}: {error.args[0]}") from error
         if self._waiting is None or not isinstance(self._waiting.message, CompressedImage):
-            raise InputError(f"{path}: no images on {topic}; `paramove recover` tells what a recording holds")
+            raise InputError(f"{path}: no images on {topic}; `paramove recover` lists the contents of a recording")
         self._first_ns = self._captured_ns(self._waiting)
         self._start_ns: int | None = None
         self._index = 0
@@ -91,7 +91,7 @@ class RecordingFrames:
         return None if latest is None else Frame(decode(latest.message), now_ns, self._index - 1)
 
     def close(self) -> None:
-        """Lets go of the file."""
+        """Releases the file."""
         self._recorded = iter(())
 
     @staticmethod

@@ -1,7 +1,7 @@
 """Points in space from two or more calibrated cameras, with their uncertainty.
 
-First linearly (Hartley and Zisserman, Multiple View Geometry, 12.2), then refined: the distances between seen and
-projected points, in images without lens distortion, are made smallest by Gauss and Newton's steps.
+First linearly (Hartley and Zisserman, Multiple View Geometry, 12.2), then refined: Gauss-Newton
+steps minimize the distances between detected and projected points in images without lens distortion.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from paramove.cameras.calibrated import CalibratedCamera
 from paramove.documents import Floats, InputError
 
 MIN_BASELINE = 0.01
-"""m. Cameras nearer to each other see the same."""
+"""m. Cameras with a smaller baseline give no depth."""
 MIN_ANGLE_DEG = 1.0
-"""Between the rays to a point: below, an error of a tenth of a pixel is one of a tenth of the distance."""
+"""Minimum angle between the rays to a point: below, 0.1 px of error is 10 % of the distance."""
 STEPS = 6
 
 
 class StereoError(InputError):
-    """Cameras or points that give no places in space; the message says why and what would."""
+    """Cameras or points that give no positions in space; the message gives the reason and the remedy."""
 
 
 @dataclass(frozen=True)
 class Triangulation:
-    """Points in space; what cannot be told is NaN.
+    """Points in space; unknown values are NaN.
 
     Attributes:
         points: (N, 3), m, world frame.
         covariances: (N, 3, 3), m², for image points with the given standard deviation.
-        residuals_px: (N,) root mean square distance of image points to where the point is projected.
+        residuals_px: (N,) root mean square distance of image points to the projected point.
         angles_deg: (N,) largest angle between two rays to the point.
     """
 
@@ -46,7 +46,7 @@ class Triangulation:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """(N,) which points were seen well enough by at least two cameras."""
+        """(N,) whether at least two cameras detected the point well enough."""
         return np.asarray(np.isfinite(self.points).all(axis=1))
 
     @property
@@ -56,41 +56,41 @@ class Triangulation:
 
 
 class StereoRig:
-    """Two or more cameras that see the same scene.
+    """Two or more cameras that view the same scene.
 
-    Raises StereoError for fewer than two cameras, and for cameras of which no two stand apart.
+    Raises StereoError for fewer than two cameras, and for cameras at the same position.
     """
 
     def __init__(self, cameras: Sequence[CalibratedCamera]) -> None:
         if len(cameras) < 2:
-            raise StereoError(f"{len(cameras)} camera found: places in space need at least two calibrated cameras")
-        places = np.array([camera.position for camera in cameras])
-        self.baseline = float(np.linalg.norm(places[:, None] - places[None], axis=2).max())
+            raise StereoError(f"{len(cameras)} camera found: positions in space need at least two calibrated cameras")
+        positions = np.array([camera.position for camera in cameras])
+        self.baseline = float(np.linalg.norm(positions[:, None] - positions[None], axis=2).max())
         if self.baseline < MIN_BASELINE:
             names = ", ".join(camera.name for camera in cameras)
             raise StereoError(
-                f"the cameras {names} stand {self.baseline * 1000:.1f} mm apart: they see the same, so no distance can "
-                "be told; at least 10 mm are needed, a third of the distance to the scene is good. Was one camera "
-                "calibrated twice?"
+                f"the cameras {names} stand {self.baseline * 1000:.1f} mm apart: they see the same, so distances "
+                "cannot be measured; at least 10 mm are needed, a third of the distance to the scene is good. "
+                "Was one camera calibrated twice?"
             )
         self.cameras = tuple(cameras)
-        self._places = places
+        self._positions = positions
         self._from_world = np.array([camera.camera_from_world[:3] for camera in cameras])
 
     def triangulate(self, pixels: ArrayLike, sigma_px: float = 0.5) -> Triangulation:
-        """Places of points that were seen in the images as captured.
+        """Positions of points from their pixels in the images as captured.
 
         Args:
-            pixels: (K, N, 2) of K cameras and N points; NaN where a camera did not see a point.
+            pixels: (K, N, 2) of K cameras and N points; NaN where a camera did not detect a point.
             sigma_px: Standard deviation of the image points in each direction.
 
-        A point is NaN if fewer than two cameras saw it, if it would lie behind one of them, or if the rays are parallel
-        to less than a degree. Raises StereoError for another shape.
+        A point is NaN if fewer than two cameras detected it, if it would lie behind one of them, or if the rays are
+        parallel to less than a degree. Raises StereoError for another shape.
         """
-        seen = np.asarray(pixels, dtype=np.float64)
-        if seen.ndim != 3 or seen.shape[0] != len(self.cameras) or seen.shape[2] != 2:
-            raise StereoError(f"image points of shape {seen.shape} found, ({len(self.cameras)}, N, 2) expected")
-        rays = np.stack([_normalised(camera, points) for camera, points in zip(self.cameras, seen, strict=True)])
+        detected = np.asarray(pixels, dtype=np.float64)
+        if detected.ndim != 3 or detected.shape[0] != len(self.cameras) or detected.shape[2] != 2:
+            raise StereoError(f"image points of shape {detected.shape} found, ({len(self.cameras)}, N, 2) expected")
+        rays = np.stack([_normalised(camera, points) for camera, points in zip(self.cameras, detected, strict=True)])
         focal = np.array([np.diag(camera.matrix)[:2] for camera in self.cameras])
         used = np.asarray(np.isfinite(rays).all(axis=2))  # [K, N]
         points = self._linear(np.nan_to_num(rays), used)
@@ -123,18 +123,18 @@ class StereoRig:
     def _linearised(
         self, points: Floats, rays: Floats, focal: Floats, used: NDArray[np.bool_]
     ) -> tuple[Floats, Floats]:
-        """What is seen less what is projected, px [K, N, 2], and d(projected)/d(point) [K, N, 2, 3]; 0 if not seen."""
-        turns = self._from_world[:, :, :3]
-        local = np.einsum("kij,nj->kni", turns, points) + self._from_world[:, None, :, 3]
+        """Detected minus projected, px [K, N, 2], and d(projected)/d(point) [K, N, 2, 3]; 0 if not detected."""
+        rotations = self._from_world[:, :, :3]
+        local = np.einsum("kij,nj->kni", rotations, points) + self._from_world[:, None, :, 3]
         depth = np.where(np.abs(local[..., 2:]) > 1e-9, local[..., 2:], 1e-9)
         projected = local[..., :2] / depth
         residuals = np.where(used[..., None], (rays - projected) * focal[:, None], 0.0)
-        bracket = turns[:, None, :2] - projected[..., None] * turns[:, None, 2:]
+        bracket = rotations[:, None, :2] - projected[..., None] * rotations[:, None, 2:]
         jacobians = bracket / depth[..., None] * focal[:, None, :, None]
         return residuals, np.where(used[..., None, None], jacobians, 0.0)
 
     def _angles_deg(self, points: Floats, used: NDArray[np.bool_]) -> Floats:
-        towards = points[None] - self._places[:, None]
+        towards = points[None] - self._positions[:, None]
         towards = towards / np.maximum(np.linalg.norm(towards, axis=2, keepdims=True), 1e-12)
         cosines = np.einsum("kni,mni->kmn", towards, towards)
         both = used[:, None] & used[None]
@@ -142,7 +142,7 @@ class StereoRig:
 
 
 def _normalised(camera: CalibratedCamera, pixels: Floats) -> Floats:
-    """Ray directions (x/z, y/z) in the camera frame of image points (N, 2), px, with the distortion undone."""
+    """Ray directions (x/z, y/z) in the camera frame of image points (N, 2), px, with the distortion removed."""
     result = np.full_like(pixels, np.nan)
     known = np.isfinite(pixels).all(axis=1)
     if known.any():
@@ -155,6 +155,6 @@ def _normalised(camera: CalibratedCamera, pixels: Floats) -> Floats:
 
 
 def _solved(matrices: Floats, right: Floats) -> Floats:
-    """Solutions [N, 3, M] of symmetric [N, 3, 3] systems; those that tell nothing stay finite."""
+    """Solutions [N, 3, M] of symmetric [N, 3, 3] systems; those of singular systems stay finite."""
     scale = np.maximum(np.trace(matrices, axis1=1, axis2=2), 1e-12)[:, None, None]
     return np.asarray(np.linalg.solve(matrices + 1e-12 * scale * np.eye(3), right), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The right arm of the synthetic demonstrator: lengths, hand shapes, and the pose for a place of the hand.
+"""The right arm of the synthetic demonstrator: lengths, hand shapes, and the pose for a position of the hand.
 
 The seven body points are those of thesis 4.2.1. All positions are in metres, x forward, y left, z up.
 """
@@ -15,7 +15,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class ArmLengths:
-    """Segment lengths in m, chosen so that a trained model shows a', b', l' of thesis 5.2.3.
+    """Segment lengths in m, chosen so that a trained model has a', b', l' of thesis 5.2.3.
 
     Attributes:
         upper_arm: shoulder to elbow.
@@ -36,7 +36,7 @@ class ArmPath:
 
     Attributes:
         sternum, shoulder: shape (T, 3).
-        effector: place on the forearm's axis that is led along the path, shape (T, 3).
+        effector: point on the forearm's axis that follows the path, shape (T, 3).
         reach: distance of the effector from the wrist, shape (T,).
         swivel: angle of the elbow about the line shoulder - effector, 0 down and back, positive outward, rad, (T,).
         aperture: distance between index finger and thumb, shape (T,).
@@ -95,11 +95,11 @@ def elbow_directions(axis: Floats) -> tuple[Floats, Floats]:
     return back_and_down, np.cross(back_and_down, axis)
 
 
-def swivel_towards(place: Floats, shoulder: Floats, effector: Floats) -> float:
-    """Swivel angle that brings the elbow nearest to `place`; all shapes (3,), m. In rad."""
+def swivel_towards(position: Floats, shoulder: Floats, effector: Floats) -> float:
+    """Swivel angle that brings the elbow nearest to `position`; all shapes (3,), m. In rad."""
     axis = unit((effector - shoulder)[None])
     back_and_down, outward = elbow_directions(axis)
-    offset = place - shoulder
+    offset = position - shoulder
     return float(np.arctan2(offset @ outward[0], offset @ back_and_down[0]))
 
 

@@ -1,6 +1,6 @@
 """Motion blending: the redirect action, "take this object here and put it there", made of pointing (thesis 4.3).
 
-A redirect action points at one place on the table and then at another; theta = (start u, start v, end u, end v). It is
+A redirect action points at one position on the table, then at another; theta = (start u, start v, end u, end v). It is
 blended from two pointing movements, either synthesised by a parametric HMM, as in the thesis, or demonstrated.
 """
 
@@ -25,12 +25,12 @@ PARAMETER_NAMES = ("start_u", "start_v", "end_u", "end_v")
 
 @dataclass(frozen=True)
 class BlendTiming:
-    """When the hand goes from the one place to the other.
+    """Timing of the transition between the two positions.
 
     Attributes:
-        crossing: share of the whole movement between arriving at the first place and leaving the second.
-        pause: share of the crossing that the hand rests at each of the two places.
-        stillness: a movement is at its place while it is slower than this share of its largest speed.
+        crossing: fraction of the whole movement between arriving at the first position and leaving the second.
+        pause: fraction of the crossing during which the hand rests at each of the two positions.
+        stillness: a movement is at its position while it is slower than this fraction of its maximum speed.
     """
 
     crossing: float = 0.36
@@ -43,11 +43,11 @@ class BlendTiming:
 
 
 def blended(first: ArrayLike, second: ArrayLike, n_samples: int = 80, timing: BlendTiming | None = None) -> Floats:
-    """Out as in the first movement, over to the second's place, back as in the second. (T_1, D), (T_2, D) -> (n, D).
+    """Out as in the first movement, over to the second's position, back as in the second. (T_1, D), (T_2, D) -> (n, D).
 
-    Both movements go out from a base pose, stay at a place and return. They are aligned by dynamic time warping of
-    their phases, not of their points: they go to different places. The weight of the second rises from 0 to 1 with
-    minimum jerk while both are at their places. Raises ValueError where a movement never stays or dimensions differ.
+    Both movements go out from a base pose, stay at a position and return. They are aligned by dynamic time warping of
+    their phases, not of their points: they go to different positions. The weight of the second rises from 0 to 1 with
+    minimum jerk while both are at their positions. Raises ValueError where a movement never stays or dimensions differ.
     """
     chosen = timing if timing is not None else BlendTiming()
     p, q = checked_sequence(first), checked_sequence(second)
@@ -70,9 +70,9 @@ def blended(first: ArrayLike, second: ArrayLike, n_samples: int = 80, timing: Bl
 
 
 def phase(movement: Floats, stillness: float = 0.1) -> Floats:
-    """0 to 1 on the way out, to 2 at the place, to 3 on the way back: by path length, at the place by time. Shape (T,).
+    """0 to 1 going out, to 2 at the position, to 3 returning: by path length, at the position by time. Shape (T,).
 
-    The place is where a movement (T, D) is stillest in its middle half. Raises ValueError where it is not still there.
+    The position is where a movement (T, D) is slowest in its middle half. Raises ValueError if it is not still there.
     """
     reach = SMOOTHED_FRAMES // 2
     padded = np.pad(movement, ((reach, reach), (0, 0)), mode="edge")
@@ -83,7 +83,7 @@ def phase(movement: Floats, stillness: float = 0.1) -> Floats:
     before, after = moving[moving < stillest], moving[moving > stillest]
     if len(before) == 0 or len(after) == 0 or after[0] - before[-1] < 4:
         raise ValueError(
-            f"a movement to blend goes out, stays at a place and returns; in the middle half it never is slower than "
+            f"a movement to blend goes out, stays at a position and returns; in the middle half it is never below "
             f"{stillness:g} of its largest speed for three frames; raise `stillness`"
         )
     arrived, leaves = int(before[-1]) + 1, int(after[0]) - 1
@@ -106,7 +106,7 @@ def corner_pairs(*, staying: bool = True) -> Floats:
 
 
 def nine_pairs() -> Floats:
-    """Nine pairs over the 3 x 3 raster, theta (9, 4): each level of a component meets each of any other once.
+    """Nine pairs over the 3 x 3 grid, theta (9, 4): each level of a component meets each of any other once.
 
     The orthogonal array of four factors with three levels: the fewest demonstrations that show every component at three
     levels without confounding any two.
@@ -138,18 +138,20 @@ def redirect_demonstrations(
     pairs = np.repeat(checked_pairs(theta), repetitions, axis=0)
     sequences = []
     for pair in pairs:
-        places = table_place(pair.reshape(2, 2))
-        shown = demonstrations_at(places, rng, action="pointing", repetitions=1, demonstrator=demonstrator).sequences
-        sequences.append(blended(shown[0], shown[1], n_samples))
+        targets = table_place(pair.reshape(2, 2))
+        sequences_of_pair = demonstrations_at(
+            targets, rng, action="pointing", repetitions=1, demonstrator=demonstrator
+        ).sequences
+        sequences.append(blended(sequences_of_pair[0], sequences_of_pair[1], n_samples))
     return Demonstrations(sequences, pairs, _described("blended from pointing demonstrations"))
 
 
 def train_pointing_model(seed: int = 0, *, n_states: int = 80, repetitions: int = 10) -> InterpolativePHMM:
     """The 2 x 2 interpolative model of pointing with parameters (u, v) that the blending starts from (4.3)."""
-    targets, places = table_targets(2, 2)
-    shown = demonstrations_at(targets, np.random.default_rng(seed), action="pointing", repetitions=repetitions)
+    targets, theta = table_targets(2, 2)
+    demonstrations = demonstrations_at(targets, np.random.default_rng(seed), action="pointing", repetitions=repetitions)
     model = InterpolativePHMM(n_states, 2, 3, resampled_frames=round(2.5 * n_states))
-    return model.fit(shown.sequences, np.repeat(places, repetitions, axis=0))
+    return model.fit(demonstrations.sequences, np.repeat(theta, repetitions, axis=0))
 
 
 def checked_pairs(theta: ArrayLike) -> Floats:

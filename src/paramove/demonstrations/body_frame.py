@@ -1,4 +1,4 @@
-"""Movements seen from the person: body frame, left arms mirrored to right ones, lengths scaled to the arm.
+"""Movements relative to the person: body frame, left arms mirrored to right ones, lengths scaled to the arm.
 
 The body frame has its origin where the shoulder of the moving arm is at the beginning, x forward, y left, z up.
 """
@@ -17,9 +17,9 @@ BODY = "body"
 SHOULDER, OTHER_SHOULDER, STERNUM = "shoulder", "other_shoulder", "sternum"
 ARM_CHAIN = ("shoulder", "elbow", "wrist")
 AT_BEGINNING = 0.25
-"""s. The pose of the trunk is the median over so much of the movement: what follows may lean."""
+"""s. The pose of the trunk is the median over this first part of the movement: afterwards the trunk may lean."""
 NARROWEST = 0.05
-"""m. Shoulder and sternum (or both shoulders) that are nearer to each other, seen from above, give no direction."""
+"""m. Shoulder and sternum (or both shoulders) at a smaller horizontal distance give no direction."""
 
 
 def in_body_frame(movement: Movement) -> Movement:
@@ -28,7 +28,7 @@ def in_body_frame(movement: Movement) -> Movement:
     y is the horizontal direction between both shoulders (points `shoulder`, of the moving arm, and `other_shoulder`)
     or, where there is only one, between sternum and shoulder; the latter is turned by some degrees, as the sternum lies
     before the shoulders, by nearly the same for everybody. One turn and shift for the whole movement, so that movements
-    of the trunk remain. A place in theta is taken along.
+    of the trunk remain. A position in theta is transformed too.
 
     Raises DemonstrationError if there is no such pair of points or they lie above each other.
     """
@@ -64,13 +64,13 @@ def mirrored(movement: Movement) -> Movement:
 
 def arm_length(movement: Movement) -> float:
     """Upper arm and forearm together: medians over the movement, m."""
-    places = [movement.point(name) for name in ARM_CHAIN]
-    pieces = [np.linalg.norm(b - a, axis=1) for a, b in itertools.pairwise(places)]
+    points = [movement.point(name) for name in ARM_CHAIN]
+    pieces = [np.linalg.norm(b - a, axis=1) for a, b in itertools.pairwise(points)]
     return float(sum(np.median(piece) for piece in pieces))
 
 
 def scaled(movement: Movement, factor: float) -> Movement:
-    """All lengths in the body frame, those of a place in theta too, times `factor`.
+    """All lengths in the body frame, those of a position in theta too, times `factor`.
 
     Raises DemonstrationError for another frame, whose origin is not at the shoulder.
     """
@@ -82,9 +82,9 @@ def scaled(movement: Movement, factor: float) -> Movement:
 
 
 def _mapped(movement: Movement, linear: Floats, origin: Floats, frame: str) -> Movement:
-    """Every place p becomes `linear` @ (p - origin)."""
+    """Every position p becomes `linear` @ (p - origin)."""
     theta = movement.theta.copy()
-    place = place_of_theta(movement.parameter_names)
-    if place is not None:
-        theta[place] = linear @ (theta[place] - origin)
+    position = place_of_theta(movement.parameter_names)
+    if position is not None:
+        theta[position] = linear @ (theta[position] - origin)
     return replace(movement, positions=(movement.positions - origin) @ linear.T, theta=theta, frame=frame)

@@ -44,7 +44,7 @@ class DemonstrationSet(Sequence[Movement]):
     Attributes:
         movements: In the order of labels.yaml.
         description: For people.
-        remarks: What was done on reading, such as gaps that were filled.
+        remarks: Changes on reading, such as gaps that were filled.
 
     Raises DemonstrationError for movements whose points, frames or parameters differ; names both.
     """
@@ -67,7 +67,7 @@ class DemonstrationSet(Sequence[Movement]):
 
     @classmethod
     def load(cls, folder: Path | str) -> DemonstrationSet:
-        """Reads a folder. Short losses of a point are filled (`max_gap` of labels.yaml) and told in `remarks`.
+        """Reads a folder. Short losses of a point are filled (`max_gap` of labels.yaml) and listed in `remarks`.
 
         Raises DemonstrationError, or LabelsError with file:line:column of every segment that cannot be used: its
         recording is missing or has other points, it is out of range, has a single frame, or a point is lost too long.
@@ -79,7 +79,7 @@ class DemonstrationSet(Sequence[Movement]):
     def write(self, folder: Path | str) -> None:
         """Writes a folder: one recording per recording that the movements come from, the movements one after another.
 
-        Positions are kept bit by bit, times to the nanosecond. Raises DemonstrationError if there is a set already.
+        Positions are stored exactly, times to the nanosecond. Raises DemonstrationError if there is a set already.
         """
         takes = [
             Take(
@@ -160,7 +160,7 @@ class DemonstrationSet(Sequence[Movement]):
         )
 
     def demonstrations(self, action: str | None = None) -> Demonstrations:
-        """The movements of one action (None: of the only one) with the description that a model keeps.
+        """The movements of one action (None: of the only one) with the description that a model stores.
 
         Raises DemonstrationError if there are several actions and none is named.
         """
@@ -170,12 +170,12 @@ class DemonstrationSet(Sequence[Movement]):
         if action is None and len(self.actions) > 1:
             raise DemonstrationError(f"a model is of one action; choose among {', '.join(self.actions)}")
         chosen = self.select(action)
-        found = chosen.sequences()
+        arrays = chosen.sequences()
         duration = float(np.mean([movement.duration for movement in chosen]))
         about = MovementDescription(
-            found.labels[0], self.point_names, "m", self.frame, self.parameter_names, duration, source=self.description
+            arrays.labels[0], self.point_names, "m", self.frame, self.parameter_names, duration, source=self.description
         )
-        return Demonstrations(found.sequences, found.theta, about)
+        return Demonstrations(arrays.sequences, arrays.theta, about)
 
     def resampled(self, rate_hz: float) -> DemonstrationSet:
         """All at one frame rate (`timing.resampled`)."""
@@ -186,7 +186,7 @@ class DemonstrationSet(Sequence[Movement]):
         return self._each(lambda movement: timing.cut_by_speed(movement, point, end=end))
 
     def in_body_frame(self) -> DemonstrationSet:
-        """All seen from the person (`body_frame.in_body_frame`)."""
+        """All relative to the person (`body_frame.in_body_frame`)."""
         return self._each(body_frame.in_body_frame)
 
     def with_right_arms(self) -> DemonstrationSet:
@@ -197,8 +197,8 @@ class DemonstrationSet(Sequence[Movement]):
         """Every person's movements scaled so that all arms are `length` metres long (None: the mean of the persons)."""
         measured = [(movement.subject, body_frame.arm_length(movement)) for movement in self.movements]
         lengths = {one: float(np.median([arm for name, arm in measured if name == one])) for one in self.subjects}
-        wanted = float(np.mean(list(lengths.values()))) if length is None else length
-        return self._each(lambda movement: body_frame.scaled(movement, wanted / lengths[movement.subject]))
+        target_length = float(np.mean(list(lengths.values()))) if length is None else length
+        return self._each(lambda movement: body_frame.scaled(movement, target_length / lengths[movement.subject]))
 
     def split(
         self, by: SplitBy = "movement", fraction: float = 0.25, seed: int = 0, bins: int | None = None

@@ -1,6 +1,6 @@
-"""A movement that depends on its parameter in no nearly straight way: a hand that passes an edge below or above it.
+"""A movement that depends nonlinearly on its parameter: a hand that passes an edge below or above it.
 
-A shelf stands between a person and the place to be reached; theta is the height of that place. To a place well below
+A shelf stands between a person and the target; theta is the height of the target. To a target well below
 the edge the hand goes straight, to one well above it goes over the edge, and in a narrow range it changes from the one
 to the other. A polynomial follows such a change badly, a grid only with many lines.
 """
@@ -14,7 +14,7 @@ from paramove.documents import Floats
 
 EDGE_HEIGHT = 0.05
 EDGE_WIDTH = 0.06
-"""Range of heights within which the way changes, m."""
+"""Range of heights within which the path changes, m."""
 DETOUR = 0.20
 SHARED_DEVIATION, SENSOR_DEVIATION = 0.006, 0.001
 N_FRAMES = 100
@@ -22,14 +22,14 @@ N_FRAMES = 100
 
 @dataclass(frozen=True)
 class NonlinearMovements:
-    """Sequences (T_k, 6), m: x, y, z of hand and elbow; theta (K, 1), m: the height of the place reached."""
+    """Sequences (T_k, 6), m: x, y, z of hand and elbow; theta (K, 1), m: the height of the target."""
 
     sequences: list[Floats]
     theta: Floats
 
 
 def strongly_nonlinear_movement(height: float, rng: np.random.Generator | None = None) -> Floats:
-    """One movement to a place at this height, -0.3 to 0.3 m from the shelf's middle. Shape (T, 6), m.
+    """One movement to a target at this height, -0.3 to 0.3 m from the shelf's middle. Shape (T, 6), m.
 
     Without a generator it is the prototype, without any variation.
     """
@@ -53,6 +53,6 @@ def strongly_nonlinear_movement(height: float, rng: np.random.Generator | None =
 def strongly_nonlinear_movements(
     rng: np.random.Generator, *, n_heights: int = 13, repetitions: int = 4
 ) -> NonlinearMovements:
-    """Demonstrations at heights spread evenly over -0.3 to 0.3 m."""
+    """Demonstrations at evenly spaced heights over -0.3 to 0.3 m."""
     theta = np.repeat(np.linspace(-0.3, 0.3, n_heights), repetitions)
     return NonlinearMovements([strongly_nonlinear_movement(float(one), rng) for one in theta], theta[:, None])

@@ -1,4 +1,4 @@
-"""Points that were lost for some frames: named, and filled where the loss is short."""
+"""Gaps in the recorded points: reported, and filled where they are short."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from paramove.demonstrations.movement import runs
 from paramove.documents import Floats
 
 NEIGHBOURS = 5
-"""So many frames on each side of a gap shape what is put into it."""
+"""Number of frames on each side of a gap that its spline goes through."""
 
 
 @dataclass(frozen=True)
 class PointGap:
-    """A point was lost from frame `first` until before frame `end`, for `duration` seconds between seen frames."""
+    """A point was lost from frame `first` until before frame `end`, for `duration` seconds between valid frames."""
 
     point: str
     first: int
@@ -25,12 +25,12 @@ class PointGap:
 
     def __str__(self) -> str:
         frames = f"frame {self.first}" if self.end - self.first == 1 else f"frames {self.first}-{self.end - 1}"
-        length = "it is not seen on both sides" if np.isinf(self.duration) else f"{self.duration:.3g} s"
+        length = "it is not valid on both sides" if np.isinf(self.duration) else f"{self.duration:.3g} s"
         return f"{self.point} in {frames} ({length})"
 
 
 def lost(positions: Floats) -> NDArray[np.bool_]:
-    """Where a point has no finite position. Shape (T, P, 3) -> (T, P)."""
+    """Whether a point has no finite position. Shape (T, P, 3) -> (T, P)."""
     result: NDArray[np.bool_] = np.asarray(~np.isfinite(positions).all(axis=-1))
     return result
 
@@ -48,14 +48,14 @@ def fill_gaps(
 
     Returns:
         Positions, with NaN where nothing was filled; the filled gaps; those left open, which are too long or lie at
-        the beginning or end. What was seen is returned as it was.
+        the beginning or end. Valid positions are unchanged.
     """
     result = positions.copy()
     missing = lost(positions)
     result[missing] = np.nan
     filled, left = [], []
     for point in np.flatnonzero(missing.any(axis=0)):
-        seen = np.flatnonzero(~missing[:, point])
+        valid_frames = np.flatnonzero(~missing[:, point])
         for first, end in runs(missing[:, point]):
             at_edge = first == 0 or end == len(time)
             duration = np.inf if at_edge else (time[end] - time[first - 1]) * (end - first) / (end - first + 1)
@@ -63,17 +63,17 @@ def fill_gaps(
             if duration > max_gap * (1.0 + 1e-9):
                 left.append(gap)
                 continue
-            split = int(np.searchsorted(seen, first))
-            around = seen[max(0, split - NEIGHBOURS) : split + NEIGHBOURS]
+            split = int(np.searchsorted(valid_frames, first))
+            around = valid_frames[max(0, split - NEIGHBOURS) : split + NEIGHBOURS]
             result[first:end, point] = _between(time, positions[:, point], around, time[first:end])
             filled.append(gap)
     return result, filled, left
 
 
-def _between(time: Floats, path: Floats, around: NDArray[np.intp], wanted: Floats) -> Floats:
+def _between(time: Floats, path: Floats, around: NDArray[np.intp], new_time: Floats) -> Floats:
     if len(around) < 4:
-        return np.stack([np.interp(wanted, time[around], path[around, axis]) for axis in range(3)], axis=-1)
+        return np.stack([np.interp(new_time, time[around], path[around, axis]) for axis in range(3)], axis=-1)
     from scipy.interpolate import CubicSpline  # a third of a second, which only a gap should cost
 
-    result: Floats = CubicSpline(time[around], path[around])(wanted)
+    result: Floats = CubicSpline(time[around], path[around])(new_time)
     return result

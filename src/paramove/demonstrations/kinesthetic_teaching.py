@@ -1,6 +1,6 @@
-"""A person leads a servo arm by hand: each segment becomes a movement of a demonstration set. Without a clock.
+"""A person leads a servo arm by hand: each segment becomes a movement of a demonstration set. It reads no clock.
 
-The points are those of `robots/pose_points.py`, and theta is the place where the end effector is at the end.
+The points are those of `robots/pose_points.py`, and theta is the final position of the end effector.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from paramove.robots import ARM_BASE, POINT_NAMES, DescriptionError, RobotDescri
 
 PARAMETERS = ("target_x", "target_y", "target_z")
 RESTS_WITHIN_M = 0.002
-"""The hand rests while it is so near to where the segment began, and from when on it stays so near to where it ends."""
+"""The hand rests while it is within this distance of the segment's start, and while it stays as close to its end."""
 RECORDING = "taught_{:03d}.mcap"
 NANO = 1e-9
 
 
 class KinestheticTeacher:
-    """`hear` where the arm is; `begin`, `end` and `drop` as the person says.
+    """Pass joint angles to `handle`; call `begin`, `end` and `drop` on the person's commands.
 
-    A segment is written as soon as it has ended, so nothing that has ended is lost, whatever happens.
+    A segment is written as soon as it has ended, so that a later failure loses nothing.
 
     Args:
         description: Of an arm with a chain.
         folder: Of the set.
-        action: What is shown, such as reaching.
-        subject: Who shows it.
-        append: Whether the set may be there already.
+        action: The demonstrated action, such as reaching.
+        subject: The person who demonstrates it.
+        append: Whether the set may exist already.
 
     Attributes:
         written: Recordings of the segments that have ended, the latest last.
@@ -56,9 +56,9 @@ class KinestheticTeacher:
         self._samples: list[tuple[int, Floats]] | None = None
         self.written: list[str] = []
         if self._labels.exists():
-            self._refuse(append)
+            self._check_existing(append)
 
-    def _refuse(self, append: bool) -> None:
+    def _check_existing(self, append: bool) -> None:
         if not append:
             raise DemonstrationError(
                 f"{self._folder} holds a demonstration set already; choose another folder, or --append to it"
@@ -76,22 +76,22 @@ class KinestheticTeacher:
         return self._samples is not None
 
     def handle(self, at_ns: int, angles: Floats) -> None:
-        """Where all joints of the robot are, [J] in its order, rad."""
+        """Adds the angles of all joints of the robot, [J] in its order, rad."""
         if self._samples is not None and (not self._samples or at_ns > self._samples[-1][0]):
             self._samples.append((at_ns, angles))
 
     def begin(self) -> None:
-        """A segment begins; one that has begun is forgotten."""
+        """Begins a segment; an unfinished one is discarded."""
         self._samples = []
 
     def end(self) -> Floats:
-        """The segment ends, and is written.
+        """Ends the segment and writes it.
 
         Returns:
-            Where the end effector was at the end, [3], m, frame of the arm's base.
+            The final position of the end effector, [3], m, frame of the arm's base.
 
         Raises:
-            DemonstrationError: None has begun, the arm was not moved, or it cannot be written; it is forgotten.
+            DemonstrationError: None has begun, the arm was not moved, or it cannot be written; it is discarded.
         """
         samples, self._samples = self._samples, None
         if samples is None:
@@ -105,7 +105,7 @@ class KinestheticTeacher:
         return np.array(take.labels[0].theta)
 
     def drop(self) -> str:
-        """Take back the latest segment of this session that has ended, its recording and its label.
+        """Deletes the latest finished segment of this session, its recording and its label.
 
         Returns:
             The name of its recording.
@@ -131,7 +131,9 @@ class KinestheticTeacher:
 
     def _take(self, samples: list[tuple[int, Floats]]) -> Take:
         if len(samples) < 2:
-            raise DemonstrationError("the segment has no frames: let the arm be heard before it ends; it is left out")
+            raise DemonstrationError(
+                "the segment has no frames: receive the arm's angles before it ends; it is left out"
+            )
         time_ns = np.array([at_ns for at_ns, _ in samples], dtype=np.int64)
         angles = np.array([row for _, row in samples])
         joints = angles[:, self._chain.indices]
@@ -162,13 +164,13 @@ def moved_part(hand: Floats) -> tuple[int, int]:
         hand: Path, shape [T, 3], m.
 
     Raises:
-        DemonstrationError: It stays where it is.
+        DemonstrationError: The hand does not move.
     """
     away = np.flatnonzero(np.linalg.norm(hand - hand[0], axis=1) > RESTS_WITHIN_M)
     on_the_way = np.flatnonzero(np.linalg.norm(hand - hand[-1], axis=1) > RESTS_WITHIN_M)
     if not away.size or not on_the_way.size:
         raise DemonstrationError(
-            f"the hand was moved by less than {1e3 * RESTS_WITHIN_M:g} mm, or brought back to where it was; the "
+            f"the hand was moved by less than {1e3 * RESTS_WITHIN_M:g} mm, or returned to its start; the "
             "segment is left out"
         )
     return max(0, int(away[0]) - 1), int(on_the_way[-1]) + 2

@@ -1,4 +1,4 @@
-"""Labels for recordings: movements found by their speed, checked against the recording before they are written."""
+"""Labels for recordings: movements detected by their speed, checked against the recording before they are written."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ def movements_by_speed(
     """Movements of one point: first frame and one past the last of each.
 
     Each begins with the first frame above 3 cm/s before the point exceeds 15 cm/s, and ends with the first frame at 3
-    cm/s or less after. A way there and a way back with a rest between them are two movements.
+    cm/s or less after. A movement and its return with a rest between them are two movements.
 
-    Raises DemonstrationError if the point is not there, or seen in fewer than two frames.
+    Raises DemonstrationError if there is no such point, or it is valid in fewer than two frames.
     """
     if point not in point_names:
         raise DemonstrationError(f"there is no point '{point}' to find movements by; {nearest(point, point_names)}")
     filled, _, _ = fill_gaps(time, positions, point_names, max_gap)
     path = filled[:, point_names.index(point)]
-    seen = np.isfinite(path).all(axis=1)
-    if seen.sum() < 2:
-        raise DemonstrationError(f"{point} is seen in {seen.sum()} frames; no movement can be found by it")
-    whole = np.stack([np.interp(time, time[seen], path[seen, axis]) for axis in range(3)], axis=-1)
+    valid = np.isfinite(path).all(axis=1)
+    if valid.sum() < 2:
+        raise DemonstrationError(f"{point} is valid in {valid.sum()} frames; no movement can be detected from it")
+    whole = np.stack([np.interp(time, time[valid], path[valid, axis]) for axis in range(3)], axis=-1)
     movement = Movement(time - time[0], whole[:, None, :], (point,), "", "any", np.zeros(0))
     speed = speeds(movement, point)
-    found: list[tuple[int, int]] = []
+    movements: list[tuple[int, int]] = []
     begin = 0
     for quick in np.flatnonzero(speed > FAST).tolist():
         if quick < begin:
@@ -44,9 +44,9 @@ def movements_by_speed(
         after = np.flatnonzero(speed[quick:] <= SLOW)
         first = begin + int(still[-1]) + 1 if still.size else begin
         end = quick + int(after[0]) + 1 if after.size else len(time)
-        found.append((first, end))
+        movements.append((first, end))
         begin = end
-    return found
+    return movements
 
 
 def next_repetition(there: Sequence[Segment], segment: Segment) -> int:

@@ -1,4 +1,4 @@
-"""labels.yaml of a demonstration set: which part of which recording shows what; read, checked and written."""
+"""labels.yaml of a demonstration set: the labelled segments of each recording; read, checked and written."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ HEAD = """\
 
 
 class LabelsError(DemonstrationError):
-    """labels.yaml is wrong: one finding or several, a line each, that begin with file:line:column."""
+    """labels.yaml is wrong: one finding per line, each with file:line:column."""
 
     def __init__(self, findings: DocumentError) -> None:
         super().__init__(str(findings))
@@ -67,7 +67,9 @@ Word = Annotated[str, Field(min_length=1, max_length=80)]
 class Segment(_Checked):
     """One movement in a recording."""
 
-    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(description="file, beside labels.yaml")
+    recording: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="file in the folder of labels.yaml"
+    )
     start: float = Field(ge=0.0, description="s from the first pose of the recording; the first frame of the movement")
     end: float = Field(gt=0.0, description="s; the last frame of the movement")
     action: Word = Field(description="what is done, such as reaching")
@@ -80,7 +82,7 @@ class Segment(_Checked):
 
 
 class LabelsFile(_Checked):
-    """Everything that labels.yaml says."""
+    """The content of labels.yaml."""
 
     version: Literal[1] = Field(default=1, description="of this form")
     description: str = Field(default="", description="for people")
@@ -94,7 +96,7 @@ class LabelsFile(_Checked):
 
 @dataclass(frozen=True)
 class Labels:
-    """A checked labels.yaml and where each value stood."""
+    """A checked labels.yaml and the position of each value."""
 
     path: Path
     file: LabelsFile
@@ -111,9 +113,9 @@ class Labels:
 
 
 def load_labels(path: Path) -> Labels:
-    """Reads and checks labels.yaml; the recordings are not looked at.
+    """Reads and checks labels.yaml; the recordings are not read.
 
-    Raises DemonstrationError if there is no such file, LabelsError with the positions of all that is wrong in it.
+    Raises DemonstrationError if there is no such file, LabelsError with the positions of all faults in it.
     """
     if not path.is_file():
         raise DemonstrationError(
@@ -138,11 +140,11 @@ def _validated(document: Document) -> LabelsFile:
     try:
         return LabelsFile.model_validate(document.data)
     except ValidationError as error:
-        unknown = [found["loc"] for found in error.errors() if found["type"] == "extra_forbidden"]
-        # A key that is missing only because it is mistyped is told once.
+        unknown = [one["loc"] for one in error.errors() if one["type"] == "extra_forbidden"]
+        # A key that is missing only because it is mistyped is reported once.
         mistyped = {(*loc[:-1], meant) for loc in unknown for meant in closest(str(loc[-1]), Segment.model_fields)}
-        told = [one for one in error.errors() if one["type"] != "missing" or tuple(one["loc"]) not in mistyped]
-        raise DocumentError.of([_finding(document, found) for found in told]) from error
+        reported = [one for one in error.errors() if one["type"] != "missing" or tuple(one["loc"]) not in mistyped]
+        raise DocumentError.of([_finding(document, one) for one in reported]) from error
 
 
 _EXPECTED = {
@@ -168,7 +170,7 @@ def _finding(document: Document, details: ErrorDetails) -> DocumentError:
 def _contradictions(labels: Labels) -> list[DocumentError]:
     """Segments that contradict themselves or each other."""
     findings: list[DocumentError] = []
-    seen: dict[tuple[object, ...], int] = {}
+    first_index: dict[tuple[object, ...], int] = {}
     names = labels.file.parameters
     for kind, words in (("parameters", names), ("points", labels.file.points or [])):
         if len(set(words)) < len(words):
@@ -184,7 +186,7 @@ def _contradictions(labels: Labels) -> list[DocumentError]:
             message = f"{segment.recording!r}: expected a file in the folder of {FILE_NAME}; copy it there"
             findings.append(labels.error(index, message, "recording"))
         key = (segment.recording, segment.start, segment.end, segment.action, segment.side)
-        first = seen.setdefault(key, index)
+        first = first_index.setdefault(key, index)
         if first != index:
             message = (
                 f"the same segment ({segment.recording}, {segment.start:g} to {segment.end:g} s) "
@@ -210,9 +212,9 @@ def write_labels(path: Path, content: LabelsFile) -> None:
 
 
 def append_segments(path: Path, segments: Sequence[Segment]) -> None:
-    """Adds segments to a labels.yaml; every other character of it, comments too, stays as it is.
+    """Adds segments to a labels.yaml; everything else in it, comments too, is unchanged.
 
-    Raises DemonstrationError or LabelsError, and leaves the file alone, if it would not be a sound one afterwards.
+    Raises DemonstrationError or LabelsError, and leaves the file alone, if the result would not be valid.
     """
     before = _text(path)
     load_labels(path)
@@ -222,8 +224,8 @@ def append_segments(path: Path, segments: Sequence[Segment]) -> None:
         try:
             load_labels(after)
         except LabelsError as error:
-            said = "; ".join(finding.message for finding in error.findings)
-            raise DemonstrationError(f"{path} would not be sound with this segment: {said}") from error
+            messages = "; ".join(finding.message for finding in error.findings)
+            raise DemonstrationError(f"{path} would not be valid with this segment: {messages}") from error
 
 
 def _with_segments(text: str, lines: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""One labelled movement of an arm, and what a set of them may be refused for."""
+"""One labelled movement of an arm, and its checks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ POINTS_FIRST = ("index", "wrist", "hand")
 
 
 class DemonstrationError(InputError):
-    """A demonstration, its labels or a file of motion capture cannot be used; says which and what helps."""
+    """A demonstration, its labels or a file of motion capture cannot be used; the message names it and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Movement:
         time: from the first frame, which is 0, increasing. Shape (T,), s; T is at least 2.
         positions: of the body points. Shape (T, P, 3), m, in `frame`.
         point_names: of the P points.
-        frame: coordinate frame of the positions: x forward, y left, z up, unless the recording says otherwise.
+        frame: coordinate frame of the positions: x forward, y left, z up, unless the recording defines others.
         action: what is done.
         theta: the movement's parameters. Shape (Q,).
         parameter_names: of the Q components of theta.
@@ -56,9 +56,9 @@ class Movement:
     source: str = "a movement"
 
     def __post_init__(self) -> None:
-        found = self._wrong()
-        if found:
-            raise DemonstrationError(f"{self.source}: {found}")
+        fault = self._wrong()
+        if fault:
+            raise DemonstrationError(f"{self.source}: {fault}")
 
     @property
     def frames(self) -> Floats:
@@ -104,7 +104,7 @@ class Movement:
 
 
 def place_of_theta(parameter_names: tuple[str, ...]) -> slice | None:
-    """Which components of theta are a place in space: three that follow each other and end in _x, _y, _z."""
+    """Which components of theta are a position in space: three that follow each other and end in _x, _y, _z."""
     for first in range(len(parameter_names) - 2):
         three = parameter_names[first : first + 3]
         stems = {name.removesuffix(ending) for name, ending in zip(three, AXIS_ENDINGS, strict=True)}
@@ -114,9 +114,9 @@ def place_of_theta(parameter_names: tuple[str, ...]) -> slice | None:
 
 
 def frame_ranges(marked: NDArray[np.bool_], first: int = 0, maximum: int = 6) -> str:
-    """Marked frames in words: '3-7, 12'; further ranges than `most` are counted."""
-    found = [f"{a + first}" if b - a == 1 else f"{a + first}-{b - 1 + first}" for a, b in runs(marked)]
-    return ", ".join(found[:maximum]) + (f" and {len(found) - maximum} more ranges" if len(found) > maximum else "")
+    """Marked frames as text: '3-7, 12'; ranges beyond `maximum` are counted."""
+    ranges = [f"{a + first}" if b - a == 1 else f"{a + first}-{b - 1 + first}" for a, b in runs(marked)]
+    return ", ".join(ranges[:maximum]) + (f" and {len(ranges) - maximum} more ranges" if len(ranges) > maximum else "")
 
 
 def runs(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:

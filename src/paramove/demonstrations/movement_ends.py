@@ -20,36 +20,35 @@ from paramove.demonstrations.synthetic import (
 from paramove.documents import Floats, Ints
 
 FRAMES = 24
-"""Of a last part, however long it took."""
-WAY, STAY = 0.5, 0.3
-"""The last part: the last half of the time of the way, and as long at the target as 0.3 of that time, or until the hand
-leaves."""
+"""Number of frames of a last part, of any duration."""
+APPROACH_FRACTION, STAY_FRACTION = 0.5, 0.3
+"""The last part: the last half of the approach's time, and 0.3 of that time at the target, or until the hand leaves."""
 THERE_M, AWAY_M = 0.02, 0.03
-"""m. The hand is at the target, and has left where it began."""
-BESIDE_M = {"elbow": 0.010, "wrist": 0.003, "index": 0.003}
-"""Standard deviation, along each axis, of where what is tracked of a joint lies beside it, the same all the time. An
-elbow is seen from outside."""
+"""m. Distances at which the hand is at the target, and has left its start."""
+OFFSET_M = {"elbow": 0.010, "wrist": 0.003, "index": 0.003}
+"""Standard deviation, along each axis, of the constant offset of a tracked point from its joint. An elbow is tracked
+from outside."""
 CAMERA_HZ = 15.0
-SEEN_M = 0.005
-"""Standard deviation of each coordinate of a tracked point. With more of it here, grasping hands look like pointing."""
+NOISE_M = 0.005
+"""Standard deviation of each coordinate of a tracked point. With more noise, grasping hands look like pointing."""
 
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody who sits elsewhere and moves otherwise than the demonstrator, as far as measuring leaves it unknown.
+    """A person whose position and movements differ from the demonstrator's by what measuring leaves unknown.
 
     Attributes:
         demonstrator: with own lengths and timing.
         swivel: angle about the line from shoulder to fingertip by which the elbow is carried higher, rad.
         offset: error of the measured shoulder, (3,), m. size: the true over the measured length of the arm.
-        beside: where what is tracked of each body point lies beside it, (7, 3), m.
+        tracking_offsets: of each tracked point from its body point, (7, 3), m.
     """
 
     demonstrator: Demonstrator
     swivel: float
     offset: Floats
     size: float
-    beside: Floats
+    tracking_offsets: Floats
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Person:
@@ -65,12 +64,12 @@ class Person:
             arrive=timing.arrive + float(rng.uniform(-0.04, 0.03)),
         )
         person = Demonstrator(lengths, timing=timing)
-        scatter = np.array([BESIDE_M.get(name, 0.0) for name in POINT_NAMES])
-        beside = scatter[:, None] * rng.standard_normal((len(POINT_NAMES), 3))
+        scatter = np.array([OFFSET_M.get(name, 0.0) for name in POINT_NAMES])
+        tracking_offsets = scatter[:, None] * rng.standard_normal((len(POINT_NAMES), 3))
         offset, size = rng.normal(0.0, 0.006, 3), float(rng.uniform(0.98, 1.02))
-        return cls(person, float(rng.uniform(-0.2, 0.2)), offset, size, beside)
+        return cls(person, float(rng.uniform(-0.2, 0.2)), offset, size, tracking_offsets)
 
-    def seen(self, action: Action, target: Floats, rng: np.random.Generator) -> tuple[Floats, tuple[float, float]]:
+    def observed(self, action: Action, target: Floats, rng: np.random.Generator) -> tuple[Floats, tuple[float, float]]:
         """One movement to `target` (3,), m, in the models' frame: body points (T, 7, 3) at 60 Hz; begin and end, s, of
         its last part."""
         points = self.demonstrator.demonstrate(action, target, rng).reshape(-1, len(POINT_NAMES), 3)
@@ -83,7 +82,7 @@ class Person:
         turn = Rotation.from_rotvec(self.swivel * axis / np.linalg.norm(axis, axis=1, keepdims=True))
         for joint in (elbow, wrist):
             points[:, joint] = points[:, shoulder] + turn.apply(points[:, joint] - points[:, shoulder])
-        return RESTING_SHOULDER + (points - RESTING_SHOULDER) * self.size + self.offset + self.beside, part
+        return RESTING_SHOULDER + (points - RESTING_SHOULDER) * self.size + self.offset + self.tracking_offsets, part
 
 
 def _last_part(hand: Floats, target: Floats) -> tuple[float, float]:
@@ -92,8 +91,9 @@ def _last_part(hand: Floats, target: Floats) -> tuple[float, float]:
     there = np.flatnonzero(np.linalg.norm(hand - reached, axis=1) < THERE_M)
     departs = float(np.argmax(np.linalg.norm(hand - hand[0], axis=1) > AWAY_M))
     arrives, leaves = float(there[0]), float(there[-1])
-    way = arrives - departs
-    return (arrives - WAY * way) / SAMPLE_RATE_HZ, min(arrives + STAY * way, leaves) / SAMPLE_RATE_HZ
+    approach = arrives - departs
+    begin, end = arrives - APPROACH_FRACTION * approach, min(arrives + STAY_FRACTION * approach, leaves)
+    return begin / SAMPLE_RATE_HZ, end / SAMPLE_RATE_HZ
 
 
 @dataclass(frozen=True)
@@ -116,26 +116,26 @@ class LastParts:
 def last_parts(
     action: Action, points: Sequence[str], seed: int = 0, *, persons: int = 8, repetitions: int = 2
 ) -> LastParts:
-    """Of persons who reach for or point at 5 x 3 places of the table; `points` are some of the demonstrated ones."""
+    """Last parts of persons who reach for or point at 5 x 3 positions on the table; `points` are some of theirs."""
     rng = np.random.default_rng((540, seed, 0 if action == "pointing" else 1))
-    targets, places = table_targets(5, 3)
+    targets, positions = table_targets(5, 3)
     chosen = [POINT_NAMES.index(name) for name in points]
     sequences, durations = [], []
     for _ in range(persons):
         person = Person.drawn(rng)
         for target in np.repeat(targets, repetitions, axis=0):
-            moved, (begin, end) = person.seen(action, target, rng)
+            moved, (begin, end) = person.observed(action, target, rng)
             times = np.arange(rng.uniform(0.0, 1.0 / CAMERA_HZ), (len(moved) - 1) / SAMPLE_RATE_HZ, 1.0 / CAMERA_HZ)
-            seen = at_times(times, np.arange(len(moved)) / SAMPLE_RATE_HZ, moved[:, chosen].reshape(len(moved), -1))
-            seen += rng.normal(0.0, SEEN_M, seen.shape)
-            sequences.append(at_times(np.linspace(begin, end, FRAMES), times, seen))
+            tracked = at_times(times, np.arange(len(moved)) / SAMPLE_RATE_HZ, moved[:, chosen].reshape(len(moved), -1))
+            tracked += rng.normal(0.0, NOISE_M, tracked.shape)
+            sequences.append(at_times(np.linspace(begin, end, FRAMES), times, tracked))
             durations.append(end - begin)
-    theta = np.tile(np.repeat(places, repetitions, axis=0), (persons, 1))
+    theta = np.tile(np.repeat(positions, repetitions, axis=0), (persons, 1))
     return LastParts(
         sequences, theta, np.repeat(np.arange(persons), len(targets) * repetitions), float(np.mean(durations))
     )
 
 
-def at_times(wanted: Floats, times: Floats, values: Floats) -> Floats:
-    """Values (T, D) at other times, linearly interpolated. (len(wanted), D)."""
-    return np.stack([np.interp(wanted, times, column) for column in values.T], axis=1)
+def at_times(new_times: Floats, times: Floats, values: Floats) -> Floats:
+    """Values (T, D) at other times, linearly interpolated. (len(new_times), D)."""
+    return np.stack([np.interp(new_times, times, column) for column in values.T], axis=1)

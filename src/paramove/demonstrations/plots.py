@@ -22,20 +22,20 @@ FIGURE_IN = (13.0, 7.5)
 COLOURS = "viridis"
 
 
-def plot_set(shown: DemonstrationSet, point: str | None = None, colour_by: str | None = None) -> Figure:
-    """Left the paths of one point in space, right its x, y, z over time; one line per movement.
+def plot_set(dataset: DemonstrationSet, point: str | None = None, colour_by: str | None = None) -> Figure:
+    """On the left the paths of one point in space, on the right its x, y, z over time; one line per movement.
 
     Args:
-        shown: What to draw.
+        dataset: The set to draw.
         point: Name of the point; None: the fingertip where there is one.
         colour_by: Name of a parameter, or "action"; None: the parameter that varies most, else the action.
 
-    Raises DemonstrationError for a set without movements, or a name that is not there.
+    Raises DemonstrationError for a set without movements, or an unknown name.
     """
-    if not len(shown):
+    if not len(dataset):
         raise DemonstrationError("there is no movement to draw")
-    name = point or next((one for one in POINTS_FIRST if one in shown.point_names), shown.point_names[-1])
-    values, title = _colour_values(shown, colour_by)
+    name = point or next((one for one in POINTS_FIRST if one in dataset.point_names), dataset.point_names[-1])
+    values, title = _colour_values(dataset, colour_by)
     figure = Figure(figsize=FIGURE_IN, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
@@ -43,55 +43,55 @@ def plot_set(shown: DemonstrationSet, point: str | None = None, colour_by: str |
     over_time = [figure.add_subplot(grid[row, 1]) for row in range(3)]
     norm = Normalize(float(values.min()), float(max(values.max(), values.min() + 1e-9)))
     colours = colormaps[COLOURS](norm(values))
-    for movement, colour in zip(shown, colours, strict=True):
+    for movement, colour in zip(dataset, colours, strict=True):
         path = movement.point(name)
         space.plot(*path.T, color=colour, linewidth=0.9, alpha=0.8)
         for axis, axes in enumerate(over_time):
             axes.plot(movement.time, path[:, axis], color=colour, linewidth=0.9, alpha=0.8)
-    _dress(space, over_time, shown, name)
+    _dress(space, over_time, dataset, name)
     if title == "action":
-        _legend(space, shown, values, colours)
+        _legend(space, dataset, values, colours)
     else:
         figure.colorbar(ScalarMappable(norm, COLOURS), ax=over_time, label=title, pad=0.02)
-    figure.suptitle(_title(shown), fontsize=11)
+    figure.suptitle(_title(dataset), fontsize=11)
     return figure
 
 
 def write_plot(figure: Figure, path: Path, about: str = "") -> None:
-    """Writes the picture as PNG, SVG or PDF, or within an HTML page that needs no other file.
+    """Writes the picture as PNG, SVG or PDF, or within a self-contained HTML page.
 
     Raises DemonstrationError for another ending.
     """
     if path.suffix.lower() in (".html", ".htm"):
         picture = io.BytesIO()
         figure.savefig(picture, format="png", dpi=DPI)
-        shown = image(picture.getvalue(), "paths and coordinates")
+        plot = image(picture.getvalue(), "paths and coordinates")
         style = "main{max-width:1400px}img{max-width:100%}"
-        path.write_text(report_page(about, about, "", [shown], style=style), encoding="utf-8")
+        path.write_text(report_page(about, about, "", [plot], style=style), encoding="utf-8")
     elif path.suffix.lower() in (".png", ".svg", ".pdf"):
         figure.savefig(path, dpi=DPI)
     else:
         raise DemonstrationError(f"{path}: pictures end in .png, .svg, .pdf or .html")
 
 
-def _colour_values(shown: DemonstrationSet, colour_by: str | None) -> tuple[Floats, str]:
+def _colour_values(dataset: DemonstrationSet, colour_by: str | None) -> tuple[Floats, str]:
     """A number per movement, and what it is."""
-    names = shown.parameter_names
+    names = dataset.parameter_names
     if colour_by not in (None, "action", *names):
         raise DemonstrationError(f"there is no parameter '{colour_by}'; {nearest(str(colour_by), ['action', *names])}")
-    theta = np.stack([movement.theta for movement in shown])
-    spread = np.ptp(theta, axis=0) if names else np.zeros(0)
-    if colour_by is None and names and spread.max() > 0.0:
-        colour_by = names[int(spread.argmax())]
+    theta = np.stack([movement.theta for movement in dataset])
+    ranges = np.ptp(theta, axis=0) if names else np.zeros(0)
+    if colour_by is None and names and ranges.max() > 0.0:
+        colour_by = names[int(ranges.argmax())]
     if colour_by in names:
         return theta[:, names.index(str(colour_by))], str(colour_by)
-    numbers = [shown.actions.index(movement.action) for movement in shown]
+    numbers = [dataset.actions.index(movement.action) for movement in dataset]
     return np.array(numbers, dtype=np.float64), "action"
 
 
-def _dress(space: Axes, over_time: list[Axes], shown: DemonstrationSet, name: str) -> None:
-    low = np.min([movement.point(name).min(axis=0) for movement in shown], axis=0)
-    high = np.max([movement.point(name).max(axis=0) for movement in shown], axis=0)
+def _dress(space: Axes, over_time: list[Axes], dataset: DemonstrationSet, name: str) -> None:
+    low = np.min([movement.point(name).min(axis=0) for movement in dataset], axis=0)
+    high = np.max([movement.point(name).max(axis=0) for movement in dataset], axis=0)
     middle, half = 0.5 * (low + high), 0.5 * float(np.max(high - low)) + 1e-3
     for number, axis in enumerate("xyz"):  # equal scales, so that a circle is one
         getattr(space, f"set_{axis}lim")(middle[number] - half, middle[number] + half)
@@ -99,18 +99,22 @@ def _dress(space: Axes, over_time: list[Axes], shown: DemonstrationSet, name: st
         over_time[number].set_ylabel(f"{name} {axis}, m")
         over_time[number].grid(alpha=0.3)
     space.set_box_aspect((1.0, 1.0, 1.0))  # type: ignore[arg-type]  # in 3D it takes three
-    space.set_title(f"path of {name}, frame '{shown.frame}'", fontsize=10)
+    space.set_title(f"path of {name}, frame '{dataset.frame}'", fontsize=10)
     over_time[-1].set_xlabel("time, s")
 
 
-def _legend(space: Axes, shown: DemonstrationSet, values: Floats, colours: Floats) -> None:
-    for number, action in enumerate(shown.actions):
+def _legend(space: Axes, dataset: DemonstrationSet, values: Floats, colours: Floats) -> None:
+    for number, action in enumerate(dataset.actions):
         colour = colours[int(np.flatnonzero(values == number)[0])]
         space.plot([], [], [], color=colour, label=action)
     space.legend(loc="upper left", fontsize=8)
 
 
-def _title(shown: DemonstrationSet) -> str:
-    persons = [name for name in shown.subjects if name]
-    parts = [f"{len(shown)} movements", ", ".join(shown.actions), f"{len(persons)} persons" if len(persons) > 1 else ""]
+def _title(dataset: DemonstrationSet) -> str:
+    persons = [name for name in dataset.subjects if name]
+    parts = [
+        f"{len(dataset)} movements",
+        ", ".join(dataset.actions),
+        f"{len(persons)} persons" if len(persons) > 1 else "",
+    ]
     return " · ".join(part for part in parts if part)

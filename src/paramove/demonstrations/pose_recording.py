@@ -17,9 +17,9 @@ from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.recording import RecordingWriter, read
 
 BILLION = 1_000_000_000
-MAX_UNSEEN = 2_000_000
+MAX_EMPTY = 2_000_000
 MAX_RATIO = 20
-"""Above `MAX_UNSEEN` places, the points that there are may be so many times as many as those that are seen."""
+"""Maximum ratio of entries in the table of points to valid positions, above `MAX_EMPTY` entries."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class PoseRecording:
 
     Attributes:
         time_ns: Capture times, increasing. Shape (T,), ns.
-        positions: Shape (T, P, 3), m, in `frame`; NaN where a point was not seen.
-        point_names: Of the P points, in the order in which they were first seen.
+        positions: Shape (T, P, 3), m, in `frame`; NaN where a point was not detected.
+        point_names: Of the P points, in the order in which they first occur.
         frame: Coordinate frame.
     """
 
@@ -53,22 +53,22 @@ def read_poses(path: Path) -> PoseRecording:
     part = path.with_name(path.name + ".part")
     file = path if path.is_file() or not part.is_file() else part
     times, columns, frames = array("q"), dict[str, int](), set()
-    rows_seen, columns_seen, places_seen = array("q"), array("q"), array("d")
+    valid_rows, valid_columns, valid_positions = array("q"), array("q"), array("d")
     with contextlib.suppress(FileNotFoundError):
         for recorded in read(file, [HUMAN_ARM_POSE.name], DemonstrationError):
             for point in recorded.message.points:
-                rows_seen.append(len(times))
-                columns_seen.append(columns.setdefault(point.name, len(columns)))
-                places_seen.extend((point.x, point.y, point.z))
+                valid_rows.append(len(times))
+                valid_columns.append(columns.setdefault(point.name, len(columns)))
+                valid_positions.extend((point.x, point.y, point.z))
             captured_ns = recorded.message.captured.ToNanoseconds()
             if not 0 <= captured_ns < 2**63:
                 raise DemonstrationError(f"{file}: pose {len(times)} was captured at {captured_ns / 1e9:g} s: damaged")
             times.append(captured_ns)
             frames.add(recorded.message.frame)
-            if len(times) * len(columns) > max(MAX_UNSEEN, MAX_RATIO * len(rows_seen)):
+            if len(times) * len(columns) > max(MAX_EMPTY, MAX_RATIO * len(valid_rows)):
                 raise DemonstrationError(
                     f"{file}: {len(columns)} names of points in {len(times)} poses, of which a pose has "
-                    f"{len(rows_seen) / len(times):.1f}; expected poses of the same points"
+                    f"{len(valid_rows) / len(times):.1f}; expected poses of the same points"
                 )
     if not times:
         raise _nothing(file)
@@ -78,12 +78,14 @@ def read_poses(path: Path) -> PoseRecording:
         first = int(backwards[0])
         raise DemonstrationError(
             f"{file}: pose {first + 1} was captured at {time_ns[first + 1] / 1e9:.6f} s, not after pose {first} at "
-            f"{time_ns[first] / 1e9:.6f} s; two sources spoke on {HUMAN_ARM_POSE.name}: record them apart"
+            f"{time_ns[first] / 1e9:.6f} s; two sources published {HUMAN_ARM_POSE.name}: record them separately"
         )
     if len(frames) > 1:
-        raise DemonstrationError(f"{file}: poses in different frames: {', '.join(sorted(frames))}; record them apart")
+        raise DemonstrationError(
+            f"{file}: poses in different frames: {', '.join(sorted(frames))}; record them separately"
+        )
     positions = np.full((len(times), len(columns), 3), np.nan)
-    positions[np.array(rows_seen), np.array(columns_seen)] = np.array(places_seen).reshape(-1, 3)
+    positions[np.array(valid_rows), np.array(valid_columns)] = np.array(valid_positions).reshape(-1, 3)
     return PoseRecording(time_ns, positions, tuple(columns), frames.pop())
 
 
@@ -105,14 +107,14 @@ def write_poses(path: Path, recording: PoseRecording, library: str) -> None:
 
     Raises RecordingExistsError if there is such a file.
     """
-    seen: NDArray[np.bool_] = np.asarray(np.isfinite(recording.positions).all(axis=-1))
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(recording.positions).all(axis=-1))
     with RecordingWriter(path, library) as writer:
         for number, at in enumerate(recording.time_ns.tolist()):
             pose = ArmPose(frame=recording.frame)
             pose.captured.FromNanoseconds(at)
-            for name, place, known in zip(
-                recording.point_names, recording.positions[number].tolist(), seen[number].tolist(), strict=True
+            for name, position, valid in zip(
+                recording.point_names, recording.positions[number].tolist(), finite[number].tolist(), strict=True
             ):
-                if known:
-                    pose.points.add(name=name, x=place[0], y=place[1], z=place[2])
+                if valid:
+                    pose.points.add(name=name, x=position[0], y=position[1], z=position[2])
             writer.write(HUMAN_ARM_POSE.name, pose, at, at, number + 1)

@@ -39,7 +39,7 @@ def reaching_cuboid() -> ParameterGrid:
 
 
 def table_targets(columns: int, rows: int, height: float = 0.07) -> tuple[Floats, Floats]:
-    """A raster over 80 x 30 cm of the table (thesis 4.2.1), `height` above it, and its coordinates (u, v) in [0, 1].
+    """A grid over 80 x 30 cm of the table (thesis 4.2.1), `height` above it, and its coordinates (u, v) in [0, 1].
 
     u runs from the person's left to the right, v away from the person. Shapes (M, 3), m, and (M, 2).
     """
@@ -49,7 +49,7 @@ def table_targets(columns: int, rows: int, height: float = 0.07) -> tuple[Floats
 
 
 def table_place(coordinates: ArrayLike, height: float = 0.07) -> Floats:
-    """The place (..., 3), m, of coordinates (u, v) (..., 2) on the table region of `table_targets`."""
+    """The position (..., 3), m, of coordinates (u, v) (..., 2) on the table region of `table_targets`."""
     u, v = np.moveaxis(np.asarray(coordinates, dtype=np.float64), -1, 0)
     x, y, _ = RESTING_SHOULDER
     return np.stack([x + 0.20 + 0.30 * v, y + 0.40 - 0.80 * u, np.full_like(u, height)], axis=-1)
@@ -85,7 +85,7 @@ def train_reaching_model(
 ) -> InterpolativePHMM:
     """The 2 x 2 x 2 interpolative model of reaching, 80 states of 2 or 3 frames (thesis 5.2.2).
 
-    Its description tells the progress of arrival and grasp. With `cache` the model is read from that file if it was
+    Its description holds the progress of arrival and grasp. With `cache` the model is read from that file if it was
     made with the same arguments by the present code, and written there otherwise.
     """
     source = f"synthetic demonstrator, seed {seed}, {repetitions} repetitions, code {code_digest(__name__)}"
@@ -98,11 +98,11 @@ def train_reaching_model(
         and stored.description.source == source
     ):
         return stored
-    shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=repetitions)
-    model.fit(shown.sequences, shown.theta)
+    demonstrations = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=repetitions)
+    model.fit(demonstrations.sequences, demonstrations.theta)
     arrival, grasp = grasp_states(model.means_)
     model.description = replace(
-        shown.description, source=source, arrival=arrival / (n_states - 1), grasp=grasp / (n_states - 1)
+        demonstrations.description, source=source, arrival=arrival / (n_states - 1), grasp=grasp / (n_states - 1)
     )
     if cache is not None:
         model.save(cache)

@@ -1,4 +1,4 @@
-"""The segments of labels.yaml cut out of their recordings; what cannot be used is told with its line."""
+"""The segments of labels.yaml cut out of their recordings; faults are reported with their lines."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def read_movements(labels: Labels) -> tuple[list[Movement], list[str]]:
 
 
 class _Reader:
-    """Reads each recording once and collects what is wrong."""
+    """Reads each recording once and collects the faults."""
 
     def __init__(self, labels: Labels) -> None:
         self.findings: list[DocumentError] = []
@@ -78,18 +78,18 @@ class _Reader:
 
     def _with_points(self, poses: PoseRecording, name: str) -> PoseRecording:
         """The points that the set has, in its order; raises DemonstrationError if the recording has others."""
-        wanted = self._points or poses.point_names
-        missing = [point for point in wanted if point not in poses.point_names]
-        more = [] if self._labels.file.points else [point for point in poses.point_names if point not in wanted]
+        expected = self._points or poses.point_names
+        missing = [point for point in expected if point not in poses.point_names]
+        more = [] if self._labels.file.points else [point for point in poses.point_names if point not in expected]
         if missing or more:
             of = "`points` of labels.yaml names" if self._labels.file.points else f"{self._pattern} has"
             raise DemonstrationError(
-                f"{name} has the points {', '.join(poses.point_names)}; {of} {', '.join(wanted)}. "
+                f"{name} has the points {', '.join(poses.point_names)}; {of} {', '.join(expected)}. "
                 "Import it again with names for its points, or choose with `points` in labels.yaml what all have"
             )
-        self._points, self._pattern = wanted, self._pattern or name
-        order = [poses.point_names.index(point) for point in wanted]
-        return PoseRecording(poses.time_ns, poses.positions[:, order], wanted, poses.frame)
+        self._points, self._pattern = expected, self._pattern or name
+        order = [poses.point_names.index(point) for point in expected]
+        return PoseRecording(poses.time_ns, poses.positions[:, order], expected, poses.frame)
 
     def _out_of_range(self, segment: Segment, poses: PoseRecording) -> str:
         time = poses.time
@@ -104,9 +104,9 @@ class _Reader:
     def _remark(self, index: int, segment: Segment, chosen: NDArray[np.intp], recording: _Filled) -> None:
         inside = [gap for gap in recording.filled if gap.end > chosen[0] and gap.first <= chosen[-1]]
         if inside:
-            place = f"{self._labels.path.name}:{self._labels.line(index)}"
+            location = f"{self._labels.path.name}:{self._labels.line(index)}"
             gaps = "; ".join(map(str, inside[:3])) + (f" and {len(inside) - 3} more" if len(inside) > 3 else "")
-            self.remarks.append(f"{place}: {_words(segment)}: filled {gaps}")
+            self.remarks.append(f"{location}: {_words(segment)}: filled {gaps}")
 
     def _cut(self, index: int, segment: Segment, chosen: NDArray[np.intp], recording: _Filled) -> Movement:
         time_ns = recording.poses.time_ns[chosen]

@@ -78,8 +78,8 @@ class RecordedMovement:
     def from_onset(self) -> Floats:
         """The movement from the onset by the absolute rule to its last frame. Shape (T, D), m.
 
-        Origin where the shoulder is at this onset: where it is at the first frame of the segment would tell how far
-        both lie apart, and with that the kind of movement.
+        The origin is the shoulder at this onset: the shoulder at the first frame of the segment would reveal the
+        distance between both, and with that the kind of movement.
         """
         part = self.points[self.onset : self.segment[1]]
         origin = part[0, 3 * self.shoulder : 3 * self.shoulder + 3]
@@ -125,12 +125,12 @@ class Recordings:
 
 
 def data_folder(folder: str | Path | None = None) -> Path:
-    """The folder of recordings: the one given, that of the variable PARAMOVE_DATA, or shared/data beside the clone.
+    """The folder of recordings: the one given, that of the variable PARAMOVE_DATA, or shared/data next to the clone.
 
     Raises RecordingsError if it does not exist.
     """
-    beside = Path(__file__).resolve().parents[4] / "shared" / "data"
-    path = Path(folder or os.environ.get(VARIABLE) or beside)
+    default = Path(__file__).resolve().parents[4] / "shared" / "data"
+    path = Path(folder or os.environ.get(VARIABLE) or default)
     if not path.is_dir():
         raise RecordingsError(f"no folder with recordings at {path}: give one with --data or in {VARIABLE}")
     return path
@@ -178,8 +178,8 @@ def _recordings(name: str, arrays: dict[str, Any], rate_hz: float) -> Recordings
         body_from_room = _facing(own, hands, chain[0], _turning(names))
         scale = REFERENCE_ARM_M / _arm_length(own, chain)
         for raw, hand in zip(own, hands, strict=True):
-            seen = replace(raw, points=raw.points @ body_from_room.T, target=body_from_room @ raw.target)
-            movements.append(_in_body_frame(seen, arrays, hand, scale, chain[0], tip, int(ids[raw.index]), rate_hz))
+            turned = replace(raw, points=raw.points @ body_from_room.T, target=body_from_room @ raw.target)
+            movements.append(_in_body_frame(turned, arrays, hand, scale, chain[0], tip, int(ids[raw.index]), rate_hz))
     if not movements:
         raise ValueError("no movement is marked as usable (array ok)")
     return Recordings(name, names, tuple(sorted(movements, key=lambda one: (one.subject, one.action, one.target_id))))
@@ -211,14 +211,14 @@ def _axes(words: str) -> Floats:
 
 
 def _filled(points: Floats) -> Floats:
-    """Frames without a value are bridged by a straight line. Raises ValueError where a point is never seen."""
+    """Frames without a value are bridged by a straight line. Raises ValueError if a point is lost in all frames."""
     flat = points.reshape(len(points), -1).copy()
     frames = np.arange(len(flat))
     for column in flat.T:
-        seen = np.isfinite(column)
-        if not seen.any():
-            raise ValueError("a point is not seen in any frame of a movement that is marked as usable")
-        column[~seen] = np.interp(frames[~seen], frames[seen], column[seen])
+        finite = np.isfinite(column)
+        if not finite.any():
+            raise ValueError("a point is lost in all frames of a movement that is marked as usable")
+        column[~finite] = np.interp(frames[~finite], frames[finite], column[finite])
     return flat.reshape(points.shape)
 
 
@@ -229,11 +229,11 @@ def _chain_of(names: Sequence[str]) -> tuple[int, ...]:
     raise ValueError(f"points of the arm are {' or '.join(map(str, ARM_CHAINS))}, found {tuple(names)}")
 
 
-def _index_of(names: Sequence[str], wanted: Sequence[str]) -> int:
-    for name in wanted:
+def _index_of(names: Sequence[str], choices: Sequence[str]) -> int:
+    for name in choices:
         if name in names:
             return list(names).index(name)
-    raise ValueError(f"one of the points {', '.join(wanted)} is needed, found {tuple(names)}")
+    raise ValueError(f"one of the points {', '.join(choices)} is needed, found {tuple(names)}")
 
 
 def _hand_of(arrays: dict[str, Any], index: int) -> str:
@@ -253,14 +253,14 @@ def _facing(own: list[_Raw], hands: list[str], shoulder: int, sternum: int | Non
     if sternum is None:
         return np.eye(3)
     first = np.array([raw.points[:5, shoulder].mean(axis=0) for raw in own])
-    places = {hand: first[np.array(hands) == hand].mean(axis=0) for hand in set(hands)}
-    if len(places) == 2:
-        leftward = places["L"] - places["R"]
+    starts = {hand: first[np.array(hands) == hand].mean(axis=0) for hand in set(hands)}
+    if len(starts) == 2:
+        leftward = starts["L"] - starts["R"]
         angle = float(np.arctan2(-leftward[0], leftward[1]))
     else:
-        ((hand, place),) = places.items()
+        ((hand, start),) = starts.items()
         middle = np.mean([raw.points[:5, sternum].mean(axis=0) for raw in own], axis=0)
-        leftward = (place - middle) if hand == "L" else (middle - place)
+        leftward = (start - middle) if hand == "L" else (middle - start)
         angle = float(np.round(np.arctan2(-leftward[0], leftward[1]) / (np.pi / 2)) * np.pi / 2)
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -309,10 +309,10 @@ def _in_body_frame(
 def onset_of(fingertip: Floats, end: int, rate_hz: float) -> int:
     """First frame of a fingertip (T, 3), m, above 3 cm/s before its first above 15 cm/s; frames from `end` are ignored.
 
-    One absolute rule for all kinds of movement: a threshold relative to the movement's own peak would tell its kind.
+    One absolute rule for all kinds of movement: a threshold relative to the movement's own peak would reveal its kind.
     """
     path = fingertip[:end]
-    width = max(1, round(0.04 * rate_hz))  # differences over 80 ms: below that the cameras' noise is seen
+    width = max(1, round(0.04 * rate_hz))  # differences over 80 ms: below that the cameras' noise dominates
     later = path[np.minimum(np.arange(len(path)) + width, len(path) - 1)]
     earlier = path[np.maximum(np.arange(len(path)) - width, 0)]
     speed = np.linalg.norm(later - earlier, axis=1) * rate_hz / (2.0 * width)

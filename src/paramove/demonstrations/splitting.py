@@ -1,4 +1,4 @@
-"""Which movements train and which test: by share, by person, or by parameter cell; the same for the same seed."""
+"""Splits movements into training and test sets, by movement, person or parameter cell; the same for the same seed."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ def split_groups(
 
     Args:
         movements: All.
-        by: movement: a share of the movements of each action. subject: whole persons. theta: whole parameter cells,
+        by: movement: a fraction of the movements of each action. subject: whole persons. theta: whole parameter cells,
             so that no parameter of a test was trained with.
-        fraction: Share of the movements of an action, of the persons or of the cells that test; at least one.
+        fraction: Fraction of the movements of an action, of the persons or of the cells that test; at least one.
         seed: The same seed and movements, in whatever order, give the same split.
-        bins: With theta: so many cells of equal width per parameter; None: each parameter vector is its own cell.
+        bins: With theta: number of cells of equal width per parameter; None: each parameter vector is its own cell.
 
     Raises ValueError for a fraction outside (0, 1), DemonstrationError if there is nothing to choose from.
     """
     if not 0.0 < fraction < 1.0:
-        raise ValueError(f"the share of the test is above 0 and below 1, found {fraction}")
+        raise ValueError(f"expected a fraction for the test above 0 and below 1, found {fraction}")
     rng = np.random.default_rng(seed)
     if by == "movement":
         tested: set[int] = set()
@@ -48,7 +48,7 @@ def split_groups(
 
 
 def _identity(movement: Movement) -> tuple[object, ...]:
-    """What tells movements of an action apart, whatever their order."""
+    """Key that identifies a movement of an action, independent of their order."""
     labels = (movement.subject, movement.side, tuple(movement.theta.tolist()), movement.repetition)
     return (*labels, len(movement.time), movement.positions[0].tobytes(), movement.positions[-1].tobytes())
 
@@ -61,14 +61,14 @@ def _cells(movements: Sequence[Movement], bins: int | None) -> Callable[[Movemen
     if bins is None:
         return lambda movement: tuple(np.round(movement.theta / SAME_THETA).astype(np.int64).tolist())
     if bins < 1:
-        raise ValueError(f"at least one cell per parameter, found {bins}")
+        raise ValueError(f"at least one cell per parameter expected, found {bins}")
     theta = np.stack([movement.theta for movement in movements])
     low, width = theta.min(axis=0), np.ptp(theta, axis=0)
     width = np.where(width > 0.0, width, 1.0)
 
     def cell(movement: Movement) -> Hashable:
-        place = np.floor((movement.theta - low) / width * bins).astype(np.int64)
-        return tuple(np.minimum(place, bins - 1).tolist())
+        cell = np.floor((movement.theta - low) / width * bins).astype(np.int64)
+        return tuple(np.minimum(cell, bins - 1).tolist())
 
     return cell
 

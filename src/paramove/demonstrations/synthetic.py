@@ -1,4 +1,4 @@
-"""A synthetic demonstrator: a seated person who reaches for objects or points at places (thesis 4.2.1, 5.2.2).
+"""A synthetic demonstrator: a seated person who reaches for objects or points at positions (thesis 4.2.1, 5.2.2).
 
 Frame "demonstrator_table": x forward, y left, z up, metres; the origin lies on the table-top, at its near edge, in
 front of the sternum. The resting right shoulder is at RESTING_SHOULDER.
@@ -30,14 +30,14 @@ class Variation:
     Chosen to give the natural variation of thesis 4.2.4 and 4.2.5.
 
     Attributes:
-        miss: of the reached place from the target per axis, m.
+        miss: of the reached position from the target per axis, m.
         path: of the control points of the path, m.
         base: of the resting hand, m.
         posture: of the shoulder, m.
         swivel: of the elbow angle, rad.
         rate: of the relative duration of each phase.
         sensor: of each coordinate in each frame, m.
-        growth: share by which path, base, posture and swivel grow at the least comfortable targets.
+        growth: fraction by which path, base, posture and swivel grow at the least comfortable targets.
         unevenness: standard deviation of the log of a whole repetition's variation at such targets.
     """
 
@@ -59,7 +59,7 @@ class Variation:
 
 @dataclass(frozen=True)
 class Timing:
-    """Phases as shares of the whole movement, so that the target is reached and released in the same HMM states.
+    """Phases as fractions of the whole movement, so that the target is reached and released in the same HMM states.
 
     Of 80 states the 37th has reached the target with an open hand, the 45th still holds the object (thesis 5.2.5).
     """
@@ -79,10 +79,10 @@ class Timing:
             [0.0, self.depart, self.arrive, self.close, self.closed, self.release, self.leave, self.home, 1.0]
         )
         lengths = np.diff(marks) * np.clip(1.0 + rate * rng.standard_normal(8), 0.6, 1.4)
-        shares = (np.cumsum(lengths) / lengths.sum())[:-1]
+        fractions = (np.cumsum(lengths) / lengths.sum())[:-1]
         scale = float(np.clip(1.0 + rate * rng.standard_normal(), 0.7, 1.3))
         names = ("depart", "arrive", "close", "closed", "release", "leave", "home")
-        marks_by_name = {name: float(share) for name, share in zip(names, shares, strict=True)}
+        marks_by_name = {name: float(mark) for name, mark in zip(names, fractions, strict=True)}
         return replace(self, duration=self.duration * scale, **marks_by_name)
 
 
@@ -99,61 +99,59 @@ class Demonstrator:
 
         Raises ValueError for an unknown action or a target out of reach.
         """
-        place = np.asarray(target, dtype=np.float64)
+        position = np.asarray(target, dtype=np.float64)
         if action not in ("reaching", "pointing"):
             raise ValueError(f"the actions are 'reaching' and 'pointing', found {action!r}")
-        if place.shape != (3,) or not 0.2 <= np.linalg.norm(place - RESTING_SHOULDER) <= 0.85:
+        if position.shape != (3,) or not 0.2 <= np.linalg.norm(position - RESTING_SHOULDER) <= 0.85:
             raise ValueError(
                 "a target is a point 0.2 to 0.85 m from the resting shoulder "
-                f"{RESTING_SHOULDER.tolist()} m, found {place.tolist()}"
+                f"{RESTING_SHOULDER.tolist()} m, found {position.tolist()}"
             )
         timing = self.timing.varied(rng, self.variation.rate)
-        path = self._path(action, place, timing, rng)
+        path = self._path(action, position, timing, rng)
         points = body_points(path, self.lengths)
         return points + self.variation.sensor * rng.standard_normal(points.shape)
 
     def _path(self, action: Action, target: Floats, timing: Timing, rng: np.random.Generator) -> ArmPath:
-        spread = self._spread(target, rng)
+        scale = self._variation_scale(target, rng)
         progress = np.linspace(0.0, 1.0, round(timing.duration * SAMPLE_RATE_HZ) + 1)
         nearness = at_target(progress, timing)
         pointing = nearness**0.4 if action == "pointing" else np.zeros_like(progress)
         reach = self.lengths.grasp + pointing * (self.lengths.fingertip - self.lengths.grasp)
-        posture = spread * self.variation.posture * rng.standard_normal(3)
+        posture = scale * self.variation.posture * rng.standard_normal(3)
         lean = leaning(target, self.lengths.upper_arm + self.lengths.forearm + float(reach.max()))
         shoulder = RESTING_SHOULDER + posture + nearness[:, None] * lean
         sternum = RESTING_STERNUM + 0.7 * posture + nearness[:, None] * 0.35 * lean
-        effector = self._hand_path(target, progress, timing, spread, rng)
+        effector = self._hand_path(target, progress, timing, scale, rng)
         effector = kept_away(effector, shoulder, target)
         shoulder = shoulder + overreach(effector - shoulder, self.lengths.upper_arm + self.lengths.forearm + reach)
-        swivel = self._swivel(target, lean, nearness, spread, rng)
+        swivel = self._swivel(target, lean, nearness, scale, rng)
         aperture = grasping(progress, timing) if action == "reaching" else np.full_like(progress, RELAXED)
         facing = np.sqrt(nearness)
         return ArmPath(sternum, shoulder, effector, reach, swivel, aperture, pointing, facing)
 
-    def _spread(self, target: Floats, rng: np.random.Generator) -> float:
+    def _variation_scale(self, target: Floats, rng: np.random.Generator) -> float:
         """Factor on this repetition's variation; larger and less even the less comfortable the target."""
         discomfort = min(1.0, float(np.linalg.norm((target - COMFORTABLE_TARGET)[:2])) / 0.42)
         uneven = self.variation.unevenness * discomfort * rng.standard_normal()
         return float((1.0 + self.variation.growth * discomfort) * np.exp(np.clip(uneven, -0.8, 0.8)))
 
     def _hand_path(
-        self, target: Floats, progress: Floats, timing: Timing, spread: float, rng: np.random.Generator
+        self, target: Floats, progress: Floats, timing: Timing, scale: float, rng: np.random.Generator
     ) -> Floats:
         """Out along a raised arc and back along a similar one. Shape (T, 3)."""
-        base = RESTING_HAND + spread * self.variation.base * np.clip(rng.standard_normal(3), -1.5, 1.5)
+        base = RESTING_HAND + scale * self.variation.base * np.clip(rng.standard_normal(3), -1.5, 1.5)
         reached = target + self.variation.miss * rng.standard_normal(3)
-        sway = [spread * self.variation.path * rng.standard_normal(3) for _ in range(3)]
+        sway = [scale * self.variation.path * rng.standard_normal(3) for _ in range(3)]
         out = arc(base, reached, sway[0], sway[1], minimum_jerk(progress, timing.depart, timing.arrive))
         back = arc(base, reached, sway[0], sway[2], 1.0 - minimum_jerk(progress, timing.leave, timing.home))
         return np.where((progress < timing.leave)[:, None], out, back)
 
-    def _swivel(
-        self, target: Floats, lean: Floats, nearness: Floats, spread: float, rng: np.random.Generator
-    ) -> Floats:
+    def _swivel(self, target: Floats, lean: Floats, nearness: Floats, scale: float, rng: np.random.Generator) -> Floats:
         """Elbow angle: hanging back at rest, towards `usual_elbow` at the target. Shape (T,)."""
         at_rest = 0.25
         at_the_target = swivel_towards(usual_elbow(target), RESTING_SHOULDER + lean, target)
-        noise = spread * self.variation.swivel * rng.standard_normal(2)
+        noise = scale * self.variation.swivel * rng.standard_normal(2)
         result: Floats = (1.0 - nearness) * (at_rest + noise[0]) + nearness * (at_the_target + noise[1])
         return result
 
@@ -166,7 +164,7 @@ ELBOW_PER_TARGET = np.array([[0.55, 0.15, 0.00], [0.00, 0.15, 0.00], [0.10, 0.00
 
 
 def usual_elbow(target: Floats) -> Floats:
-    """Where the elbow would like to be: it follows the target forward, to the left and up, only partly. (3,)."""
+    """The elbow's preferred position: it follows the target forward, to the left and up, only partly. (3,)."""
     result: Floats = ELBOW_AT_COMFORT + ELBOW_PER_TARGET @ (target - COMFORTABLE_TARGET)
     return result
 
@@ -187,7 +185,7 @@ def at_target(progress: Floats, timing: Timing) -> Floats:
 
 
 def grasping(progress: Floats, timing: Timing) -> Floats:
-    """Distance of thumb and index finger: opens on the way, closes at the target, releases, relaxes. Shape (T,)."""
+    """Distance of thumb and index finger: opens on approach, closes at the target, releases, relaxes. Shape (T,)."""
     opening = minimum_jerk(progress, timing.depart, 0.75 * timing.arrive)
     closing = minimum_jerk(progress, timing.close, timing.closed)
     releasing = minimum_jerk(progress, timing.release, timing.release + 0.05)
@@ -197,12 +195,12 @@ def grasping(progress: Floats, timing: Timing) -> Floats:
     return result
 
 
-def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, share: Floats) -> Floats:
+def arc(base: Floats, reached: Floats, sway_low: Floats, sway_high: Floats, progress: Floats) -> Floats:
     """Bezier curve from the hanging hand out to the side, over the table's edge, and down to the target. (T, 3)."""
     lifted = RESTING_SHOULDER + np.array([0.05, -0.40, 0.0]) + 0.15 * (reached - COMFORTABLE_TARGET) + sway_low
     away = (RESTING_SHOULDER - reached) * np.array([1.0, 1.0, 0.0])
     above = reached + 0.10 * away + 0.20 * UPWARD + sway_high
-    s = share[:, None]
+    s = progress[:, None]
     result: Floats = (1 - s) ** 3 * base + 3 * s * (1 - s) ** 2 * lifted + 3 * s**2 * (1 - s) * above + s**3 * reached
     return result
 
@@ -221,7 +219,7 @@ def leaning(target: Floats, arm_length: float) -> Floats:
 
 
 def kept_away(effector: Floats, shoulder: Floats, target: Floats) -> Floats:
-    """The path with places nearer to the shoulder than a bent arm likes moved outward; the target stays. (T, 3)."""
+    """The path with positions too near to the shoulder for a bent arm moved outward; the target stays. (T, 3)."""
     width = 0.03
     minimum = min(0.26, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)
     line = effector - shoulder

@@ -1,4 +1,4 @@
-"""Takes made by the synthetic demonstrator, for those who have no motion capture at hand."""
+"""Takes made by the synthetic demonstrator, for use without motion capture."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ SUBJECT = "synthetic"
 def synthetic_takes(
     action: Action, columns: int, rows: int, repetitions: int, seed: int
 ) -> tuple[list[Take], tuple[str, ...]]:
-    """Movements to a raster of targets over 80 x 30 cm of the table (`table_targets`), and the parameters' names."""
+    """Movements to a grid of targets over 80 x 30 cm of the table (`table_targets`), and the parameters' names."""
     targets, _ = table_targets(columns, rows)
-    shown = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
-    about = shown.description
+    demonstrations = demonstrations_at(targets, np.random.default_rng(seed), action=action, repetitions=repetitions)
+    about = demonstrations.description
     takes = []
-    for number, (sequence, theta) in enumerate(zip(shown.sequences, shown.theta, strict=True)):
+    for number, (sequence, theta) in enumerate(zip(demonstrations.sequences, demonstrations.theta, strict=True)):
         label = Label(0, len(sequence), action, tuple(theta.tolist()), SUBJECT, number % repetitions)
         time = np.arange(len(sequence)) / SAMPLE_RATE_HZ
         positions = sequence.reshape(len(sequence), -1, 3)

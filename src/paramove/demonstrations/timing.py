@@ -13,7 +13,7 @@ FINGERTIP = "index"
 SLOW, FAST = 0.03, 0.15
 """m/s. A movement begins with the first frame above the one before it exceeds the other."""
 SPEED_WINDOW = 0.2
-"""s. Speeds come from parabolas through so much of the path, so that the noise of markers is no movement."""
+"""s. Speeds come from parabolas through this much of the path, so that markers' noise does not count as movement."""
 
 
 def resampled(movement: Movement, rate_hz: float) -> Movement:
@@ -23,7 +23,7 @@ def resampled(movement: Movement, rate_hz: float) -> Movement:
     positive, DemonstrationError if fewer than 2 frames would be left.
     """
     if not rate_hz > 0.0 or not np.isfinite(rate_hz):
-        raise ValueError(f"a frame rate is positive and finite, found {rate_hz}")
+        raise ValueError(f"a positive, finite frame rate expected, found {rate_hz}")
     count = int(np.floor(movement.duration * rate_hz + 1e-6)) + 1
     if count < 2:
         raise DemonstrationError(

@@ -22,7 +22,7 @@ BETWEEN_NS = 2 * BILLION
 
 @dataclass(frozen=True)
 class Label:
-    """What a part of a take shows: the frames from `first` to before `end`."""
+    """The label of a part of a take: the frames from `first` to before `end`."""
 
     first: int
     end: int
@@ -49,7 +49,7 @@ class Take:
         positions: Shape (T, P, 3), m; NaN where a point was lost.
         point_names: Of the P points.
         frame: Coordinate frame.
-        labels: What is shown when.
+        labels: Of the segments.
     """
 
     recording: str
@@ -74,7 +74,7 @@ def write_set(
     *,
     add: bool = False,
 ) -> None:
-    """Writes recordings and labels; with `add` to a set that is there already, whose labels.yaml keeps its comments.
+    """Writes recordings and labels; with `add` to an existing set, whose labels.yaml keeps its comments.
 
     Raises DemonstrationError if there is a set or a recording already, or if parameters differ from those of the set.
     """
@@ -82,11 +82,11 @@ def write_set(
     _refuse(folder, takes, parameter_names, there, add)
     names = dict.fromkeys(take.recording for take in takes)
     recordings = {name: _together([take for take in takes if take.recording == name]) for name in names}
-    folder.mkdir(parents=True, exist_ok=True)  # nothing is written before everything is known to fit
+    folder.mkdir(parents=True, exist_ok=True)  # nothing is written before everything is checked
     segments: list[Segment] = []
-    for name, (together, found) in recordings.items():
+    for name, (together, its_segments) in recordings.items():
         write_poses(folder / name, together, LIBRARY)
-        segments += found
+        segments += its_segments
     if there:
         if segments:
             append_segments(folder / FILE_NAME, segments)

@@ -1,4 +1,4 @@
-"""Files that somebody else made, read within limits: YAML with positions, arrays, images; each fault is one message."""
+"""Reads files within limits: YAML with positions, arrays, images; each fault raises one error with one message."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Types of arrays; shapes and units stand where an array is described."""
+"""Types of arrays; the docstring of each array gives its shape and unit."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Image = NDArray[Any]
-"""uint8, [H, W] or [H, W, 3] in the order blue, green, red; OpenCV's own annotations say only integer or floating."""
+"""uint8, [H, W] or [H, W, 3] in the order blue, green, red; OpenCV's annotations know only integer and floating."""

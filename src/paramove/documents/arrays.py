@@ -1,4 +1,4 @@
-"""NPZ files: arrays without pickles, whose sizes are checked before memory is taken for them."""
+"""NPZ files: arrays without pickles, whose sizes are checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paramove.documents.files import MEBIBYTE, size_of, unreadable
 from paramove.documents.input_error import InputError
 
 ARRAY_BYTES = 512 * MEBIBYTE
-"""Of all arrays that are read: an hour of 40 points at 100 Hz has 350 MB."""
+"""Limit for all arrays that are read: an hour of 40 points at 100 Hz has 350 MB."""
 ALWAYS_BYTES = 64 * MEBIBYTE
 MAX_RATIO = 30
 """Arrays above `ALWAYS_BYTES` may be so many times as large as their file; recorded movements are at most 5."""
@@ -34,11 +34,11 @@ _DAMAGED = (
     ValueError, OSError, EOFError, LookupError, NotImplementedError, RuntimeError, OverflowError, SyntaxError,
     TypeError, MemoryError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What numpy and zipfile raise for damaged bytes, which depends on the byte."""
+"""What numpy and zipfile raise for damaged bytes."""
 
 
 class _Reader(io.BufferedReader):
-    """A file whose archive's directory, which zipfile reads at once, is not larger than it may be."""
+    """Limits the size of the archive's directory, which zipfile reads at once."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         if size is not None and size > DIRECTORY_BYTES:
@@ -60,25 +60,25 @@ def read_arrays(
         path: Of the file.
         kind: What the file should be, for people.
         raising: Class of what is raised.
-        only: Names of arrays, of which those that there are are read; empty for all.
-        max_bytes: Of all arrays that are read together, decompressed.
-        max_arrays: In the file.
+        only: Names of the arrays to read, if they exist; empty for all.
+        max_bytes: Maximum of all arrays that are read, decompressed.
+        max_arrays: Maximum number in the file.
 
     Raises `raising` if there is no such file, if it is damaged, larger than allowed, or holds objects.
     """
     size = size_of(path, kind, raising, 4 * ARRAY_BYTES)
     try:
         with _Reader(io.FileIO(path)) as file, zipfile.ZipFile(file) as archive:
-            found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
-            wanted = {name: member for name, member in found.items() if not only or name in only}
-            claimed = sum(member.file_size for member in wanted.values())
+            members = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
+            requested = {name: member for name, member in members.items() if not only or name in only}
+            claimed = sum(member.file_size for member in requested.values())
             allowed = min(max_bytes, max(ALWAYS_BYTES, MAX_RATIO * size))
-            if claimed > allowed or len(found) > max_arrays:
+            if claimed > allowed or len(members) > max_arrays:
                 raise raising(
                     f"{path}: expected at most {max_arrays} arrays of {allowed >> 20} MB together, "
-                    f"found {len(found)} of {claimed / MEBIBYTE:.0f} MB in a file of {size / MEBIBYTE:.1f} MB"
+                    f"found {len(members)} of {claimed / MEBIBYTE:.0f} MB in a file of {size / MEBIBYTE:.1f} MB"
                 )
-            return {name: _array(path, archive, member, raising) for name, member in wanted.items()}
+            return {name: _array(path, archive, member, raising) for name, member in requested.items()}
     except raising:
         raise
     except PermissionError as error:

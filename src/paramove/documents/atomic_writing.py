@@ -10,10 +10,10 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def replacing(path: Path, mode: int = 0o666) -> Iterator[Path]:
-    """Yields a file beside `path` to write to, which takes its place at the end of the block.
+    """Yields a temporary file to write to, which replaces `path` at the end of the block.
 
-    Until then nothing at `path` changes, and an error within the block leaves it as it was. The file beside it has the
-    same ending, as some libraries tell the format by it, and exists already with its permissions.
+    Until then nothing at `path` changes, and an error within the block leaves it as it was. The temporary
+    file has the same ending, as some libraries derive the format from it, and exists already with its permissions.
 
     Args:
         path: Of the finished file.
@@ -32,10 +32,10 @@ def replacing(path: Path, mode: int = 0o666) -> Iterator[Path]:
 
 
 def rename_durably(unfinished: Path, path: Path) -> None:
-    """Gives a file that is written its name: first its content reaches the disk, then the name does."""
+    """Renames a complete file: first its content reaches the disk, then the name does."""
     _sync(unfinished)
     unfinished.replace(path)
-    with contextlib.suppress(OSError):  # not every file system can; the file is in its place
+    with contextlib.suppress(OSError):  # not every file system supports this; the file has its name
         _sync(path.parent)
 
 

@@ -9,19 +9,19 @@ OK = 0
 FAILURE = 1
 """A node was given up, a required node ended, or the run was judged a failure."""
 USAGE = 2
-"""Wrong arguments; the same again would fail again."""
+"""Wrong arguments; a restart does not help."""
 JUDGED_A_FAILURE = 3
-"""An evaluation found that what it judges is not as it should be."""
+"""An evaluation judged its subject a failure."""
 INPUT_MISSING = 66
 """A launch file, an overlay or a node's input does not exist; a restart does not help."""
 UNAVAILABLE = 69
-"""A device is not there or does not answer, or nobody answers who should."""
+"""A device is missing or does not respond, or no node that should answer does."""
 NODE_FAILED = 70
 """A node raised an exception, or reported that it has failed."""
 TEMPORARY = 75
-"""Something else holds what is needed, such as another run in the same domain."""
+"""Another process holds what is needed, such as another run in the same domain."""
 PERMISSION = 77
-"""A right is missing; a restart does not help."""
+"""A permission is missing; a restart does not help."""
 CONFIGURATION = 78
 """The launch file, a node's parameters or its input are wrong; a restart does not help."""
 TIME_LIMIT = 124
@@ -41,7 +41,7 @@ INTERRUPTED = frozenset(map(by_signal, (signal.SIGINT, signal.SIGTERM, signal.SI
 
 
 def describe(code: int) -> str:
-    """What a node did when it ended with an exit code, in words that follow its name; negative codes are signals."""
+    """How a node ended, as a phrase that follows its name; negative codes are signals."""
     if code < 0:
         return _describe_signal(-code)
     meanings = {
@@ -68,7 +68,7 @@ def _describe_signal(number: int) -> str:
 
 
 def interrupted(number: int) -> str:
-    """Why a run ended that a signal to the launcher has ended."""
+    """Why a run ended after a signal to the launcher."""
     reasons = {
         signal.SIGINT: "stopped by Ctrl-C",
         signal.SIGHUP: "stopped because the terminal was closed",

@@ -1,4 +1,4 @@
-"""Files read within limits; what cannot be read is one `InputError` with its path, what was found and what helps."""
+"""Files read within limits; one that cannot be read raises an `InputError` with its path, the finding and a remedy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from paramove.documents.input_error import InputError
 
 MEBIBYTE = 2**20
 TEXT_BYTES = 512 * MEBIBYTE
-"""Of a text with numbers, such as BVH: an hour of 60 joints at 120 Hz has 250 MB."""
+"""Limit for a text with numbers, such as BVH: an hour of 60 joints at 120 Hz has 250 MB."""
 
 
 def size_of(
@@ -21,26 +21,26 @@ def size_of(
         path: Of the file.
         kind: What the file should be, for people.
         raising: Class of what is raised.
-        max_bytes: Larger files are refused.
+        max_bytes: Larger files are rejected.
         remedy: What helps, for people.
 
     Raises `raising` for a missing file, a folder or device, and a file that is too large.
     """
     remedy = f"; {remedy}" if remedy else ""
     try:
-        found = path.stat()
+        status = path.stat()
     except (FileNotFoundError, NotADirectoryError) as error:
         raise raising(f"there is no {kind} {path}{remedy}", missing=True) from error
-    except (OSError, ValueError) as error:  # a ValueError tells of a NUL byte in the path
+    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the path
         raise raising(f"{path}: cannot be read: {error}{remedy}") from error
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise raising(f"{path}: expected a {kind}, found a folder or device{remedy}")
-    if found.st_size > max_bytes:
+    if status.st_size > max_bytes:
         raise raising(
             f"{path}: expected a {kind} of at most {max_bytes / MEBIBYTE:.3g} MB, "
-            f"found {found.st_size / MEBIBYTE:.1f} MB{remedy}"
+            f"found {status.st_size / MEBIBYTE:.1f} MB{remedy}"
         )
-    return found.st_size
+    return status.st_size
 
 
 def read_bytes(
@@ -58,7 +58,7 @@ def read_bytes(
 def read_text(
     path: Path, kind: str, raising: type[InputError] = InputError, max_bytes: int = TEXT_BYTES, remedy: str = ""
 ) -> str:
-    """All of a UTF-8 text, without a byte order mark. Arguments and errors as of `size_of`; other text is refused."""
+    """All of a UTF-8 text, without a byte order mark. Arguments and errors as of `size_of`; other text is rejected."""
     try:
         return read_bytes(path, kind, raising, max_bytes, remedy).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -66,7 +66,7 @@ def read_text(
 
 
 def unreadable(path: Path, error: OSError) -> str:
-    """The system's reason, and what helps."""
+    """Message: the system's reason and the remedy."""
     if isinstance(error, PermissionError):
         return f"{path}: no right to read it; run 'chmod u+r {path}'"
     return f"{path}: cannot be read: {error.strerror or error}"

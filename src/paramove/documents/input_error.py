@@ -1,4 +1,4 @@
-"""What a program is given from outside and cannot use: files, devices, parameters."""
+"""The error for input that a program cannot use: files, devices, parameters."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ class InputError(ValueError):
     The message is one line for people: what was expected, what was found and what helps.
 
     Attributes:
-        missing: There is nothing where the input should be.
+        missing: The input does not exist.
     """
 
-    def __init__(self, sentence: str, missing: bool = False) -> None:
-        super().__init__(" ".join(sentence.split()))
+    def __init__(self, message: str, missing: bool = False) -> None:
+        super().__init__(" ".join(message.split()))
         self.missing = missing
 
     @property

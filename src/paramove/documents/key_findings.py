@@ -1,4 +1,4 @@
-"""What does not fit in a YAML file that a person wrote, key by key."""
+"""Describes pydantic's validation errors of a YAML file, key by key."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ MAX_FINDINGS = 5
 
 
 def findings(error: ValidationError) -> str:
-    """Of each wrong key where it is, what was expected and what was found; the first few of many."""
-    found = error.errors()
-    more = [f"and {len(found) - MAX_FINDINGS} more"] if len(found) > MAX_FINDINGS else []
-    return "; ".join([_told(item) for item in found[:MAX_FINDINGS]] + more)
+    """Each wrong key with its location, the expected and the actual value; at most `MAX_FINDINGS`."""
+    errors = error.errors()
+    more = [f"and {len(errors) - MAX_FINDINGS} more"] if len(errors) > MAX_FINDINGS else []
+    return "; ".join([_described(item) for item in errors[:MAX_FINDINGS]] + more)
 
 
-def _told(item: ErrorDetails) -> str:
+def _described(item: ErrorDetails) -> str:
     where = ".".join(map(str, item["loc"])) or "the file"
     if item["type"] == "missing":
         return f"{where} is missing"

@@ -13,10 +13,10 @@ _log = logging.getLogger(__name__)
 
 
 class OldNames(BaseModel):
-    """A model whose fields may be given by the names that they had in the release before.
+    """A model that also accepts the names that its fields had in the previous release.
 
     Attributes:
-        old_names: Old name and name of the field, of each; `outer.inner` for a field of a field.
+        old_names: Pairs of old and new name; `outer.inner` for a nested field.
     """
 
     old_names: ClassVar[tuple[tuple[str, str], ...]] = ()
@@ -30,7 +30,7 @@ class OldNames(BaseModel):
 
 
 def renamed_attribute(old: str, new: str) -> Any:
-    """A property by which the attribute `new` is also read by the name that it had in the release before."""
+    """A property that reads the attribute `new` by its name in the previous release."""
 
     def read(instance: Any) -> Any:
         message = f"{type(instance).__name__}.{old} is called {new} now; the next release knows the new name only"
@@ -41,7 +41,7 @@ def renamed_attribute(old: str, new: str) -> Any:
 
 
 def _renamed(values: Any, old: str, new: str, path: Sequence[str]) -> Any:
-    """The mapping with the key at the end of `path` renamed; the one that is given if there is no such key."""
+    """The mapping with the key at the end of `path` renamed; unchanged if there is no such key."""
     key, *inner = path
     new_key = new.rpartition(".")[2]
     if not isinstance(values, dict) or key not in values:

@@ -1,4 +1,4 @@
-"""Pictures and videos, whose size in pixels is known before memory is taken for them."""
+"""Pictures and videos, whose size in pixels is checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from paramove.documents.files import MEBIBYTE, read_bytes, size_of, unreadable
 from paramove.documents.input_error import InputError
 
 MAX_PIXELS = 50_000_000
-"""Of one picture, which may claim more than memory holds in a few bytes."""
+"""Limit for one picture: a header of a few bytes may claim more than memory holds."""
 PICTURE_BYTES = 256 * MEBIBYTE
 VIDEO_BYTES = 2**40
 JPEG = b"\xff\xd8"
@@ -27,7 +27,7 @@ _VIDEOS = (b"....ftyp", b"RIFF....AVI ", b"\x1aE\xdf\xa3", b"....moov", b"....md
 def decoded(data: bytes) -> NDArray[np.uint8]:
     """BGR pixels [H, W, 3] of a PNG, JPEG, BMP, WebP or TIFF file.
 
-    Raises InputError, which tells what is wrong with the data but not where they come from.
+    Raises InputError with what is wrong with the data, without their source.
     """
     width, height = claimed_size(data)
     if not width * height:
@@ -74,13 +74,13 @@ def claimed_size(data: bytes) -> tuple[int, int]:
 
 
 def _of_jpeg(data: bytes) -> tuple[int, int]:
-    place = 2
-    while data[place] == 0xFF:
-        marker = data[place + 1]
+    offset = 2
+    while data[offset] == 0xFF:
+        marker = data[offset + 1]
         if 0xC0 <= marker <= 0xCF and marker not in _NO_FRAME_HEADER:
-            height, width = struct.unpack_from(">HH", data, place + 5)
+            height, width = struct.unpack_from(">HH", data, offset + 5)
             return width, height
-        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+        offset += 2 + int.from_bytes(data[offset + 2 : offset + 4], "big")
     return 0, 0
 
 
@@ -95,19 +95,19 @@ def _of_webp(data: bytes) -> tuple[int, int]:
 
 
 def _of_tiff(data: bytes, order: str) -> tuple[int, int]:
-    found = {256: 0, 257: 0}
+    sizes = {256: 0, 257: 0}
     begin = struct.unpack_from(order + "I", data, 4)[0]
     for number in range(struct.unpack_from(order + "H", data, begin)[0]):
         tag, kind, _ = struct.unpack_from(order + "HHI", data, begin + 2 + 12 * number)
-        if tag in found:
-            found[tag] = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, begin + 10 + 12 * number)[0]
-    return found[256], found[257]
+        if tag in sizes:
+            sizes[tag] = struct.unpack_from(order + ("H" if kind == 3 else "I"), data, begin + 10 + 12 * number)[0]
+    return sizes[256], sizes[257]
 
 
 def opened_video(path: Path, raising: type[InputError] = InputError) -> Any:
     """A cv2.VideoCapture of an mp4, mov, avi, mkv or webm file with a sound frame rate and size.
 
-    Raises `raising` for everything else, also for play lists, which would lead to other files.
+    Raises `raising` for everything else, also for playlists, which refer to other files.
     """
     size = size_of(path, "video file (mp4, avi, ...)", raising, VIDEO_BYTES)
     try:

@@ -1,4 +1,4 @@
-"""YAML 1.2 read as plain data that remembers where every value stood."""
+"""YAML 1.2 read as plain data with the position of every value."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from paramove.documents.wording import printable
 MAX_CHARACTERS = 100_000
 MAX_DEPTH = 20
 MAX_FINDINGS = 20
-"""So many are told at once; more of them help nobody."""
+"""Maximum number of findings in one message."""
 
 KeyPath = tuple[str, ...]
 
@@ -40,7 +40,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
 
 @dataclass(frozen=True)
 class Position:
-    """Where a value was written: a file (or a command-line argument), line and column from 1; line 0 is all of it."""
+    """Position of a value: a file (or a command-line argument), line and column from 1; line 0 means the whole."""
 
     source: str
     line: int = 0
@@ -52,11 +52,11 @@ class Position:
 
 
 class DocumentError(ValueError):
-    """Something in a launch file is wrong: one finding or several, a line each, that begin with their positions.
+    """Faults in a launch file: one finding per line, each with its position.
 
     Attributes:
         position: Of the first finding.
-        message: Of the first finding, without what a terminal would obey.
+        message: Of the first finding, with control characters escaped.
         others: Further findings.
     """
 
@@ -77,11 +77,11 @@ class DocumentError(ValueError):
 
     @classmethod
     def of(cls, findings: Sequence[DocumentError]) -> DocumentError:
-        """One error that tells all findings, each once, from the top of each file down; at least one is needed."""
-        flat = {(one.position, one.message): one for found in findings for one in found}
+        """One error with all findings, each once, in the order of each file; at least one is needed."""
+        flat = {(one.position, one.message): one for finding in findings for one in finding}
         sources = list(dict.fromkeys(position.source for position, _ in flat))
-        places = sorted(flat, key=lambda key: (sources.index(key[0].source), key[0].line, key[0].column))
-        first, *others = (flat[place] for place in places)
+        keys = sorted(flat, key=lambda key: (sources.index(key[0].source), key[0].line, key[0].column))
+        first, *others = (flat[key] for key in keys)
         return cls(first.position, first.message, others)
 
 
@@ -106,7 +106,7 @@ class Document:
         return Position("launch file")
 
     def error(self, path: KeyPath, message: str) -> DocumentError:
-        """An error at the place where `path` was written."""
+        """An error at the position of `path`."""
         return DocumentError(self.position(path), message)
 
     def overlaid(self, top: Document) -> Document:
@@ -139,9 +139,9 @@ def read_mapping(text: str, source: str, *, max_characters: int = MAX_CHARACTERS
     """Reads a YAML text whose top level is a mapping, such as `example`.
 
     Tags, anchors, aliases, duplicate keys, keys that are no strings, numbers that are not finite, control characters,
-    more than one document, more than `max_characters` and more than 20 levels are refused.
+    more than one document, more than `max_characters` and more than 20 levels are rejected.
 
-    Raises DocumentError with the positions of all that is refused; what is no YAML ends the search.
+    Raises DocumentError with the positions of everything that is rejected; a syntax error ends the search.
     """
     start = Position(source, 1, 1)
     data, positions = _read(text, source, max_characters)
@@ -156,7 +156,7 @@ def read_mapping(text: str, source: str, *, max_characters: int = MAX_CHARACTERS
 def read_document(path: Path, kind: str, raising: type[InputError] = InputError, remedy: str = "") -> Document:
     """The mapping in a YAML file; arguments as of `read_text`.
 
-    Raises `raising` for a file that cannot be read and for what `read_mapping` refuses.
+    Raises `raising` for a file that cannot be read and for what `read_mapping` rejects.
     """
     text = read_text(path, kind, raising, 4 * MAX_CHARACTERS, remedy)
     try:
@@ -174,7 +174,7 @@ def read_value(text: str, source: str) -> Any:
 
 
 def _read(text: str, source: str, max_characters: int) -> tuple[Any, dict[KeyPath, Position]]:
-    """The value of a text, None of an empty one, and where its keys and elements stood; raises DocumentError."""
+    """The value of a text, None of an empty one, and the positions of its keys and elements; raises DocumentError."""
     if len(text) > max_characters:
         raise DocumentError(Position(source), f"{len(text)} characters; at most {max_characters} are read")
     reader = _Reader(text, source)
@@ -184,16 +184,16 @@ def _read(text: str, source: str, max_characters: int) -> tuple[Any, dict[KeyPat
         before = text[: error.position]
         where = Position(source, before.count("\n") + 1, len(before) - before.rfind("\n"))
         letter = text[error.position : error.position + 1]
-        raise DocumentError.of([*reader.refused, DocumentError(where, f"control character {letter!r}")]) from error
+        raise DocumentError.of([*reader.rejected, DocumentError(where, f"control character {letter!r}")]) from error
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = Position(source, mark.line + 1, mark.column + 1) if mark else Position(source)
-        raise DocumentError.of([*reader.refused, DocumentError(where, _explained(error))]) from error
+        raise DocumentError.of([*reader.rejected, DocumentError(where, _explained(error))]) from error
     except (YAMLError, RecursionError, ValueError, LookupError) as error:
         if isinstance(error, DocumentError):
             raise
         raise DocumentError(Position(source), f"cannot be read as YAML: {' '.join(str(error).split())}") from error
-    raise_any(reader.refused or reader.findings)
+    raise_any(reader.rejected or reader.findings)
     return data, reader.positions
 
 
@@ -210,38 +210,38 @@ _EXPLANATIONS = (
 
 
 def _explained(error: MarkedYAMLError) -> str:
-    """What the parser says, in words for people who have not read the grammar of YAML."""
+    """The parser's message, for readers who do not know the grammar of YAML."""
     problem = " ".join(str(error.problem or "").split())
     for pattern, explanation in _EXPLANATIONS:
-        found = re.match(pattern, problem)
-        if found:
-            return found.expand(explanation)
+        match = re.match(pattern, problem)
+        if match:
+            return match.expand(explanation)
     if not problem or problem.startswith("but "):
         problem = f"{error.context or 'cannot be read as YAML'} {problem}"
     return " ".join(problem.split())
 
 
-def _refusal(event: Event) -> str:
+def _reason_to_reject(event: Event) -> str:
     if isinstance(event, DocumentStartEvent) and (event.version or event.tags):
-        return "'%' directives are refused: YAML 1.2 is expected"
+        return "'%' directives are rejected: YAML 1.2 is expected"
     if isinstance(event, AliasEvent):
-        return f"alias '*{event.anchor}' is refused: write the value out"
+        return f"alias '*{event.anchor}' is rejected: write the value out"
     if isinstance(event, NodeEvent) and event.anchor is not None:
-        return f"anchor '&{event.anchor}' is refused: write the value out"
+        return f"anchor '&{event.anchor}' is rejected: write the value out"
     if isinstance(event, ScalarEvent | CollectionStartEvent) and event.ctag is not None:
         tag = str(event.ctag).replace("tag:yaml.org,2002:", "!!")
-        return f"tag '{tag}' is refused: only plain values are taken"
+        return f"tag '{tag}' is rejected: only plain values are accepted"
     if isinstance(event, ScalarEvent) and event.value == "<<" and event.style is None:
-        return "merge keys '<<' are refused: write the values out"
+        return "merge keys '<<' are rejected: write the values out"
     return ""
 
 
 class _Reader:
-    """Builtin data of the events of a text, which are read once; `refused` is what hides all other findings."""
+    """Builds plain data from the events of a text; `rejected` takes precedence over all other findings."""
 
     def __init__(self, text: str, source: str) -> None:
         self.positions: dict[KeyPath, Position] = {}
-        self.refused: list[DocumentError] = []
+        self.rejected: list[DocumentError] = []
         self.findings: list[DocumentError] = []
         self._source = source
         self._yaml = YAML(typ="safe", pure=True)
@@ -256,15 +256,15 @@ class _Reader:
             if isinstance(event, DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    raise DocumentError.of([*self.refused, DocumentError(self._at(event), _SECOND)])
-                self._refuse_unwanted(event)
+                    raise DocumentError.of([*self.rejected, DocumentError(self._at(event), _SECOND)])
+                self._check_allowed(event)
             elif isinstance(event, NodeEvent):
                 value = self._value(event, ())
         return value
 
     def _value(self, event: Event, path: KeyPath) -> Any:
-        """Data of what begins with an event."""
-        self._refuse_unwanted(event)
+        """The value that begins with an event."""
+        self._check_allowed(event)
         if not isinstance(event, CollectionStartEvent):
             return self._scalar(event) if isinstance(event, ScalarEvent) else None
         self._depth += 1
@@ -277,43 +277,43 @@ class _Reader:
     def _list(self, path: KeyPath) -> list[Any]:
         result: list[Any] = []
         while not isinstance(event := next(self._events), CollectionEndEvent):
-            place = (*path, str(len(result)))
-            self.positions[place] = self._at(event)
-            result.append(self._value(event, place))
+            child = (*path, str(len(result)))
+            self.positions[child] = self._at(event)
+            result.append(self._value(event, child))
         return result
 
     def _mapping(self, path: KeyPath) -> dict[str, Any]:
         result: dict[str, Any] = {}
         while not isinstance(event := next(self._events), CollectionEndEvent):
             key = event.value if isinstance(event, ScalarEvent) else ""
-            where, place = self._at(event), (*path, key)
-            self._refuse_unwanted(event)
+            where, child = self._at(event), (*path, key)
+            self._check_allowed(event)
             if not isinstance(event, ScalarEvent) or self._tag(event) != "str":
                 if isinstance(event, CollectionStartEvent):
-                    self._value(event, place)
+                    self._value(event, child)
                 kind = "a mapping" if isinstance(event, MappingStartEvent) else "a list"
-                shown = f"'{key}'" if isinstance(event, ScalarEvent) else kind
-                self.findings.append(DocumentError(where, f"key {shown} is no string; write it in quotes"))
+                described = f"'{key}'" if isinstance(event, ScalarEvent) else kind
+                self.findings.append(DocumentError(where, f"key {described} is no string; write it in quotes"))
             elif _CONTROL.search(key):
                 self.findings.append(DocumentError(where, f"control characters in the key {key[:80]!r}"))
             elif key in result:
-                first = self.positions[place]
+                first = self.positions[child]
                 self.findings.append(DocumentError(where, f"duplicate key '{key}': it is in line {first.line} too"))
             else:
-                self.positions[place] = where
-            value = self._value(next(self._events), place)
+                self.positions[child] = where
+            value = self._value(next(self._events), child)
             result.setdefault(key, value)
         return result
 
-    def _refuse_unwanted(self, event: Event) -> None:
-        message = _refusal(event)
+    def _check_allowed(self, event: Event) -> None:
+        message = _reason_to_reject(event)
         if message:
-            self.refused.append(DocumentError(self._at(event), message))
+            self.rejected.append(DocumentError(self._at(event), message))
 
     def _scalar(self, event: ScalarEvent) -> Any:
         tag = self._tag(event)
         if tag not in ("str", "int", "float", "bool", "null"):
-            self._find(event, f"'{event.value}' would be a {tag}, which is not taken; write it in quotes")
+            self._find(event, f"'{event.value}' would be a {tag}, which is not accepted; write it in quotes")
             return None
         value = event.value
         if tag != "str":
@@ -321,10 +321,10 @@ class _Reader:
             try:
                 value = self._yaml.constructor.construct_object(node, deep=True)
             except ValueError:  # more digits than Python converts
-                self._find(event, f"a number of {len(event.value)} characters is refused")
+                self._find(event, f"a number of {len(event.value)} characters is rejected")
                 return None
         if isinstance(value, float) and not math.isfinite(value):
-            self._find(event, f"'{event.value}' is refused: numbers are finite")
+            self._find(event, f"'{event.value}' is rejected: numbers are finite")
         if isinstance(value, str) and _CONTROL.search(value):
             self._find(event, f"control characters in {value[:80]!r}")
         return value
@@ -332,7 +332,7 @@ class _Reader:
     def _tag(self, event: ScalarEvent) -> str:
         """`int` of `tag:yaml.org,2002:int`."""
         if event.ctag is not None and str(event.ctag) != "!":
-            return "str"  # it is refused elsewhere
+            return "str"  # it is rejected elsewhere
         tag = self._yaml.resolver.resolve(ScalarNode, event.value, event.implicit)
         return str(tag).rpartition(":")[2]
 

@@ -1,4 +1,4 @@
-"""Reports as one HTML file that needs no other: the page, its sections, tables, pictures and films."""
+"""Reports as one self-contained HTML file: the page, its sections, tables, pictures and videos."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ def report_page(
     """A whole page.
 
     Args:
-        title: Of the browser's window.
+        title: Title of the browser's window.
         headline: The first line, on green if `good`, else on red.
-        about: One sentence below it.
+        about: A line below it.
         parts: HTML already; empty ones are left out.
         style: CSS rules of this page alone.
     """
@@ -57,17 +57,17 @@ def report_page(
 
 
 def section(title: str, why: str, content: str) -> str:
-    """A part of a page; `content` is HTML already."""
+    """A section of a page; `content` is HTML already."""
     return f"<section><h2>{escape(title)}</h2><p class=why>{escape(why)}</p><div class=scroll>{content}</div></section>"
 
 
 def folded(title: str, content: str) -> str:
-    """A part of a page that a reader opens; `content` is HTML already."""
+    """A section that is folded until the reader opens it; `content` is HTML already."""
     return f"<section><details><summary>{escape(title)}</summary>{content}</details></section>"
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Cells are HTML already; columns of `numbers` stand to the right."""
+    """Cells are HTML already; columns of `numbers` are right-aligned."""
 
     def cells(tag: str, row: Sequence[str]) -> str:
         return "".join(f"<{tag}{' class=n' if i in numbers else ''}>{cell}</{tag}>" for i, cell in enumerate(row))
@@ -77,12 +77,12 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence
 
 
 def image(data: bytes, about: str, kind: str = "png") -> str:
-    """A picture (a file's bytes), with words for those who cannot see it."""
+    """A picture (a file's bytes), with a description as its alternative text."""
     return f"<img alt='{escape(about)}' src='data:image/{kind};base64,{base64.b64encode(data).decode()}'>"
 
 
 def film(video: Path | None) -> str:
-    """A part of a page that holds the film itself; nothing without one."""
+    """A section with the embedded video; empty without one."""
     if video is None:
         return ""
     data = base64.b64encode(video.read_bytes()).decode()

@@ -1,4 +1,4 @@
-"""Words in messages: which name was probably meant, and text that no terminal obeys."""
+"""Helpers for messages: suggestions of names, and text without control characters."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """The text with control characters, which a terminal would obey, written as escapes."""
+    """The text with control characters, written as escapes."""
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)

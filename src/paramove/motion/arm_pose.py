@@ -1,7 +1,7 @@
 """Arm poses of a person to joint angles of a robot's arm, in closed form (thesis 5.2.4).
 
 The gripper is placed exactly; the elbow as near to the person's as the robot's proportions and joint limits allow. The
-gripper site (the centre of a held cylinder) lies beside the forearm's axis; the solution includes that offset.
+gripper site (the centre of a held cylinder) lies next to the forearm's axis; the solution includes that offset.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _TURNS = np.deg2rad(np.arange(0.0, 181.0, 1.0))
 _TURNS_BOTH = np.stack([_TURNS, -_TURNS], axis=1).ravel()
 _BISECTIONS = 7
 _JUMP = np.deg2rad(20.0)
-_MARGIN = np.deg2rad(0.3)  # inside the limits that the safety gate refuses: paths are curves through these poses
+_MARGIN = np.deg2rad(0.3)  # inside the limits of the safety gate: paths are curves through these poses
 _NEARLY_STRAIGHT = 1e-9
 
 
@@ -104,19 +104,19 @@ class ArmPoseSolver:
             elbow: The person's elbow scaled to the robot, [K, 3], m, shoulder frame.
             gripper: Where the gripper site shall be, [K, 3].
             finger_to_thumb: Direction from index finger to thumb (o of 5.2.3), [K, 3].
-            level: Share 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the
+            level: Fraction 0 to 1, [K] or one, by which o is replaced by the direction o′ that aligns the hand to the
                 table plane, thumb on the left (5.2.5).
-            slope: Angle by which the forearm shall slope down, rad: by the share `level` the elbow is turned towards
-                the nearest place that gives it, so that what is held keeps its tilt. None leaves it to the person.
-            smoothing: Over how many poses a turn of the elbow comes and goes; 0 for poses that are no sequence.
+            slope: Angle by which the forearm shall slope down, rad: by the fraction `level` the elbow is turned towards
+                the nearest position with this slope, so that a held object keeps its tilt. None: as the person does.
+            smoothing: Number of poses over which a turn of the elbow rises and falls; 0 for independent poses.
 
         Raises:
             UnreachablePoseError: A gripper point is out of reach, or no turn of the elbow keeps the joint limits.
         """
         q, r, o = (np.atleast_2d(np.asarray(a, dtype=np.float64)) for a in (elbow, gripper, finger_to_thumb))
         self._check_reach(r)
-        share = np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1])
-        poses = _Poses(q if slope is None else self._sloped(q, r, slope, share), r, o, share)
+        fraction = np.broadcast_to(np.asarray(level, dtype=np.float64), r.shape[:1])
+        poses = _Poses(q if slope is None else self._sloped(q, r, slope, fraction), r, o, fraction)
         solution = self._one_sided(poses, self._nearest(poses, _TURNS_BOTH))
         return self._smoothed(poses, solution, smoothing) if smoothing else solution
 
@@ -217,15 +217,15 @@ class ArmPoseSolver:
 
     def _broken(self, angles: Floats) -> str:
         worst = int(np.argmax(np.maximum(self._lower - angles, angles - self._upper)))
-        low, high, found = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
-        return f"the limit of {self._joints[worst]} ({found:.1f} deg, allowed {low:.1f} to {high:.1f})"
+        low, high, angle = np.rad2deg([self._lower[worst], self._upper[worst], angles[worst]])
+        return f"the limit of {self._joints[worst]} ({angle:.1f} deg, allowed {low:.1f} to {high:.1f})"
 
     def _pose(self, poses: _Poses, turn: Floats) -> tuple[Floats, Floats]:
         """Angles [K, 5] and elbow [K, 3] for the elbow of 5.2.4 turned by `turn` [K]."""
         q = self._elbow(poses.q, poses.r, turn)
         o = poses.o / np.maximum(np.linalg.norm(poses.o, axis=-1, keepdims=True), _NEARLY_STRAIGHT)
-        share = poses.level[:, None]
-        forearm, aside = self._hand(q, poses.r, (1.0 - share) * o + share * _level(q, poses.r))
+        fraction = poses.level[:, None]
+        forearm, aside = self._hand(q, poses.r, (1.0 - fraction) * o + fraction * _level(q, poses.r))
         return _angles(q / self._upper_arm, forearm, aside), q
 
     def _elbow(self, q: Floats, r: Floats, turn: Floats) -> Floats:
@@ -247,18 +247,18 @@ class ArmPoseSolver:
         cos_beta = np.clip((a**2 + c**2 - b**2) / (2 * a * c), -1.0, 1.0)  # (5.8)
         return a * cos_beta * w1, a * np.sqrt(1.0 - cos_beta**2), w2, np.cross(w1, w2)
 
-    def _sloped(self, q: Floats, r: Floats, slope: float, share: Floats) -> Floats:
-        """The elbow turned towards the nearest place at which the forearm slopes down by `slope`, by a share [K]."""
+    def _sloped(self, q: Floats, r: Floats, slope: float, fraction: Floats) -> Floats:
+        """The elbow turned by a fraction [K] towards the nearest position at which the forearm slopes by `slope`."""
         middle, radius, w2, w3 = self._elbow_circle(q, r)
-        wanted_z = r[:, 2] + self._forearm * np.sin(slope)
+        target_z = r[:, 2] + self._forearm * np.sin(slope)
         along, across = radius[:, 0] * w2[:, 2], radius[:, 0] * w3[:, 2]
         amplitude = np.maximum(np.hypot(along, across), _NEARLY_STRAIGHT)
         centre = np.arctan2(across, along)
-        spread = np.arccos(np.clip((wanted_z - middle[:, 2]) / amplitude, -1.0, 1.0))
-        turns = np.stack([centre + spread, centre - spread])
+        half_angle = np.arccos(np.clip((target_z - middle[:, 2]) / amplitude, -1.0, 1.0))
+        turns = np.stack([centre + half_angle, centre - half_angle])
         turns = (turns + np.pi) % (2 * np.pi) - np.pi
         nearest = np.where(np.abs(turns[0]) <= np.abs(turns[1]), turns[0], turns[1])
-        return self._elbow(q, r, share * nearest)
+        return self._elbow(q, r, fraction * nearest)
 
     def _hand(self, q: Floats, r: Floats, o: Floats) -> tuple[Floats, Floats]:
         """Unit forearm axis b and the hand's sideward axis y (towards the thumb), with r = q + along b + aside y.
@@ -287,8 +287,8 @@ class _Poses:
     o: Floats
     level: Floats
 
-    def of(self, places: NDArray[np.intp]) -> _Poses:
-        return _Poses(self.q[places], self.r[places], self.o[places], self.level[places])
+    def of(self, indices: NDArray[np.intp]) -> _Poses:
+        return _Poses(self.q[indices], self.r[indices], self.o[indices], self.level[indices])
 
 
 def _level(q: Floats, r: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Plans that keep their distance: the first of several ways to do a motion that is reachable and clear."""
+"""Plans that keep clear of obstacles: the first of several alternatives that is reachable and clear."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ MIN_CLEARANCE = 0.005  # m, of planned paths from table, body and standing objec
 _HIGHER_ENTRY = 0.065
 _HIGHER_CARRY = np.array([0.0, 0.0, 0.012])
 _BEHIND_ROW = 0.004
-_MIN_TO_STANDING = 0.003  # m, where no way keeps more: places of standing objects are known to about 2 mm
-_HALF_OPEN = 0.45  # ξ; an object of 20 mm is let go at less than half of it
+_MIN_TO_STANDING = 0.003  # m, where no alternative keeps more: positions of standing objects are known to about 2 mm
+_HALF_OPEN = 0.45  # ξ; an object of 20 mm is released at less than half of it
 _HIGH = 0.055  # m above the working plane's grasp height: an empty hand there has left the objects below it
 
 
 class NoClearPlanError(ValueError):
-    """No way of doing the motion is both reachable and clear; the message says why, way by way.
+    """No alternative of the motion is both reachable and clear; the message gives the reason for each.
 
     Attributes:
-        in_the_way: Numbers of the standing objects that ways would come too close to.
+        in_the_way: Numbers of the standing objects that alternatives would come too close to.
     """
 
     def __init__(self, message: str, in_the_way: frozenset[int] = frozenset()) -> None:
@@ -36,16 +36,16 @@ class NoClearPlanError(ValueError):
         self.in_the_way = in_the_way
 
 
-class _Way(Protocol):
+class _Alternative(Protocol):
     def __call__(self) -> PlannedMotion: ...
 
 
 _Choices = Mapping[str, object]
-"""Phase -> what a way does in it. Ways that do the same in a phase are alike there; all are in a phase not named."""
+"""Phase -> choice of an alternative in it. Equal choices give equal motions in a phase; so do phases not named."""
 
 
 class ClearPlans:
-    """Tries the ways of a motion in order of preference.
+    """Tries the alternatives of a motion in order of preference.
 
     Args:
         planner: Builds motions from the converted movement.
@@ -64,9 +64,9 @@ class ClearPlans:
         """
         heights = (self.planner.options.entry_height, _HIGHER_ENTRY)
         kinds = [(height, above) for above in (False, True) for height in heights]
-        ways = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
+        alternatives = [partial(self.planner.fetch, source, height, above) for height, above in kinds]
         choices = [{"approach": kind, "lower": kind, "reach": kind[1]} for kind in kinds]
-        return self._first(ways, standing, choices)
+        return self._first(alternatives, standing, choices)
 
     def deliver(self, start: Floats, target: Floats, standing: Floats) -> PlannedMotion:
         """Carry straight; if that is not clear, first back to the target's row, or higher. Withdraw back, else up.
@@ -77,7 +77,7 @@ class ClearPlans:
         detours: list[list[Floats]] = [[], [back], [back + _HIGHER_CARRY]]
         leavings = [(upward, opened) for opened in (None, _HALF_OPEN) for upward in (False, True)]
         kinds = [(number, leaving) for leaving in leavings for number in range(len(detours))]
-        ways = [
+        alternatives = [
             partial(
                 self.planner.deliver, start, target, [self.planner.far_enough(p) for p in detours[number]], *leaving
             )
@@ -87,13 +87,13 @@ class ClearPlans:
             {"carry": number, "release": leaving[1], "withdraw": leaving, "retreat": leaving}
             for number, leaving in kinds
         ]
-        return self._first(ways, standing, choices)
+        return self._first(alternatives, standing, choices)
 
-    def hold(self, start: Floats, place: Floats, standing: Floats) -> PlannedMotion:
-        """Carry a held object to `place` and stay there: straight, else over the start or over the place."""
-        corners = [np.array([*side[:2], max(start[2], place[2])]) for side in (start, place)]
-        ways = [[], *([self.planner.far_enough(corner)] for corner in corners)]
-        return self._first([partial(self.planner.hold, start, place, via) for via in ways], standing)
+    def hold(self, start: Floats, position: Floats, standing: Floats) -> PlannedMotion:
+        """Carry a held object to `position` and stay there: straight, else over the start or over the position."""
+        corners = [np.array([*side[:2], max(start[2], position[2])]) for side in (start, position)]
+        alternatives = [[], *([self.planner.far_enough(corner)] for corner in corners)]
+        return self._first([partial(self.planner.hold, start, position, via) for via in alternatives], standing)
 
     def leave(self, here: Floats, opening: float, standing: Floats) -> PlannedMotion:
         """Open the hand and go back to the base pose, withdrawing back, else up."""
@@ -103,7 +103,7 @@ class ClearPlans:
         """From measured `angles` [6], rad, wherever they are, to the base pose.
 
         A held object is put down where it is. An empty hand is opened and withdrawn as after a placing; where it is
-        already above all objects, or where that cannot be done, the arm goes straight in joint angles.
+        already above all objects, or where that is not possible, the arm goes straight in joint angles.
         """
         planner = self.planner
         here = planner.arm.kinematics.forward(angles[:5]).gripper
@@ -112,16 +112,19 @@ class ClearPlans:
         start = np.array([*angles[:5], planner.arm.fingers_angle(opening)])
         grasped = self._checker.grasp_height
         below = np.array([here[0], here[1], min(here[2], grasped)])
-        put_down: list[_Way] = [partial(planner.deliver, here, below, [], upward) for upward in (False, True)]
-        leave: list[_Way] = [partial(planner.leave, here, opening, upward) for upward in (False, True)]
-        learned = [partial(self._from, start, way, holding) for way in ([*put_down, *leave] if holding else leave)]
+        put_down: list[_Alternative] = [partial(planner.deliver, here, below, [], upward) for upward in (False, True)]
+        leave: list[_Alternative] = [partial(planner.leave, here, opening, upward) for upward in (False, True)]
+        learned = [
+            partial(self._from, start, alternative, holding)
+            for alternative in ([*put_down, *leave] if holding else leave)
+        ]
         straight = partial(self._straight, start, planner.base_angles, "retreat")
         high = here[2] > grasped + _HIGH and not holding
         return self._first([straight, *learned] if high else [*learned, straight], standing)
 
-    def _from(self, start: Floats, way: _Way, holding: bool) -> PlannedMotion:
-        """The motion, begun with a way to its first sample."""
-        motion = way()
+    def _from(self, start: Floats, alternative: _Alternative, holding: bool) -> PlannedMotion:
+        """The motion, preceded by a straight path to its first sample."""
+        motion = alternative()
         return joined(self._straight(start, motion.angles[0], "gather", holding), motion)
 
     def _straight(self, start: Floats, end: Floats, phase: str, holding: bool = False) -> PlannedMotion:
@@ -138,18 +141,18 @@ class ClearPlans:
             holding,
         )
 
-    def offer(self, place: Floats, standing: Floats) -> PlannedMotion:
-        """Go to `place` with an open hand."""
-        return self._first([partial(self.planner.offer, place)], standing)
+    def offer(self, position: Floats, standing: Floats) -> PlannedMotion:
+        """Go to `position` with an open hand."""
+        return self._first([partial(self.planner.offer, position)], standing)
 
     def fingers(self, here: Floats, start: float, end: float, standing: Floats) -> PlannedMotion:
         """Open or close the hand where it is."""
         return self._first([partial(self.planner.fingers, here, start, end)], standing)
 
     def _first(
-        self, ways: Sequence[_Way], standing: Floats, choices: Sequence[_Choices] | None = None
+        self, alternatives: Sequence[_Alternative], standing: Floats, choices: Sequence[_Choices] | None = None
     ) -> PlannedMotion:
-        """The first way that is reachable and clear. With `choices`, ways that would fail as one before are skipped."""
+        """The first reachable and clear alternative; `choices` skips those that would fail like a previous one."""
         if len(standing) > self._checker.n_standing:
             raise NoClearPlanError(
                 f"{len(standing)} objects to keep clear of; at most {self._checker.n_standing} at once are possible"
@@ -160,11 +163,11 @@ class ClearPlans:
         in_the_way = set()
         next_best: tuple[float, PlannedMotion | None] = (0.0, None)
         hopeless: list[tuple[str, object]] = []
-        for number, way in enumerate(ways):
+        for number, alternative in enumerate(alternatives):
             if choices and any(choices[number].get(phase) == choice for phase, choice in hopeless):
                 continue
             try:
-                motion = way()
+                motion = alternative()
             except UnreachablePoseError as error:
                 reasons.append(str(error))
                 continue

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from paramove.documents import Floats, Ints
 from paramove.robots import RobotDescription
 
-_FAR = 0.05  # distances beyond are not told apart, m
+_FAR = 0.05  # larger distances are not distinguished, m
 _HIDDEN = 10.0
 _GRASPED_ABOVE_MIDDLE = 0.011
 
@@ -61,7 +61,7 @@ class ClearanceChecker:
         side: Which arm.
         surface: The working surface.
         cylinder: The standing objects' shape.
-        n_standing: How many standing objects can be told apart at once.
+        n_standing: Maximum number of standing objects.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class ClearanceChecker:
 
     @property
     def n_standing(self) -> int:
-        """How many standing objects can be kept clear of."""
+        """Maximum number of standing objects to keep clear of."""
         return self._n_standing
 
     @property

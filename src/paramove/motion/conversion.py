@@ -1,6 +1,6 @@
 """A person's movement model converted to a robot's arm (thesis 5.2.3).
 
-The converted model keeps the correspondence between the parameter and the place that is reached: a movement synthesised
+The converted model keeps the correspondence between parameter and reached position: a movement synthesised
 for a target in the robot's shoulder frame brings the gripper to that target.
 
 Elbows between the demonstrated ones: interpolated as parts of an arm, not as points on their own.
@@ -71,7 +71,7 @@ class RobotMovement(ReachingMovement):
             elbow_interpolation: As the attribute.
 
         Raises:
-            ValueError: The model lacks a point or does not say where in the movement the target is reached.
+            ValueError: The model lacks a point or does not define when the target is reached.
         """
         description = model.description or MovementDescription()
         person = points_of(model.means_, description.point_names)
@@ -103,7 +103,7 @@ class RobotMovement(ReachingMovement):
         )
 
     def converted(self, means: Floats, point_names: tuple[str, ...]) -> ArmPoses:
-        """Other poses of the same person as this movement's are: scaled by s, seen from p̄ (5.7).
+        """Converts other poses of the same person: scaled by s, relative to p̄ (5.7).
 
         Args:
             means: Body points, [K, 3 · points], m, frame of the demonstrations.
@@ -137,14 +137,14 @@ class RobotMovement(ReachingMovement):
 
         The demonstrations miss their targets a little; a few Newton steps on the effect remove that.
         """
-        wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
-        parameter = wanted.copy()
+        target = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
+        parameter = target.copy()
         steps = 0.01 * np.eye(3)
         for _ in range(_NEWTON_STEPS):
             reached = self._gripper(state, parameter)
             columns = [(self._gripper(state, parameter + step) - reached) / 0.01 for step in steps]
             jacobian = np.stack(columns, axis=-1)
-            parameter = parameter + np.linalg.solve(jacobian, (wanted - reached)[..., None])[..., 0]
+            parameter = parameter + np.linalg.solve(jacobian, (target - reached)[..., None])[..., 0]
         return parameter
 
     def opening(self, finger_to_thumb: ArrayLike) -> Floats:
@@ -192,7 +192,7 @@ def points_of(means: Floats, point_names: tuple[str, ...]) -> dict[str, Floats]:
 
 
 def arm_of(person: dict[str, Floats], shoulder: Floats) -> tuple[Floats, Floats, Floats]:
-    """Elbow q̃, gripper r̃ seen from a shoulder, and finger to thumb õ; [..., 3] each (5.2.3)."""
+    """Elbow q̃, gripper r̃ relative to a shoulder, and finger to thumb õ; [..., 3] each (5.2.3)."""
     gripper = np.mean([person["knuckle"], person["index"], person["thumb"]], axis=0)
     return person["elbow"] - shoulder, gripper - shoulder, person["thumb"] - person["index"]
 

@@ -1,4 +1,4 @@
-"""Poses in which a servo arm's hand is at a place, clear of the table; and the nearest place where there is none."""
+"""Poses in which a servo arm's hand is at a position, clear of the table; or the nearest reachable position."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ MIN_HEIGHT = 0.0005
 _PITCHES_A_BAND = 41
 _GRID_M = 0.005
 FARTHEST_M = 2.0
-"""Along each axis, of a place that an arm is asked for."""
-_TRIED_PLACES = 100
+"""Maximum of each coordinate of a requested position."""
+_TRIED_POSITIONS = 100
 
 
 class HandPoses:
@@ -30,81 +30,85 @@ class HandPoses:
     def __init__(self, chain: Chain, clearance: TableClearance, gripper: float) -> None:
         self._chain, self._clearance, self._gripper = chain, clearance, gripper
 
-    def pitch_at(self, target: ArrayLike, wanted: float, band: tuple[float, float]) -> float:
-        """The pitch nearest to the wanted one, of a band, rad, with which the arm is at a place and clear of the table.
+    def pitch_at(self, target: ArrayLike, preferred: float, band: tuple[float, float]) -> float:
+        """The pitch in a band, nearest to the preferred one, that reaches a position clear of the table; rad.
 
         Args:
             target: Shape [3], frame of the base, m.
 
         Raises:
-            OutOfReachError: There is none; names the reason and the nearest place where there is one.
+            OutOfReachError: There is none; with the reason and the nearest reachable position.
         """
         goal = np.asarray(target, dtype=np.float64)
         if goal.shape != (3,) or not np.isfinite(goal).all() or np.abs(goal).max() > FARTHEST_M:
             raise OutOfReachError(
-                f"{goal.tolist()} is no place: expected three numbers x, y, z in m, up to {FARTHEST_M:g} m away"
+                f"{goal.tolist()} is no position: expected three numbers x, y, z in m, up to {FARTHEST_M:g} m away"
             )
-        pitches, angles = self._poses(goal, wanted, band)
+        pitches, angles = self._poses(goal, preferred, band)
         for pitch, row in zip(pitches, angles, strict=True):
             if self._clear(row):
                 return float(pitch)
-        raise self._refusal(goal, wanted, band, len(pitches) > 0)
+        raise self._out_of_reach(goal, preferred, band, len(pitches) > 0)
 
     def middle(self, height: float, band: tuple[float, float]) -> Floats:
-        """Of the places straight ahead at this height that are reached with a pitch of a band, [3], m."""
+        """Mean of the positions straight ahead at this height that are reached with a pitch of a band, [3], m."""
         ahead = np.arange(0.02, 0.5, _GRID_M)
-        places = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
-        found = self._chain.kinematics.all_joint_angles(places[:, None], np.linspace(*band, 13)[None])
-        return np.asarray(places[np.isfinite(found).all(axis=-1).any(axis=-1).any(axis=-1)].mean(axis=0))
+        positions = np.stack([ahead, np.zeros_like(ahead), np.full_like(ahead, height)], axis=1)
+        solutions = self._chain.kinematics.all_joint_angles(positions[:, None], np.linspace(*band, 13)[None])
+        return np.asarray(positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)].mean(axis=0))
 
-    def _poses(self, goal: Floats, wanted: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
-        """Pitches in order of their distance from the wanted one, with the joint angles, [P] and [P, J]."""
-        pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(wanted, *band)])
-        pitches = pitches[np.argsort(np.abs(pitches - wanted), kind="stable")]
-        found = self._chain.kinematics.all_joint_angles(goal, pitches)
-        good = np.isfinite(found).all(axis=-1)
+    def _poses(self, goal: Floats, preferred: float, band: tuple[float, float]) -> tuple[Floats, Floats]:
+        """Pitches in order of their distance from the preferred one, with the joint angles, [P] and [P, J]."""
+        pitches = np.unique([*np.linspace(*band, _PITCHES_A_BAND), np.clip(preferred, *band)])
+        pitches = pitches[np.argsort(np.abs(pitches - preferred), kind="stable")]
+        solutions = self._chain.kinematics.all_joint_angles(goal, pitches)
+        good = np.isfinite(solutions).all(axis=-1)
         first = good.argmax(axis=-1)
         reached = good.any(axis=-1)
-        return pitches[reached], found[np.arange(len(pitches)), first][reached]
+        return pitches[reached], solutions[np.arange(len(pitches)), first][reached]
 
     def _clear(self, row: Floats) -> bool:
         pose = np.append(row, self._gripper)[None]
         return float(self._clearance.heights(pose)[0]) >= MIN_HEIGHT and self._clearance.touching(pose) is None
 
-    def _refusal(self, goal: Floats, wanted: float, band: tuple[float, float], reached: bool) -> OutOfReachError:
+    def _out_of_reach(
+        self, goal: Floats, preferred: float, band: tuple[float, float], reached: bool
+    ) -> OutOfReachError:
         lowest, highest = np.rad2deg(band)
-        cause = "the hand would touch the table or the arm itself there" if reached else self._cause(goal, wanted)
-        sentence = f"{metres(goal)} cannot be reached with the hand {lowest:.0f} to {highest:.0f} deg down: {cause}"
-        nearest = self._nearest(goal, wanted, band)
+        cause = "the hand would touch the table or the arm itself there" if reached else self._cause(goal, preferred)
+        message = f"{metres(goal)} cannot be reached with the hand {lowest:.0f} to {highest:.0f} deg down: {cause}"
+        nearest = self._nearest(goal, preferred, band)
         if nearest is None:
-            return OutOfReachError(f"{sentence}; nor can any place in that direction")
-        return OutOfReachError(f"{sentence}; the nearest place that can be reached is {metres(nearest)}", None, nearest)
+            return OutOfReachError(f"{message}; no position in that direction can be reached")
+        return OutOfReachError(
+            f"{message}; the nearest position that can be reached is {metres(nearest)}", None, nearest
+        )
 
-    def _cause(self, goal: Floats, wanted: float) -> str:
+    def _cause(self, goal: Floats, preferred: float) -> str:
         try:
-            pitch = self._chain.kinematics.nearest_pitch(goal, wanted)
+            pitch = self._chain.kinematics.nearest_pitch(goal, preferred)
         except OutOfReachError as error:
             return str(error).split("is out of reach: ")[-1].split("; ")[0]
         return f"the hand would have to be {np.rad2deg(pitch):.0f} deg down"
 
-    def _nearest(self, goal: Floats, wanted: float, band: tuple[float, float]) -> Floats | None:
-        """Nearest place of a grid in the upright plane through the arm's axis and the goal that can be reached."""
+    def _nearest(self, goal: Floats, preferred: float, band: tuple[float, float]) -> Floats | None:
+        """Nearest position of a grid in the upright plane through the arm's axis and the goal that can be reached."""
         axis = np.array([*self._chain.kinematics.yaw_axis, 0.0])
         ahead, side = (goal - axis)[:2]
         azimuth = np.arctan2(side, ahead)
         grid = np.stack(np.meshgrid(np.arange(0.03, 0.45, _GRID_M), np.arange(0.0, 0.45, _GRID_M)), axis=-1)
         radius, height = grid.reshape(-1, 2).T
         for turned in (azimuth, 0.75 * azimuth, 0.5 * azimuth):
-            places = axis + np.stack([radius * np.cos(turned), radius * np.sin(turned), height], axis=-1)
+            positions = axis + np.stack([radius * np.cos(turned), radius * np.sin(turned), height], axis=-1)
             pitches = np.linspace(*band, 9)
-            found = self._chain.kinematics.all_joint_angles(places[:, None], pitches[None])
-            reached = places[np.isfinite(found).all(axis=-1).any(axis=-1).any(axis=-1)]
-            for place in reached[np.argsort(np.linalg.norm(reached - goal, axis=-1))][:_TRIED_PLACES]:
-                if any(self._clear(row) for row in self._poses(place, wanted, band)[1]):
-                    return np.asarray(place)
+            solutions = self._chain.kinematics.all_joint_angles(positions[:, None], pitches[None])
+            reached = positions[np.isfinite(solutions).all(axis=-1).any(axis=-1).any(axis=-1)]
+            for position in reached[np.argsort(np.linalg.norm(reached - goal, axis=-1))][:_TRIED_POSITIONS]:
+                if any(self._clear(row) for row in self._poses(position, preferred, band)[1]):
+                    return np.asarray(position)
         return None
 
 
 def metres(point: Floats) -> str:
-    """A place in words, in m."""
+    """A position as text, in m."""
     return f"({', '.join(f'{value:.3f}' for value in point)}) m"

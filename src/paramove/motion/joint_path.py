@@ -1,4 +1,4 @@
-"""Motions along straight lines of joint angles: from where the arm was found to where a planned motion can begin.
+"""Motions along straight lines of joint angles: from the arm's measured pose to the start of a planned motion.
 
 No movement was learned for this. It is used only after an interruption, when the arm rests somewhere on a path.
 """
@@ -13,7 +13,7 @@ from paramove.motion.planned_motion import PlannedMotion
 from paramove.motion.timing import minimum_jerk
 from paramove.robots import ArmKinematics
 
-LIMIT_SHARE = 0.5  # of the operating velocity and acceleration: nobody expects this motion
+LIMIT_FRACTION = 0.5  # of the operating velocity and acceleration: people do not expect this motion
 MIN_DURATION_S = 0.5
 JOINED_WITHIN = np.deg2rad(0.01)
 
@@ -41,8 +41,8 @@ def joint_motion(
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     distance = np.abs(b - a)
     # Peaks of the minimum-jerk profile: velocity 15/8 d/T, acceleration 10/√3 d/T².
-    by_velocity = 1.875 * distance / (LIMIT_SHARE * velocity)
-    by_acceleration = np.sqrt(5.7735 * distance / (LIMIT_SHARE * acceleration))
+    by_velocity = 1.875 * distance / (LIMIT_FRACTION * velocity)
+    by_acceleration = np.sqrt(5.7735 * distance / (LIMIT_FRACTION * acceleration))
     duration = max(MIN_DURATION_S, float(by_velocity.max()), float(by_acceleration.max()))
     n = int(np.ceil(duration / period))
     angles = a + minimum_jerk(np.arange(n + 1) / n)[:, None] * (b - a)

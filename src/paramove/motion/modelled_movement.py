@@ -1,8 +1,8 @@
-"""Any parametric HMM over the place that is reached, as a movement of a robot's arm (thesis 5.2.3).
+"""Any parametric HMM over the position that is reached, as a movement of a robot's arm (thesis 5.2.3).
 
-Unlike the interpolation of a grid (`conversion.py`) this asks the model for its state means, whatever it is: linear,
-quadratic, neural. A model of a movement that ends where it arrives, as when people touch something, has no way back;
-the hand then goes back as it came.
+Unlike the interpolation of a grid (`conversion.py`) this uses the state means of any model: linear, quadratic,
+neural. A model of a movement that ends where it arrives, as when people touch something, has no retreat;
+the hand then returns along its approach.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from paramove.motion.timing import minimum_jerk
 from paramove.phmm import InterpolativePHMM, MovementDescription, ParametricHMM
 
 WIDEST_AT = 0.7
-"""Share of the way to an object after which a hand that will grasp is opened widest: 60 to 80 % (Jeannerod 1984)."""
+"""Fraction of the path to an object at which a grasping hand is opened widest: 60 to 80 % (Jeannerod 1984)."""
 _STEP = 0.005  # m, of the differences
 _EXACT = 1e-7  # m
 _NEWTON_STEPS = 25
@@ -29,18 +29,18 @@ _FARTHEST = 5.0  # arm lengths, of a parameter from the middle of the training
 
 
 class ModelledMovement(ReachingMovement):
-    """The converted model. Lengths are scaled by s, and seen from the shoulder where it is in each state.
+    """The converted model. Lengths are scaled by s, and relative to the shoulder in each state.
 
     A person's trunk leans towards what is reached, the robot's does not: it takes over the movement of the arm alone.
-    The parameter is the model's own, scaled and seen from the mean shoulder p̄.
+    The parameter is the model's own, scaled and relative to the mean shoulder p̄.
 
     Args:
-        model: Three parameters, the place that is reached; its description names the points shoulder, elbow, knuckle,
+        model: Three parameters, the reached position; its description names the points shoulder, elbow, knuckle,
             index and thumb, and the progress of arrival: 1 for a movement that ends there, else that of the grasp too.
         arm_length: l = a + b of the robot, m.
 
     Raises:
-        ValueError: The model lacks a point, has other parameters, or does not say when the target is reached.
+        ValueError: The model lacks a point, has other parameters, or does not define when the target is reached.
     """
 
     def __init__(self, model: ParametricHMM, arm_length: float) -> None:
@@ -50,7 +50,7 @@ class ModelledMovement(ReachingMovement):
         self._farthest = _FARTHEST * arm_length
         self._returns = not ends_at_target(description)
         self.begins_above_table = not self._returns
-        self.reach_state, self.release_state = _moments(description, model.n_states)
+        self.reach_state, self.release_state = _arrival_states(description, model.n_states)
         targets = _targets_of(model)
         person = points_of(model.state_means(targets), self._names)
         elbow, gripper, across = arm_of(person, person["shoulder"])
@@ -82,22 +82,22 @@ class ModelledMovement(ReachingMovement):
         the training's targets, as far as the model's movements go on to change with the target.
 
         Raises:
-            UnreachablePoseError: No parameter is found for a point.
+            UnreachablePoseError: There is no parameter for a point.
         """
-        wanted = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
-        parameter: Floats = wanted + self._centre - self._gripper(state, self._centre[None])
-        missed = wanted - self._gripper(state, parameter)
+        target = np.atleast_2d(np.asarray(gripper, dtype=np.float64))
+        parameter: Floats = target + self._centre - self._gripper(state, self._centre[None])
+        missed = target - self._gripper(state, parameter)
         for _ in range(_NEWTON_STEPS):
             if np.abs(missed).max() < _EXACT:
                 return parameter
-            parameter, missed = self._nearer(state, wanted, parameter, missed)
+            parameter, missed = self._nearer(state, target, parameter, missed)
         worst = int(np.abs(missed).max(axis=1).argmax())
         if np.abs(missed[worst]).max() < _EXACT:
             return parameter
-        raise UnreachablePoseError(self._refusal(wanted[worst], float(np.linalg.norm(missed[worst]))))
+        raise UnreachablePoseError(self._no_parameter_message(target[worst], float(np.linalg.norm(missed[worst]))))
 
     def openings(self, states: ArmPoses) -> Floats:
-        """ξ in all states: measured where the movement grasps, else opened on the way and closed on the way back."""
+        """ξ in all states: measured where the movement grasps, else opened on approach and closed on retreat."""
         n = len(states)
         if self._returns:
             size = np.linalg.norm(states.finger_to_thumb, axis=-1)
@@ -120,7 +120,7 @@ class ModelledMovement(ReachingMovement):
         theta = self._model.training_theta_
         return None if theta is None else TrainingTargets((theta - self._shoulder) * self.scale)
 
-    def _nearer(self, state: int, wanted: Floats, parameter: Floats, missed: Floats) -> tuple[Floats, Floats]:
+    def _nearer(self, state: int, target: Floats, parameter: Floats, missed: Floats) -> tuple[Floats, Floats]:
         """One step of Newton's method, halved where it would not come nearer."""
         steps = _STEP * np.eye(3)
         columns = [self._gripper(state, parameter + step) - self._gripper(state, parameter - step) for step in steps]
@@ -128,23 +128,25 @@ class ModelledMovement(ReachingMovement):
         try:
             change = np.linalg.solve(jacobian, missed[..., None])[..., 0]
         except np.linalg.LinAlgError as error:
-            raise UnreachablePoseError(self._refusal(wanted[0], float(np.linalg.norm(missed[0])))) from error
+            raise UnreachablePoseError(
+                self._no_parameter_message(target[0], float(np.linalg.norm(missed[0])))
+            ) from error
         distance = np.linalg.norm(missed, axis=1)
         for _ in range(_HALVINGS):
             tried = self._centre + np.clip(parameter + change - self._centre, -self._farthest, self._farthest)
-            left = wanted - self._gripper(state, tried)
+            left = target - self._gripper(state, tried)
             worse = np.linalg.norm(left, axis=1) > distance
             if not worse.any():
                 break
             change = np.where(worse[:, None], 0.5 * change, change)
         return tried, left
 
-    def _refusal(self, wanted: Floats, missed: float) -> str:
-        x, y, z = 100.0 * wanted
+    def _no_parameter_message(self, target: Floats, missed: float) -> str:
+        x, y, z = 100.0 * target
         description = self._model.description or MovementDescription()
         return (
             f"no movement of the model {description.action!r} brings the gripper to ({x:.1f}, {y:.1f}, {z:.1f}) cm, "
-            f"the nearest is {100 * missed:.1f} cm beside it; its training reached no such place, and a linear "
+            f"the nearest is {100 * missed:.1f} cm away; its training reached no such position, and a linear "
             "model extrapolates farther than others"
         )
 
@@ -175,12 +177,12 @@ def _targets_of(model: ParametricHMM) -> Floats:
     else:
         raise ValueError("the model is not trained: call fit first")
     if targets.shape[1] != 3:
-        raise ValueError(f"expected a model of 3 parameters, the place that is reached; found {targets.shape[1]}")
+        raise ValueError(f"expected a model of 3 parameters, the position that is reached; found {targets.shape[1]}")
     return targets
 
 
-def _moments(description: MovementDescription, n_states: int) -> tuple[int, int]:
-    """States of arrival and of the beginning of the way back."""
+def _arrival_states(description: MovementDescription, n_states: int) -> tuple[int, int]:
+    """States of arrival and of the beginning of the retreat."""
     arrival, grasp, last = description.arrival, description.grasp, n_states - 1
     if ends_at_target(description):
         return last, last + 1

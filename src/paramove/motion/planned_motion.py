@@ -19,7 +19,7 @@ class RelocationOptions:
 
     before: float = 0.03  # 3 cm before the object
     aside: float = 0.008  # thesis 1 cm to the right
-    grasp_aside: float = 0.004  # thesis 1 cm; the gripper site already lies beside the forearm's axis
+    grasp_aside: float = 0.004  # thesis 1 cm; the gripper site already lies next to the forearm's axis
     release_aside: float = 0.006  # 0.6 cm
     lift: float = 0.048  # thesis 1.5 cm; this much clears standing objects
     entry_height: float = 0.048  # the synthesised approach ends and the retreat begins so far above the table target
@@ -35,10 +35,10 @@ class RelocationOptions:
     closed_opening: float = 0.02  # ξ of the hand that closes on an object, which stops it earlier
     work_slope: float = 0.25  # rad; the forearm's slope while it interacts, the same everywhere: objects stay upright
     level_states: int = 12  # over so many states the hand is levelled before, and let free after, the interaction
-    limit_share: float = 0.85  # of the arm's operating velocity and acceleration, used at most
+    limit_fraction: float = 0.85  # of the arm's operating velocity and acceleration, used at most
     reach_margin: float = 0.002  # the synthesised path keeps this much outside the smallest reach of the arm
     reach_width: float = 0.012  # and begins to be moved outward from twice so much on
-    turn_smoothing: float = 0.15  # s, over which a turn of the elbow comes and goes
+    turn_smoothing: float = 0.15  # s, over which a turn of the elbow rises and falls
     blend_share: float = 0.45  # part of the approach over which the robot's own base pose fades into the movement
     begin_within: tuple[tuple[float, float], ...] = ((0.128, 0.15), (-0.06, -0.01), (-0.04, -0.015))
     """x, y, z of where a movement may begin that begins above the table: clear of torso, smallest reach and objects."""
@@ -90,7 +90,7 @@ class PlannedMotion:
         gripper: Where the gripper site shall be, [K, 3], m, shoulder frame.
         holding: Whether an object is held, [K].
         phases: Name and start of each phase.
-        elbow_turn: Largest turn of the elbow that a joint limit asked for, rad.
+        elbow_turn: Largest turn of the elbow for a joint limit, rad.
     """
 
     times: Floats

@@ -45,7 +45,7 @@ def load_reaching_model(path: Path) -> ParametricHMM:
 
 
 def check_reaching_model(model: ParametricHMM) -> None:
-    """Raises ValueError unless the model tells of a person's arm, in m, that reaches the targets of its parameters."""
+    """Raises ValueError unless the model describes a person's arm, in m, that reaches the targets of its parameters."""
     description = model.description or MovementDescription()
     if description.unit != "m":
         raise ValueError(f"expected points in m, found {description.unit!r}")
@@ -55,7 +55,7 @@ def check_reaching_model(model: ParametricHMM) -> None:
             f"found {description.frame!r}"
         )
     _check_sizes(model, description)
-    movement = robot_movement(model, 1.0)  # checks the points and the moments of arrival and grasp
+    movement = robot_movement(model, 1.0)  # checks the points and the times of arrival and grasp
     arm_length = 1.0 / movement.scale
     shortest, longest = SERVO_ARM_LENGTHS if description.frame == ARM_BASE else ARM_LENGTHS
     if not shortest <= arm_length <= longest:
@@ -64,7 +64,7 @@ def check_reaching_model(model: ParametricHMM) -> None:
         raise ValueError("expected a hand that opens and closes, found a constant distance of finger and thumb")
     missed = _missed(movement) * arm_length
     if not missed <= MAX_MISSED:
-        raise ValueError(f"expected a movement that reaches its targets, found {missed:.3g} m beside the middle one")
+        raise ValueError(f"expected a movement that reaches its targets, found {missed:.3g} m from the middle one")
 
 
 def _check_sizes(model: ParametricHMM, description: MovementDescription) -> None:
@@ -74,10 +74,10 @@ def _check_sizes(model: ParametricHMM, description: MovementDescription) -> None
         targets = "a grid of targets" if isinstance(model, InterpolativePHMM) else "targets"
         raise ValueError(f"expected {targets} with 3 coordinates, found {dimension}")
     expected = 3 * len(description.point_names)
-    found = model.state_means(np.zeros(3) if bounds is None else bounds.mean(axis=0)).shape[-1]
-    if found != expected:
+    dimensions = model.state_means(np.zeros(3) if bounds is None else bounds.mean(axis=0)).shape[-1]
+    if dimensions != expected:
         raise ValueError(
-            f"expected {expected} numbers a frame for {len(description.point_names)} points, found {found}"
+            f"expected {expected} numbers a frame for {len(description.point_names)} points, found {dimensions}"
         )
 
 

@@ -1,4 +1,4 @@
-"""A reaching movement as a robot's arm makes it: what the relocation action needs of it, whichever model is behind."""
+"""A reaching movement as a robot's arm makes it: the interface that the relocation action needs, for any model."""
 
 from __future__ import annotations
 
@@ -52,15 +52,15 @@ class ArmPoses:
 
 
 class ReachingMovement(ABC):
-    """A family of movements over the place that is reached, converted to a robot's arm (thesis 5.2.3).
+    """A family of movements over the position that is reached, converted to a robot's arm (thesis 5.2.3).
 
     Attributes:
         scale: s = l / l′.
-        o_max: Greatest distance of finger and thumb, m.
+        o_max: Maximum distance of finger and thumb, m.
         reach_state: State in which the gripper is at the target, still open (T of 5.2.5).
         release_state: State in which the hand begins to go back (T′).
         begins_above_table: Whether the hand comes from above the table, as that of people who sit at it; otherwise it
-            comes from beside the body, where the robot's own hangs.
+            comes from next to the body, where the robot's own hangs.
     """
 
     scale: float
@@ -110,7 +110,7 @@ class ReachingMovement(ABC):
 
 
 class TrainingTargets:
-    """The targets of the training as a body: their convex hull, widened by nothing.
+    """The targets of the training as a body: their convex hull, without a margin.
 
     Args:
         targets: [K, P].

@@ -16,31 +16,31 @@ from paramove.source_code import code_digest
 ACTIONS = ("reach_forward", "reach_across")
 N_STATES = 40
 REMEDY = (
-    "put the data set beside the clone as ../shared/data/table_reach/data.npz or name its folder in PARAMOVE_DATA; or "
+    "put the data set next to the clone as ../shared/data/table_reach/data.npz or name its folder in PARAMOVE_DATA; or "
     "give a trained model by the node's parameter movement.file; or leave out its parameter movement to move as the "
     "synthetic demonstrator does"
 )
 
 
 def people_model(name: str, cache_folder: Path | None) -> PolynomialPHMM:
-    """The linear model of the data set `name`, trained once and kept in `cache_folder`.
+    """The linear model of the data set `name`, trained once and cached in `cache_folder`.
 
-    The kept one is used if the present code trained it, from the recordings that are there or while there are none.
+    The cached model is used if the present code trained it from the present recordings, or if there are none.
 
     Raises:
-        ModelFileError: There are neither recordings nor a kept model, or the recordings do not suit; with the remedy.
+        ModelFileError: There are neither recordings nor a cached model, or the recordings do not suit; with the remedy.
     """
     cache = None if cache_folder is None else cache_folder / f"reaching_{name}.npz"
-    kept, code = stored_model(PolynomialPHMM, cache), f"code {code_digest(__name__)}"
-    trained_from = kept.description.source if kept is not None and kept.description is not None else ""
+    cached, code = stored_model(PolynomialPHMM, cache), f"code {code_digest(__name__)}"
+    trained_from = cached.description.source if cached is not None and cached.description is not None else ""
     try:
         source = f"{name}, {', '.join(ACTIONS)}, sha256 {_digest(name)}, {code}"
-        if kept is not None and trained_from == source:
-            return kept
+        if cached is not None and trained_from == source:
+            return cached
         model = train_people_model(load_recordings(name), actions=ACTIONS, n_states=N_STATES)
     except RecordingsError as error:
-        if kept is not None and trained_from.endswith(code):
-            return kept
+        if cached is not None and trained_from.endswith(code):
+            return cached
         raise ModelFileError(
             f"the movement {name!r} is trained from recorded people: {error}. Remedy: {REMEDY}", missing=True
         ) from error
@@ -62,12 +62,12 @@ def _digest(name: str) -> str:
 def train_people_model(
     recordings: Recordings, *, degree: int = 1, actions: Sequence[str] = ACTIONS, n_states: int = N_STATES
 ) -> PolynomialPHMM:
-    """A polynomial model of reaching over the touched place, in the body frame of one person, m.
+    """A polynomial model of reaching over the touched position, in the body frame of one person, m.
 
-    The movements end where the hand arrives: arrival is 1, there is no grasp and no way back.
+    The movements end where the hand arrives: arrival is 1, there is no grasp and no retreat.
 
     Args:
-        recordings: Of people that reach for places, each movement labelled with its target.
+        recordings: Of people that reach for positions, each movement labelled with its target.
         degree: 1 linear, 2 quadratic.
         actions: Which of their actions, pooled.
         n_states: Each of 2 or 3 of `2.5 * n_states` frames.

@@ -100,10 +100,10 @@ class RelocationPlanner:
         self._leave(path, t, o.closed_opening, upward, o.work_opening if opened is None else opened)
         return self._finish(path)
 
-    def hold(self, start: ArrayLike, place: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
-        """Carry a held object from gripper position `start` over `via` to `place` and stay there."""
+    def hold(self, start: ArrayLike, position: ArrayLike, via: Sequence[ArrayLike] = ()) -> PlannedMotion:
+        """Carry a held object from gripper position `start` over `via` to `position` and stay there."""
         path = self._new_path()
-        self._carry(path, np.asarray(start, dtype=np.float64), [*via, place])
+        self._carry(path, np.asarray(start, dtype=np.float64), [*via, position])
         return self._finish(path)
 
     def leave(self, start: ArrayLike, opening: float, upward: bool = False) -> PlannedMotion:
@@ -261,11 +261,11 @@ class RelocationPlanner:
         gripper = np.clip(states.gripper[:1], *np.transpose(o.begin_within))
         return self._blended(states, ArmPoses(states.elbow[:1], gripper, states.finger_to_thumb[:1]), 1.0)
 
-    def _blended(self, states: ArmPoses, first: ArmPoses, share: float) -> ArmPoses:
-        """The movement started from another pose, which fades out over the first `share`."""
+    def _blended(self, states: ArmPoses, first: ArmPoses, fraction: float) -> ArmPoses:
+        """The movement started from another pose, which fades out over the first `fraction`."""
         values = states.stacked()
         n = len(values)
-        fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (share * (n - 1)), 0.0, 1.0))
+        fade = 1.0 - minimum_jerk(np.clip(np.arange(n) / (fraction * (n - 1)), 0.0, 1.0))
         return ArmPoses.from_stacked(values + fade[:, None] * (first.stacked()[0] - values[0]))
 
     def _pose_of(self, angles: Floats) -> ArmPoses:
@@ -283,8 +283,8 @@ class RelocationPlanner:
         closed, opened = self.arm.fingers_closed, self.arm.fingers_open
         fingers = closed + opening * (opened - closed)
         angles = np.concatenate([solution.angles, fingers[:, None]], axis=1)
-        share = self.options.limit_share
-        stretched = slowed_times(angles, path.period, share * self.velocity, share * self.acceleration)
+        fraction = self.options.limit_fraction
+        stretched = slowed_times(angles, path.period, fraction * self.velocity, fraction * self.acceleration)
         holding = np.concatenate(path.holding).astype(np.float64)
         columns = np.concatenate([angles, poses.gripper], axis=1)
         times, values = self._sampled(stretched, columns, path.period)
@@ -314,5 +314,5 @@ class RelocationPlanner:
 
 def _crossfaded(first: Floats, second: Floats, n: int) -> Floats:
     """From one curve of n values to another."""
-    share = fade_in(n, n)
-    return np.asarray((1.0 - share) * first + share * second)
+    fraction = fade_in(n, n)
+    return np.asarray((1.0 - fraction) * first + fraction * second)

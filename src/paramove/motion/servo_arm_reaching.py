@@ -1,8 +1,8 @@
-"""The learned reaching on a small servo arm: reach for a place, or pick an object up and place it elsewhere.
+"""The learned reaching on a small servo arm: reach for a position, or pick an object up and place it elsewhere.
 
 As the relocation action of the thesis (5.2.5): a learned movement brings the open hand over the object, a straight line
-lowers it, the hand closes and lifts the object, a learned movement carries it over the place, and so on. See
-`learned_way.py` for what is the person's in it.
+lowers it, the hand closes and lifts the object, a learned movement carries it over the target, and so on. See
+`learned_path.py` for the part that is learned from the person.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from paramove.documents import Floats
 from paramove.motion.arm_pose import UnreachablePoseError
 from paramove.motion.hand_poses import HandPoses, metres
-from paramove.motion.learned_way import SMOOTHING, LearnedWay, PlacedPerson
+from paramove.motion.learned_path import SMOOTHING, LearnedPath, PlacedPerson
 from paramove.motion.modelled_movement import robot_movement
 from paramove.motion.planar_path import NoJointPathError, planar_path
 from paramove.motion.planned_motion import PlannedMotion
@@ -26,8 +26,8 @@ from paramove.phmm import ParametricHMM
 from paramove.robots import DescriptionError, OutOfReachError, RobotDescription
 
 POINTS = 48
-"""Of a learned way."""
-_SHARES = (1.0, 0.6, 0.3, 0.0)
+"""Number of points of a learned path."""
+_FRACTIONS = (1.0, 0.6, 0.3, 0.0)
 _ARCHES_M = (0.0, 0.02, 0.04, 0.07, 0.10)
 _CHECKED_EVERY = 3
 _GAP_TO_ENDS_M = 0.0005
@@ -39,18 +39,18 @@ class ServoArmReaching:
 
     Args:
         description: Of a robot with a chain.
-        model: Of a person's reaching, its parameter the place that is reached; made as small as the arm.
+        model: Of a person's reaching, its parameter the position that is reached; scaled to the size of the arm.
         options: Sizes.
 
     Raises:
         DescriptionError: The robot has no such arm.
-        ValueError: The model is none of reaching.
+        ValueError: The model is not one of reaching.
 
     Attributes:
         joints: Names, the gripper last.
-        base_angles: Where motions end that go home.
-        lower, upper: What the angles keep to.
-        start_tolerance: How far from where it is commanded to be a motion of this robot may begin, rad.
+        base_angles: The end of motions that go home.
+        lower, upper: Limits of the angles.
+        start_tolerance: Maximum distance of a motion's start from the commanded angles, rad.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class ServoArmReaching:
         self.base_angles = description.base_pose[indices]
         self.lower, self.upper = description.soft_lower[indices], description.soft_upper[indices]
         rates = (description.operating_velocity, description.operating_acceleration, description.jerk)
-        velocity, acceleration, jerk = (o.limit_share * limit[indices] for limit in rates)
+        velocity, acceleration, jerk = (o.limit_fraction * limit[indices] for limit in rates)
         self._limits = (velocity, acceleration, jerk)
         self.start_tolerance = float(np.deg2rad(description.stream.start_tolerance_deg))
         self._period = description.stream.period_us * 1e-6
@@ -77,31 +77,31 @@ class ServoArmReaching:
         self._person = PlacedPerson(robot_movement(model, length), middle, self._arm.yaw_axis, POINTS)
 
     def reach(self, target: ArrayLike, start: ArrayLike | None = None) -> PlannedMotion:
-        """Bring the end effector to a place with an open hand, by the learned movement.
+        """Bring the end effector to a position with an open hand, by the learned movement.
 
         Args:
             target: Shape [3], frame of the base, m.
             start: Angles from which the motion begins; None for the base pose.
 
         Raises:
-            OutOfReachError: With the reason and the nearest place, or that no way leads there.
+            OutOfReachError: With the reason and the nearest reachable position, or that there is no path.
         """
         goal = np.asarray(target, dtype=np.float64)
         pitch = self._poses.pitch_at(goal, np.deg2rad(self.options.pitch_deg), self._band(self.options.reach_band_deg))
         motion = self._begun(start)
-        way = self._learned(self._person.approach, goal)
-        self._go(motion, "reach", goal, pitch, way, self.options.work_opening, self.options.clearance)
+        path = self._learned(self._person.approach, goal)
+        self._go(motion, "reach", goal, pitch, path, self.options.work_opening, self.options.clearance)
         return self._finished(motion)
 
     def pick_and_place(self, source: ArrayLike, place: ArrayLike, start: ArrayLike | None = None) -> PlannedMotion:
         """Fetch the object at `source`, put it at `place` and go back to the base pose.
 
         Args:
-            source, place: Of the end effector when it grasps and lets go, [3], frame of the base, m.
+            source, place: Of the end effector when it grasps and releases, [3], frame of the base, m.
             start: As for `reach`.
 
         Raises:
-            OutOfReachError: With the reason and the nearest place, or that no way leads there.
+            OutOfReachError: With the reason and the nearest reachable position, or that there is no path.
         """
         o = self.options
         ends = [np.asarray(point, dtype=np.float64) for point in (source, place)]
@@ -119,10 +119,10 @@ class ServoArmReaching:
         return self._finished(motion)
 
     def home(self, start: ArrayLike) -> PlannedMotion:
-        """Back to the base pose, by the learned way back.
+        """Back to the base pose, by the learned retreat.
 
         Raises:
-            OutOfReachError: No way leads there.
+            OutOfReachError: There is no path.
         """
         motion = self._begun(start)
         self._home(motion, "retreat", self._hand(motion.end))
@@ -137,16 +137,16 @@ class ServoArmReaching:
     def _over(
         self, motion: MotionRows, name: str, point: Floats, pitch: float, opening: float, holding: bool = False
     ) -> None:
-        """By the learned movement to over an object or its place."""
+        """By the learned movement to above an object or its target."""
         above, above_pitch = self._above(point, pitch)
-        way = self._learned(self._person.approach, above)
-        self._go(motion, name, above, above_pitch, way, opening, self.options.carry_clearance, holding)
+        path = self._learned(self._person.approach, above)
+        self._go(motion, name, above, above_pitch, path, opening, self.options.carry_clearance, holding)
 
     def _home(self, motion: MotionRows, name: str, from_point: Floats) -> None:
         base = self.base_angles
-        way = self._learned(self._person.retreat, from_point)
+        path = self._learned(self._person.retreat, from_point)
         pitch = float(self._arm.forward(base[:-1]).pitch)
-        self._go(motion, name, self._hand(base), pitch, way, None, self.options.clearance)
+        self._go(motion, name, self._hand(base), pitch, path, None, self.options.clearance)
         self._joints(motion, name, base)
 
     def _go(
@@ -155,48 +155,50 @@ class ServoArmReaching:
         name: str,
         point: Floats,
         pitch: float,
-        way: LearnedWay,
+        path: LearnedPath,
         opening: float | None,
         clearance: float,
         holding: bool = False,
     ) -> None:
-        """Along a learned way; with an arch or less of what the person does where that is not clear, or slow."""
-        refusal, best = "", None
-        for share in _SHARES:
-            mild = way.milder(share)
+        """Along a learned path; with an arch or less of the person's deviation where it is not clear, or slow."""
+        reason, best = "", None
+        for fraction in _FRACTIONS:
+            mild = path.milder(fraction)
             gripper = self._openings(motion.end, mild, opening)
             rows, fault = self._clear(motion.end, mild, point, pitch, gripper, clearance)
-            refusal = refusal or fault
+            reason = reason or fault
             if rows is not None and (best is None or len(rows) < len(best)):
                 best = rows
             if best is not None and self._period * len(best) <= self.options.longest_duration:
                 break
         if best is None:
-            raise OutOfReachError(f"no way leads to {metres(point)} from {metres(self._hand(motion.end))}: {refusal}")
+            raise OutOfReachError(
+                f"there is no path to {metres(point)} from {metres(self._hand(motion.end))}: {reason}"
+            )
         motion.add(name, best, holding)
 
     def _clear(
         self,
         start: Floats,
-        way: LearnedWay,
+        path: LearnedPath,
         point: Floats,
         pitch: float,
         gripper: Floats,
         clearance: float,
     ) -> tuple[Floats | None, str]:
-        """Rows along a path with the smallest arch that is clear; if none is, None and what is in the way."""
-        refusal = ""
+        """Rows along a path with the smallest arch that is clear; if none is, None and the obstacle."""
+        reason = ""
         for arch in _ARCHES_M:
             try:
-                rows = self._along(start, way.raised(arch), point, pitch, gripper)
+                rows = self._along(start, path.raised(arch), point, pitch, gripper)
             except NoJointPathError as error:
-                refusal = refusal or str(error)
+                reason = reason or str(error)
                 continue
             fault = self._fault(rows, clearance)
             if not fault:
                 return rows, ""
-            refusal = refusal or fault
-        return None, refusal
+            reason = reason or fault
+        return None, reason
 
     def _line(self, motion: MotionRows, name: str, point: Floats, pitch: float, holding: bool = False) -> None:
         """Straight, with the gripper as it is."""
@@ -229,30 +231,30 @@ class ServoArmReaching:
         if np.abs(motion.end - end).max() > 1e-9:
             motion.add(name, rest_to_rest(np.linspace(motion.end, end, 6), 0.2, self._period, self._limits), False)
 
-    def _along(self, start: Floats, way: LearnedWay, point: Floats, pitch: float, gripper: Floats) -> Floats:
+    def _along(self, start: Floats, path: LearnedPath, point: Floats, pitch: float, gripper: Floats) -> Floats:
         here = self._arm.forward(start[:-1])
-        positions = way.between(here.position, point, self._arm.yaw_axis)
-        share = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
-        pitches = float(here.pitch) + share * (pitch - float(here.pitch))
+        positions = path.between(here.position, point, self._arm.yaw_axis)
+        fraction = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
+        pitches = float(here.pitch) + fraction * (pitch - float(here.pitch))
         arm = planar_path(self._arm, positions, pitches, start[:-1])
-        if self._arm.n_joints == 5:  # the search knows no roll: it is turned back on the way
-            arm[:, 4] = (1.0 - share) * start[4]
+        if self._arm.n_joints == 5:  # the search has no roll: it is turned back along the path
+            arm[:, 4] = (1.0 - fraction) * start[4]
         knots = np.concatenate([arm, gripper[:, None]], axis=1)
-        return self._inside(rest_to_rest(knots, self.options.way_duration, self._period, self._limits, ramped))
+        return self._inside(rest_to_rest(knots, self.options.learned_duration, self._period, self._limits, ramped))
 
-    def _openings(self, start: Floats, way: LearnedWay, opening: float | None) -> Floats:
-        """Angles of the gripper along a way: the person's opening, times how far it shall be opened; kept if closed."""
-        share = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
+    def _openings(self, start: Floats, path: LearnedPath, opening: float | None) -> Floats:
+        """Angles of the gripper along a path: the person's opening, scaled to `opening`; constant if closed."""
+        fraction = minimum_jerk(np.linspace(0.0, 1.0, POINTS))
         if opening is None:
-            return np.asarray((1.0 - share) * start[-1] + share * self.base_angles[-1])
+            return np.asarray((1.0 - fraction) * start[-1] + fraction * self.base_angles[-1])
         if opening == self.options.closed_opening:
             return np.full(POINTS, start[-1])
-        last = max(float(way.opening[-1]), 1e-3)
-        angles = np.array([self._gripper(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in way.opening])
-        return smoothed(angles + (1.0 - share) * (start[-1] - angles[0]), SMOOTHING)
+        last = max(float(path.opening[-1]), 1e-3)
+        angles = np.array([self._gripper(opening * float(np.clip(xi / last, 0.0, 1.0))) for xi in path.opening])
+        return smoothed(angles + (1.0 - fraction) * (start[-1] - angles[0]), SMOOTHING)
 
     def _fault(self, rows: Floats, clearance: float) -> str:
-        """What is in the way of a path; empty if nothing is."""
+        """The obstacle on a path; empty if it is clear."""
         checked = np.concatenate([rows[:-1:_CHECKED_EVERY], rows[-1:]])
         heights, hand = self._clearance.heights(checked), self._arm.forward(checked[:, :-1]).position
         minimum = np.full(len(checked), clearance)
@@ -265,12 +267,12 @@ class ServoArmReaching:
         touching = self._clearance.touching(checked[:: 2 * _CHECKED_EVERY])
         return "" if touching is None else f"its {touching[0]} would touch its {touching[1]}"
 
-    # Places
+    # Positions
 
     def _begun(self, start: ArrayLike | None) -> MotionRows:
         angles = self.base_angles if start is None else np.asarray(start, dtype=np.float64)
         if angles.shape != self.base_angles.shape or not np.isfinite(angles).all():
-            raise ValueError(f"a start has the angles of {', '.join(self.joints)}, found {angles.tolist()}")
+            raise ValueError(f"expected a start with the angles of {', '.join(self.joints)}, found {angles.tolist()}")
         return MotionRows([self._inside(angles)[None]], [np.zeros(1, dtype=bool)])
 
     def _finished(self, motion: MotionRows) -> PlannedMotion:
@@ -279,9 +281,9 @@ class ServoArmReaching:
         times: Floats = self._period * np.arange(len(rows), dtype=np.float64)
         return PlannedMotion(times, rows, self._hand(rows), np.concatenate(motion.holding), phases, 0.0)
 
-    def _learned(self, way: Callable[[Floats], LearnedWay], target: Floats) -> LearnedWay:
+    def _learned(self, path: Callable[[Floats], LearnedPath], target: Floats) -> LearnedPath:
         try:
-            return way(target)
+            return path(target)
         except (UnreachablePoseError, np.linalg.LinAlgError) as error:
             raise OutOfReachError(f"the learned movement does not lead to {metres(target)}: {error}") from error
 
@@ -315,18 +317,18 @@ class ServoReachingOptions:
     pitch_deg: float = 90.0  # of the hand at the target: straight down
     reach_band_deg: tuple[float, float] = (-90.0, 120.0)
     grasp_band_deg: tuple[float, float] = (50.0, 110.0)  # further from straight down an open gripper strikes the object
-    lift: float = 0.05  # learned movements end and begin so far above an object
-    speed: float = 0.06  # of straight lines, at most
-    way_duration: float = 1.6  # of a learned movement, at least
+    lift: float = 0.05  # height above an object at which learned movements end and begin
+    speed: float = 0.06  # maximum, of straight lines
+    learned_duration: float = 1.6  # minimum, of a learned movement
     longest_duration: float = 6.0  # where a learned movement takes longer, as joints turn far, a milder one is tried
     gripper_duration: float = 0.8
-    settle_duration: float = 0.4  # the closed gripper is given so long to press
+    settle_duration: float = 0.4  # time for the closed gripper to press
     work_opening: float = 0.6  # ξ
     closed_opening: float = 0.0
-    clearance: float = 0.005  # of every part from the table on the way
+    clearance: float = 0.005  # of every part from the table
     carry_clearance: float = 0.02
-    near: float = 0.03  # so near the ends of a way the hand may be as low as it is there
-    limit_share: float = 0.8  # of the operating velocity, acceleration and jerk
+    near: float = 0.03  # within this distance of a path's ends the hand may be as low as there
+    limit_fraction: float = 0.8  # of the operating velocity, acceleration and jerk
 
 
 @dataclass
@@ -343,7 +345,7 @@ class MotionRows:
         return np.asarray(self.rows[-1][-1])
 
     def add(self, name: str, rows: Floats, holding: bool) -> None:
-        """More rows, of which the first repeats the last one that is there."""
+        """Adds rows, of which the first repeats the last existing one."""
         if not self.phases or self.phases[-1][0] != name:
             self.phases.append((name, sum(map(len, self.rows)) - 1))
         self.rows.append(rows[1:])

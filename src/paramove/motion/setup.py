@@ -25,10 +25,10 @@ _log = logging.getLogger(__name__)
 
 
 class MovementSource(BaseModel):
-    """Where the reaching movement comes from: a `file`, or a `model` that is trained when it is first asked for.
+    """Source of the reaching movement: a `file`, or a `model` that is trained on first use.
 
     `synthetic`: demonstrations of the synthetic demonstrator with that `seed`. `table_reach`: recorded people that
-    reach for places on a table.
+    reach for positions on a table.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -44,7 +44,7 @@ class MovementSource(BaseModel):
         return self
 
     def trained(self) -> ParametricHMM:
-        """The model, kept in the user's cache folder once trained. Raises ModelFileError for a bad `file`."""
+        """The model, cached in the user's folder once trained. Raises ModelFileError for a bad `file`."""
         if self.file is not None:
             return load_reaching_model(self.file)
         cache = _cache_folder()
@@ -56,12 +56,12 @@ class MovementSource(BaseModel):
 
 
 def _cache_folder() -> Path | None:
-    """The user's folder for trained models; None where it cannot be made."""
+    """The user's folder for trained models; None if it cannot be created."""
     folder = user_cache_path("paramove")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        _log.warning("training the movement, which cannot be kept in %s: %s", folder, error.strerror)
+        _log.warning("training the movement; the model cannot be stored in %s: %s", folder, error.strerror)
         return None
     return folder
 
@@ -84,7 +84,7 @@ def synthesizer_for(robot_folder: Path, side: str, movement: MovementSource, sur
 
 
 def plans_for(robot_folder: Path, side: str, movement: MovementSource, surface: SurfaceParameters) -> ClearPlans:
-    """What plans the robot's movements, from files."""
+    """The planner of the robot's movements, from files."""
     robot = RobotDescription.load(robot_folder)
     arm = robot.arm(side)
     solver = ArmPoseSolver(robot, arm)

@@ -1,4 +1,4 @@
-"""From goals to trajectories: plays one goal after the other with the learned movement and says how it fares."""
+"""From goals to trajectories: executes one goal after the other with the learned movement and reports its progress."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationSta
 
 FRAME = "right_shoulder"
 FARTHEST = 2.0
-"""m; beyond it not even the way to an answer of the inverse kinematics can be computed."""
+"""m; beyond it the inverse kinematics are numerically unusable."""
 LARGEST = 1e6
 RESEND_NS = 400_000_000
 REMEMBERED_GOALS = 200
 STALE_TRIES = 3
 NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
-RESTARTED = "the synthesizer was restarted; the motion it had begun was ended where it led; send a new goal"
+RESTARTED = "the synthesizer was restarted; its motion ran to its end; send a new goal"
 
 _ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
 
 
 @dataclass(frozen=True)
 class SynthesizerOutput:
-    """What one tick gives."""
+    """The output of one tick."""
 
     trajectories: tuple[JointTrajectory, ...]
     statuses: tuple[RelocationStatus, ...]
@@ -51,7 +51,7 @@ _Course = Generator[PlannedMotion, None, _Outcome]
 
 
 class _Hulls(NamedTuple):
-    """Where the places of a goal lie, seen by the movement model."""
+    """Whether the positions of a goal lie in the hull of the movement model's training."""
 
     goal_id: str = ""
     from_hull: RelocationStatus.Hull = RelocationStatus.HULL_UNSPECIFIED
@@ -60,7 +60,7 @@ class _Hulls(NamedTuple):
 
 @dataclass
 class _Running:
-    """The goal being done: its course, the motion under way and what is known of it."""
+    """The goal being executed: its course, the current motion and its state."""
 
     goal: RelocationGoal
     course: _Course
@@ -76,7 +76,7 @@ class _Running:
 
 
 class Synthesizer:
-    """Does one goal at a time. Hear messages with the `on_…` methods, then call `tick` once per turn.
+    """Executes one goal at a time. Pass messages to the `on_…` methods, then call `tick` once per iteration.
 
     Args:
         plans: Builds motions from the converted movement that keep clear of table, body and standing objects.
@@ -110,30 +110,30 @@ class Synthesizer:
 
     @property
     def sentence(self) -> str:
-        """What it does, for people."""
+        """A description of its state, for people."""
         if self._running is not None:
             return f"goal {self._running.goal.id}: {self._running.phase or 'begins'}"
         if self._waiting is not None:
-            return f"goal {self._waiting.id} waits until the arm rests, for where it is is not known yet"
+            return f"goal {self._waiting.id} waits until the arm rests: its pose is not known yet"
         return "waiting for a goal"
 
     def on_goal(self, goal: RelocationGoal) -> None:
-        """Accept or refuse a goal. The same id again is answered with its latest status and not done twice.
+        """Accepts or rejects a goal. The same id again is answered with its latest status and not executed twice.
 
-        While it is not known where the arm is (see `ArmState`), the latest goal waits until the arm rests.
+        While the pose of the arm is unknown (see `ArmState`), the latest goal waits until the arm rests.
         """
         known = self._latest.get(goal.id)
         if known is not None:
             self._statuses.append(known)
         elif goal.asked_again:
-            self._say(goal.id, RelocationStatus.STATE_FAILED, reason=RESTARTED)
-        elif self._running is None and not self._hand.find_out(self._now_ns):
+            self._report(goal.id, RelocationStatus.STATE_FAILED, reason=RESTARTED)
+        elif self._running is None and not self._hand.estimate_pose(self._now_ns):
             self._waiting = goal
         else:
-            self._begin_or_refuse(goal)
+            self._begin_or_reject(goal)
 
     def on_joint_states(self, message: JointStates) -> None:
-        """Hear the measured joints: where the arm is, and by the fingers whether something is held."""
+        """Updates with the measured joints: the arm's pose, and from the fingers whether an object is held."""
         if not self._hand.handle(message, self._now_ns):
             return
         running = self._running
@@ -141,13 +141,13 @@ class Synthesizer:
             self._hand.lost |= self._hand.measured <= FELT_OPENING
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
-        """Hear how the driver fares with the motion under way."""
+        """Updates with the driver's progress in the current motion."""
         running = self._running
         if running is None or running.message is None or status.trajectory_id != running.message.id:
             self._on_status_of_others(status)
             return
         if status.state == TrajectoryStatus.STATE_REFUSED and status.code == "stale" and running.stale < STALE_TRIES:
-            running.stale += 1  # planning took longer than the driver waits: it is said again with the time of now
+            running.stale += 1  # planning took longer than the driver waits: it is sent again with the current time
             running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
             return
         if not math.isfinite(status.time_s):
@@ -160,17 +160,17 @@ class Synthesizer:
             self._hand.forget()
             self._end(running, _Outcome(False, f"the arm driver ended the motion: {status.reason}"))
         else:
-            self._say_phase(running)
+            self._report_phase(running)
 
     def tick(self, now_ns: int) -> SynthesizerOutput:
-        """Once per turn: what is to be said."""
+        """One iteration: returns the messages to publish."""
         self._now_ns = now_ns
-        if self._waiting is not None and self._running is None and self._hand.find_out(now_ns):
+        if self._waiting is not None and self._running is None and self._hand.estimate_pose(now_ns):
             waiting, self._waiting = self._waiting, None
-            self._begin_or_refuse(waiting)
+            self._begin_or_reject(waiting)
         running = self._running
-        unheard = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
-        if running is not None and running.message is not None and unheard:
+        unanswered = running is not None and not running.acknowledged and now_ns - running.sent_ns >= RESEND_NS
+        if running is not None and running.message is not None and unanswered:
             running.message.captured.FromNanoseconds(now_ns)
             self._trajectories.append(running.message)
             running.sent_ns = now_ns
@@ -179,7 +179,7 @@ class Synthesizer:
         return output
 
     def _on_status_of_others(self, status: TrajectoryStatus) -> None:
-        """A motion that an earlier process began, or one that was given up here, moves the arm."""
+        """A motion that an earlier process began, or one that was abandoned here, moves the arm."""
         if status.state in (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_EXECUTING):
             self._hand.moved_by_others(self._now_ns)
             if self._running is None:
@@ -190,7 +190,7 @@ class Synthesizer:
     def _fetch(self, goal: RelocationGoal, then: Callable[[Floats, Floats, Floats], PlannedMotion]) -> _Course:
         source, target, standing = point_of(goal, "from"), point_of(goal, "to"), standing_of(goal)
         if not self._hand.at_base:
-            raise GoalRefusedError(NOT_AT_BASE)
+            raise GoalRejectedError(NOT_AT_BASE)
         fetch = self._plans.fetch(source, standing)
         lifted = fetch.gripper[-1]
         onwards = then(lifted, target, standing)  # known to be possible before the arm moves
@@ -203,7 +203,7 @@ class Synthesizer:
 
     def _offer_hand(self, goal: RelocationGoal) -> _Course:
         if not self._hand.at_base:
-            raise GoalRefusedError(NOT_AT_BASE)
+            raise GoalRejectedError(NOT_AT_BASE)
         yield self._plans.offer(point_of(goal, "from"), standing_of(goal))
         return _Outcome(True)
 
@@ -223,13 +223,13 @@ class Synthesizer:
     def _place_held(self, goal: RelocationGoal) -> _Course:
         target = point_of(goal, "to")
         if not self.holding:
-            raise GoalRefusedError("nothing is held; take an object first")
+            raise GoalRejectedError("nothing is held; take an object first")
         yield self._plans.deliver(self._waits_at(), target, standing_of(goal))
         return self._placed(target)
 
     def _rest(self, goal: RelocationGoal) -> _Course:
-        if self._hand.found is not None:
-            yield self._plans.home(self._hand.found, self.holding, standing_of(goal))
+        if self._hand.measured_angles is not None:
+            yield self._plans.home(self._hand.measured_angles, self.holding, standing_of(goal))
         elif not self._hand.at_base:
             yield self._plans.leave(self._waits_at(), self._hand.opening, standing_of(goal))
         return _Outcome(True)
@@ -239,33 +239,33 @@ class Synthesizer:
             return _Outcome(False, f"the object slipped out of the hand on the way to {centimetres(target)} cm")
         return _Outcome(True)
 
-    def _begin_or_refuse(self, goal: RelocationGoal) -> None:
+    def _begin_or_reject(self, goal: RelocationGoal) -> None:
         if self._running is None:
             movement = self._plans.planner.movement
             self._hulls = _Hulls(goal.id, hull_of(goal, "from", movement), hull_of(goal, "to", movement))
         try:
             self._begin(goal)
-        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as refusal:
-            self._say(goal.id, RelocationStatus.STATE_REFUSED, reason=str(refusal))
-            if isinstance(refusal, NoClearPlanError):
-                self._latest[goal.id].in_the_way.extend(sorted(refusal.in_the_way))
+        except (GoalRejectedError, NoClearPlanError, UnreachablePoseError) as error:
+            self._report(goal.id, RelocationStatus.STATE_REFUSED, reason=str(error))
+            if isinstance(error, NoClearPlanError):
+                self._latest[goal.id].in_the_way.extend(sorted(error.in_the_way))
 
     def _begin(self, goal: RelocationGoal) -> None:
         if not goal.id:
-            raise GoalRefusedError("a goal without an id; give each goal an id of its own")
+            raise GoalRejectedError("a goal without an id; give each goal its own id")
         if self._running is not None:
-            raise GoalRefusedError(f"busy with goal {self._running.goal.id}; one goal at a time")
+            raise GoalRejectedError(f"busy with goal {self._running.goal.id}; one goal at a time")
         if goal.frame != FRAME:
-            raise GoalRefusedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
+            raise GoalRejectedError(f"positions in frame {goal.frame!r}; this arm's goals are in {FRAME!r}")
         course = self._courses.get(goal.kind)
         if course is None:
             kinds = [name.removeprefix("KIND_") for name in RelocationGoal.Kind.keys()[1:]]
-            raise GoalRefusedError(f"kind {goal.kind} is none of {', '.join(kinds)}")
+            raise GoalRejectedError(f"kind {goal.kind} is none of {', '.join(kinds)}")
         running = _Running(goal, course(goal))
         first = self._advance(running)
         self._running = running
         self._hand.lost = False
-        self._say(goal.id, RelocationStatus.STATE_ACCEPTED)
+        self._report(goal.id, RelocationStatus.STATE_ACCEPTED)
         self._start_or_end(running, first)
 
     def _advance(self, running: _Running) -> PlannedMotion | _Outcome:
@@ -280,7 +280,7 @@ class Synthesizer:
         self._hand.ended(running.motion)
         try:
             self._start_or_end(running, self._advance(running))
-        except (GoalRefusedError, NoClearPlanError, UnreachablePoseError) as error:
+        except (GoalRejectedError, NoClearPlanError, UnreachablePoseError) as error:
             self._end(running, _Outcome(False, str(error)))
 
     def _start_or_end(self, running: _Running, step: PlannedMotion | _Outcome) -> None:
@@ -299,16 +299,16 @@ class Synthesizer:
         running.course.close()
         self._running = None
         state = RelocationStatus.STATE_SUCCEEDED if outcome.done else RelocationStatus.STATE_FAILED
-        self._say(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
+        self._report(running.goal.id, state, running.phase, outcome.reason, running.elbow_turn)
 
-    def _say_phase(self, running: _Running) -> None:
+    def _report_phase(self, running: _Running) -> None:
         assert running.motion is not None
         phase = [name for name, start in running.motion.phases if start <= running.time_s][-1]
         if phase != running.phase:
             running.phase = phase
-            self._say(running.goal.id, RelocationStatus.STATE_EXECUTING, phase, "", running.elbow_turn)
+            self._report(running.goal.id, RelocationStatus.STATE_EXECUTING, phase, "", running.elbow_turn)
 
-    def _say(
+    def _report(
         self, goal_id: str, state: RelocationStatus.State, phase: str = "", reason: str = "", elbow_turn: float = 0.0
     ) -> None:
         status = RelocationStatus(
@@ -336,24 +336,24 @@ class Synthesizer:
 
     def _waits_at(self) -> Floats:
         if self._hand.gripper is None:
-            raise GoalRefusedError("the arm is at its base pose; offer the hand first")
+            raise GoalRejectedError("the arm is at its base pose; offer the hand first")
         return self._hand.gripper
 
 
-class GoalRefusedError(ValueError):
-    """A goal cannot be done; the message says why and what would work."""
+class GoalRejectedError(ValueError):
+    """A goal cannot be executed; the message gives the reason and the remedy."""
 
 
 def point_of(goal: RelocationGoal, name: str) -> Floats:
-    """Position `name` ("from" or "to") of a goal, [3], m; raises GoalRefusedError if it lacks or is not finite."""
+    """Position `name` ("from" or "to") of a goal, [3], m; raises GoalRejectedError if it lacks or is not finite."""
     if not goal.HasField(name):
-        raise GoalRefusedError(f"the goal lacks its position {name!r}")
+        raise GoalRejectedError(f"the goal lacks its position {name!r}")
     position: Position = getattr(goal, name)
     point = np.array([position.x, position.y, position.z])
     if not np.isfinite(point).all():
-        raise GoalRefusedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
+        raise GoalRejectedError(f"position {name!r} is {point.tolist()}; finite numbers in m are needed")
     if np.abs(point).max() > FARTHEST:
-        raise GoalRefusedError(
+        raise GoalRejectedError(
             f"position {name!r} is {point.tolist()} m; an arm reaches no farther than {FARTHEST:g} m"
         )
     return point
@@ -363,7 +363,7 @@ def hull_of(goal: RelocationGoal, name: str, movement: ReachingMovement) -> Relo
     """Whether position `name` of a goal lies within the training of the movement; unspecified where it lacks."""
     try:
         within = movement.within_training(point_of(goal, name))
-    except (ArithmeticError, ValueError):  # the goal is refused for it elsewhere; LinAlgError is a ValueError
+    except (ArithmeticError, ValueError):  # `point_of` rejects the goal elsewhere; LinAlgError is a ValueError
         return RelocationStatus.HULL_UNSPECIFIED
     if within is None:
         return RelocationStatus.HULL_UNSPECIFIED
@@ -371,13 +371,13 @@ def hull_of(goal: RelocationGoal, name: str, movement: ReachingMovement) -> Relo
 
 
 def standing_of(goal: RelocationGoal) -> Floats:
-    """Places of the objects to keep clear of, [M, 2], m; raises GoalRefusedError if one is not finite."""
-    places = np.array([[place.x, place.y, place.z] for place in goal.avoid]).reshape(-1, 3)
-    if not np.isfinite(places).all() or np.abs(places).max(initial=0.0) > LARGEST:
-        raise GoalRefusedError(f"the places to avoid are {places.tolist()}; finite numbers in m are needed")
-    return places[:, :2]
+    """Positions of the objects to keep clear of, [M, 2], m; raises GoalRejectedError if one is not finite."""
+    positions = np.array([[one.x, one.y, one.z] for one in goal.avoid]).reshape(-1, 3)
+    if not np.isfinite(positions).all() or np.abs(positions).max(initial=0.0) > LARGEST:
+        raise GoalRejectedError(f"the positions to avoid are {positions.tolist()}; finite numbers in m are needed")
+    return positions[:, :2]
 
 
 def centimetres(point: Floats) -> str:
-    """A place in words, in cm."""
+    """A position as text, in cm."""
     return f"({point[0] * 100:.1f}, {point[1] * 100:.1f})"

@@ -20,7 +20,7 @@ def minimum_jerk(u: Floats) -> Floats:
 
 
 def soft_ends(u: Floats) -> Floats:
-    """Progress that is even but for its ends, so that a movement with a timing of its own keeps it in the middle."""
+    """Even progress with smooth ends, which keeps a movement's own timing in the middle."""
     return np.asarray(0.6 * u + 0.4 * minimum_jerk(u))
 
 
@@ -32,7 +32,7 @@ def fade_in(n: int, last: int) -> Floats:
 def slowed_times(angles: Floats, period: float, velocity: Floats, acceleration: Floats) -> Floats:
     """Times of samples that were planned `period` apart, stretched where a joint would exceed its limits.
 
-    The stretch is spread over a tenth of a second before and after, so that slowing down is itself smooth.
+    The stretch is widened by a tenth of a second before and after, so that slowing down is itself smooth.
 
     Args:
         angles: [K, J], rad.
@@ -40,7 +40,7 @@ def slowed_times(angles: Floats, period: float, velocity: Floats, acceleration: 
         velocity: Largest speed of each joint, [J], rad/s.
         acceleration: Largest acceleration of each joint, [J], rad/s².
     """
-    stretch = _spread((np.abs(np.diff(angles, axis=0)) / velocity).max(axis=1) / period, period)
+    stretch = _widened((np.abs(np.diff(angles, axis=0)) / velocity).max(axis=1) / period, period)
     for _ in range(_ACCELERATION_ROUNDS):
         steps = stretch * period
         rates = np.diff(angles, axis=0) / steps[:, None]
@@ -48,7 +48,7 @@ def slowed_times(angles: Floats, period: float, velocity: Floats, acceleration: 
         if excess.max(initial=0.0) <= 1.0:
             break
         needed = np.sqrt(np.concatenate([excess[:1], np.maximum(excess[1:], excess[:-1]), excess[-1:]]))
-        stretch = stretch * _spread(needed, period)
+        stretch = stretch * _widened(needed, period)
     return np.concatenate([[0.0], np.cumsum(stretch * period)])
 
 
@@ -64,7 +64,7 @@ def largest_excess(angles: Floats, period: float, velocity: Floats, acceleration
     return float(max(speed, np.sqrt(change)))
 
 
-def _spread(needed: Floats, period: float) -> Floats:
+def _widened(needed: Floats, period: float) -> Floats:
     """At least 1 and at least `needed`, smooth in time."""
     window = max(1, round(_WINDOW_S / period))
     widest = maximum_filter1d(np.maximum(1.0, needed), 2 * window + 1, mode="nearest")
@@ -87,19 +87,19 @@ def smoothed(values: Floats, width: float) -> Floats:
     return np.concatenate([values[:1], np.linalg.solve(inner[:, 1:-1], right), values[-1:]])
 
 
-def ramped(u: Floats, share: float = 0.25) -> Floats:
+def ramped(u: Floats, fraction: float = 0.25) -> Floats:
     """Even progress 0 to 1 for u in 0 to 1 that begins and ends at rest, without a jump of acceleration.
 
-    The speed rises over the first `share` and falls over the last, which are at most half each.
+    The speed rises over the first `fraction` and falls over the last, which are at most half each.
     """
-    rising, falling = np.clip(u / share, 0.0, 1.0), np.clip((1.0 - u) / share, 0.0, 1.0)
-    even = np.clip(u - share, 0.0, 1.0 - 2.0 * share)
-    way = share * (_ramp(rising) + 0.5 - _ramp(falling)) + even
-    return np.asarray(way / (1.0 - share))
+    rising, falling = np.clip(u / fraction, 0.0, 1.0), np.clip((1.0 - u) / fraction, 0.0, 1.0)
+    even = np.clip(u - fraction, 0.0, 1.0 - 2.0 * fraction)
+    distance = fraction * (_ramp(rising) + 0.5 - _ramp(falling)) + even
+    return np.asarray(distance / (1.0 - fraction))
 
 
 def _ramp(x: Floats) -> Floats:
-    """Way of a speed 3 x² - 2 x³ that rises from 0 to 1; half of the time at full speed."""
+    """Distance of a speed 3 x² - 2 x³ that rises from 0 to 1; half of the time at full speed."""
     return np.asarray(x**3 - 0.5 * x**4)
 
 
@@ -114,10 +114,10 @@ def rest_to_rest(
 
     Args:
         knots: [K, J], rad, at even progress.
-        duration: s, at least.
+        duration: Minimum, s.
         period: Of the samples, s.
         limits: Largest velocity, acceleration and jerk, [J] each, rad/s, rad/s², rad/s³.
-        progress: Along the knots, 0 to 1, for shares of the duration.
+        progress: Along the knots, 0 to 1, for fractions of the duration.
 
     Returns:
         [N, J], rad, from the first knot to the last.

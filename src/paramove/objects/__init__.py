@@ -1,4 +1,4 @@
-"""Coloured objects and a hand on a table: tracking, the plane's homography, and the gestures that they make."""
+"""Coloured objects and a hand on a table: tracking, the plane's homography, and gesture recognition."""
 
 import lazy_loader
 

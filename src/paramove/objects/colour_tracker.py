@@ -1,6 +1,6 @@
 """Finds objects and the hand by their colours (thesis 5.2.6: "tracked by a color tracker in a camera view").
 
-Regions are found at half resolution and measured at full resolution. The measure is soft: a pixel at the border that is
+Regions are found at half resolution and measured at full resolution. Pixels are weighted: a pixel at the border that is
 half object, half background counts half, which gives centres to about 0.1 px.
 """
 
@@ -31,7 +31,7 @@ class Colour:
     Attributes:
         name: Name of the colour, used as the object's name.
         hue_deg: Lower and upper hue, 0 to 360; lower > upper wraps over red.
-        saturation: Smallest saturation, (max - min)/max of RGB, 0 to 1.
+        saturation: Minimum saturation, (max - min)/max of RGB, 0 to 1.
         hand: True for the instructor's hand.
     """
 
@@ -43,8 +43,8 @@ class Colour:
     def __post_init__(self) -> None:
         if not all(0 <= hue <= 360 for hue in self.hue_deg) or not 0 < self.saturation < 1:
             raise ValueError(
-                f"colour {self.name!r}: hue {self.hue_deg} and saturation {self.saturation} found, "
-                "hues within 0..360 degrees and a saturation within 0..1 expected"
+                f"colour {self.name!r}: hues within 0..360 degrees and a saturation within 0..1 expected, "
+                f"found hue {self.hue_deg} and saturation {self.saturation}"
             )
 
 
@@ -79,23 +79,23 @@ class ColourTracker:
     """Tracks one region per colour.
 
     Args:
-        colours: What to look for.
+        colours: The colours to track.
         min_area_px: Smaller regions are noise; an object of 20 x 50 mm has about 400 px.
-        largest_share: Regions above this share of the image are background.
+        max_area_fraction: Regions above this fraction of the image are background.
     """
 
     STILL_PX = 0.75  # centres of a standing object scatter by about 0.15 px
     STILL_FRAMES = 8  # half a second at 15 Hz
 
     def __init__(
-        self, colours: Sequence[Colour] = DEFAULT_COLOURS, min_area_px: float = 24.0, largest_share: float = 0.12
+        self, colours: Sequence[Colour] = DEFAULT_COLOURS, min_area_px: float = 24.0, max_area_fraction: float = 0.12
     ) -> None:
         if not colours or len({colour.name for colour in colours}) != len(colours):
             raise ValueError(f"colours {[c.name for c in colours]}: at least one, each name once, expected")
         cv2.setNumThreads(1)  # images are small: threads cost more than they give, and other nodes need the cores
         self._colours = tuple(colours)
         self._min_area = min_area_px
-        self._largest_share = largest_share
+        self._max_area_fraction = max_area_fraction
         self._full_size = FullSize()
         self._recent: dict[str, deque[Region]] = {
             colour.name: deque(maxlen=self.STILL_FRAMES) for colour in self._colours
@@ -122,12 +122,12 @@ class ColourTracker:
         return tracked
 
     def _find(self, mask: Image) -> tuple[int, int, int, int] | None:
-        """Box (left, top, right, bottom), full-resolution px, of the largest region and of its pieces beside it."""
+        """Box (left, top, right, bottom), full-resolution px, of the largest region and its nearby pieces."""
         x, y, width, height = cv2.boundingRect(mask)
         if width == 0:
             return None
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask[y : y + height, x : x + width], connectivity=8)
-        minimum, maximum = self._min_area / 4, self._largest_share * mask.size
+        minimum, maximum = self._min_area / 4, self._max_area_fraction * mask.size
         areas = stats[1:, cv2.CC_STAT_AREA]
         pieces = stats[1:][(areas >= max(2.0, 0.1 * minimum)) & (areas <= maximum)]
         pieces = pieces[np.argsort(-pieces[:, cv2.CC_STAT_AREA], kind="stable")][:MAX_PIECES]
@@ -146,7 +146,7 @@ class ColourTracker:
 
     def _message(self, colour: Colour, region: Region) -> TrackedObject:
         kind = TrackedObject.KIND_HAND if colour.hand else TrackedObject.KIND_OBJECT
-        found = TrackedObject(
+        message = TrackedObject(
             name=colour.name,
             kind=kind,
             u_px=region.u_px,
@@ -161,8 +161,8 @@ class ColourTracker:
         )
         if colour.hand:
             for u, v in region.outline:
-                found.outline.add(u_px=float(u), v_px=float(v))
-            return found
+                message.outline.add(u_px=float(u), v_px=float(v))
+            return message
         recent = self._recent[colour.name]
         recent.append(region)
         if self._stands_still(recent):
@@ -170,8 +170,8 @@ class ColourTracker:
             lower = region.top_px + region.height_px - region.v_px
             size = Size(area, height, region.width_px, lower, region.lean)
             self._full_size.learn(colour.name, region.u_px, region.v_px, size)
-        found.confidence = self._full_size.visible_share(colour.name, region.u_px, region.v_px, region.area_px)
-        return found
+        message.confidence = self._full_size.visible_fraction(colour.name, region.u_px, region.v_px, region.area_px)
+        return message
 
     def _stands_still(self, recent: deque[Region]) -> bool:
         if len(recent) < self.STILL_FRAMES:
@@ -285,7 +285,7 @@ def _outline(weight: Floats, left: int, top: int) -> Floats:
 
 
 def _extent(profile: Floats) -> tuple[float, float]:
-    """Where a profile first and last crosses half of its typical value, to a part of a pixel."""
+    """First and last position at which a profile crosses half of its typical value, with subpixel accuracy."""
     typical = np.sort(profile[profile > 0.2 * profile.max()])
     level = 0.5 * float(typical[typical.size // 2])
     inside = np.flatnonzero(profile >= level)

@@ -1,4 +1,4 @@
-"""How large an object looks at a place of the image when nothing hides it."""
+"""The apparent size of an unoccluded object as a function of the image point."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from paramove.documents import Floats
 
-PLACE_RADIUS_PX = 24.0
-"""Nearer samples belong to one place: about one object's width apart, over which the size changes by < 3 %."""
+POSITION_RADIUS_PX = 24.0
+"""Closer samples belong to one position: about one object's width apart, over which the size changes by < 3 %."""
 ACCEPT_RATIO = 0.85
-"""A sample below this share of what is expected is partly hidden, unless it is as slender as expected."""
+"""A sample below this fraction of the expected area is partly occluded, unless it is as slender as expected."""
 AS_SLENDER = 0.11
-"""Depth changes height and width alike, what hides a part does not: largest difference of the logarithms of both."""
-PLACES_PER_OBJECT = 12
+"""Maximum difference of the logarithms of height and width: depth changes both alike, occlusion does not."""
+POSITIONS_PER_OBJECT = 12
 
 
 @dataclass(frozen=True)
 class Size:
-    """An upright round object that nothing hides; px.
+    """The size of an upright, round, unoccluded object; px.
 
     Attributes:
         area_px: Of its region.
@@ -49,7 +49,7 @@ class Size:
 
 
 @dataclass
-class _Place:
+class _SizeSample:
     u_px: float
     v_px: float
     size: Size
@@ -59,18 +59,18 @@ class FullSize:
     """Learns, from objects at rest, how large they are in the image as a function of the image point.
 
     Perspective makes sizes change smoothly over the image, alike for all objects: log area of object k is modelled as
-    c_k + a·u + b·v with a and b shared (least squares with a weak ridge on a and b), the lean likewise
-    without the logarithm. The largest steady area seen at a place is the full one, as anything that hides an object
-    makes it smaller. No truth and no camera model is used.
+    c_k + a·u + b·v with common a and b (least squares with a weak ridge on a and b), the lean likewise
+    without the logarithm. The largest steady area at a position is the full one, as occlusion only makes
+    an area smaller. No truth and no camera model is used.
     """
 
     def __init__(self) -> None:
-        self._places: dict[str, list[_Place]] = {}
+        self._samples: dict[str, list[_SizeSample]] = {}
         self._model: dict[str, Floats] = {}
         self._slope: Floats = np.zeros((2, 5))
 
     def expected(self, name: str, u_px: float, v_px: float) -> Size | None:
-        """Full size of the object at an image point; None before it was first seen at rest."""
+        """Full size of the object at an image point; None before it was first detected at rest."""
         if name not in self._model:
             return None
         point = np.array([u_px, v_px]) / 100.0
@@ -78,25 +78,25 @@ class FullSize:
         area, height, width, lower = (float(np.exp(number)) for number in logs)
         return Size(area, height, width, lower, float(lean))
 
-    def visible_share(self, name: str, u_px: float, v_px: float, area_px: float) -> float:
-        """Area over full area at that image point, 0 to 1; 1 for an object not known yet."""
+    def visible_fraction(self, name: str, u_px: float, v_px: float, area_px: float) -> float:
+        """Area over full area at that image point, 0 to 1; 1 for an unknown object."""
         full = self.expected(name, u_px, v_px)
         return 1.0 if full is None else min(1.0, area_px / full.area_px)
 
     def learn(self, name: str, u_px: float, v_px: float, size: Size) -> None:
-        """Take in one sample of an object that stands still."""
+        """Adds one sample of an object that stands still."""
         area_px = size.area_px
         full = self.expected(name, u_px, v_px)
         if full is not None and not _as_slender(size, full):
             if area_px < ACCEPT_RATIO * full.area_px:
                 return
             if area_px > full.area_px / ACCEPT_RATIO:
-                self._places[name] = []  # what was learned of it was partly hidden
-        places = self._places.setdefault(name, [])
-        near = min(places, key=lambda place: _distance(place, u_px, v_px), default=None)
-        if near is None or _distance(near, u_px, v_px) > PLACE_RADIUS_PX:
-            places.append(_Place(u_px, v_px, size))
-            del places[:-PLACES_PER_OBJECT]
+                self._samples[name] = []  # the earlier samples were partly occluded
+        samples = self._samples.setdefault(name, [])
+        near = min(samples, key=lambda sample: _distance(sample, u_px, v_px), default=None)
+        if near is None or _distance(near, u_px, v_px) > POSITION_RADIUS_PX:
+            samples.append(_SizeSample(u_px, v_px, size))
+            del samples[:-POSITIONS_PER_OBJECT]
         elif area_px > 1.02 * near.size.area_px:
             near.u_px, near.v_px, near.size = u_px, v_px, size
         else:
@@ -104,17 +104,17 @@ class FullSize:
         self._fit()
 
     def _fit(self) -> None:
-        names = sorted(self._places)
-        rows = [(index, place) for index, name in enumerate(names) for place in self._places[name]]
+        names = sorted(self._samples)
+        rows = [(index, sample) for index, name in enumerate(names) for sample in self._samples[name]]
         design = np.zeros((len(rows) + 2, len(names) + 2))
         value = np.zeros((len(rows) + 2, 5))
-        for row, (index, place) in enumerate(rows):
+        for row, (index, sample) in enumerate(rows):
             design[row, index] = 1.0
-            design[row, -2:] = place.u_px / 100.0, place.v_px / 100.0
-            size = place.size
+            design[row, -2:] = sample.u_px / 100.0, sample.v_px / 100.0
+            size = sample.size
             value[row, :4] = np.log([size.area_px, size.height_px, size.width_px, size.lower_px])
             value[row, 4] = size.lean
-        design[-2, -2] = design[-1, -1] = 0.2  # ridge: without spread of places the size is taken as constant
+        design[-2, -2] = design[-1, -1] = 0.2  # ridge: if all positions coincide, the size is constant
         solution = np.linalg.lstsq(design, value, rcond=None)[0]
         self._slope = np.asarray(solution[-2:], dtype=np.float64)
         self._model = {name: np.asarray(solution[i], dtype=np.float64) for i, name in enumerate(names)}
@@ -124,5 +124,5 @@ def _as_slender(one: Size, other: Size) -> bool:
     return abs(math.log(one.height_px * other.width_px / (other.height_px * one.width_px))) < AS_SLENDER
 
 
-def _distance(place: _Place, u_px: float, v_px: float) -> float:
-    return float(np.hypot(place.u_px - u_px, place.v_px - v_px))
+def _distance(sample: _SizeSample, u_px: float, v_px: float) -> float:
+    return float(np.hypot(sample.u_px - u_px, sample.v_px - v_px))

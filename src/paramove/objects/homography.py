@@ -19,7 +19,7 @@ MIN_FLATNESS = 0.03
 
 
 class HomographyError(ValueError):
-    """The correspondences cannot give a homography; the message says why and what would."""
+    """The correspondences do not determine a homography; the message gives the reason and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class PlaneHomography:
         """Least-squares homography of >= 4 correspondences by the normalised DLT.
 
         Args:
-            image_points: [M, 2] px. plane_points: [M, 2] m. plane_z: m, carried along.
+            image_points: [M, 2] px. plane_points: [M, 2] m. plane_z: m, stored with the homography.
         Raises:
             HomographyError: fewer than 4, not finite, collinear or coinciding points, or an image that is a mirrored
-                view of the plane (two points were mixed up: a camera above the plane never sees it mirrored).
+                view of the plane (two points were mixed up: a camera above the plane never gives a mirrored view).
         """
         image, plane = _points(image_points, "image"), _points(plane_points, "plane")
         if len(image) != len(plane):
@@ -56,11 +56,11 @@ class PlaneHomography:
             raise HomographyError(
                 f"{len(image)} correspondences: at least 4 needed, such as the working area's corners"
             )
-        _refuse_collinear(image, "image")
-        _refuse_collinear(plane, "plane")
+        _check_not_collinear(image, "image")
+        _check_not_collinear(plane, "plane")
         matrix = _direct_linear_transform(image, plane)
         homography = cls(matrix, plane_z, correspondences=np.hstack([image, plane]))
-        homography._refuse_mirrored(image)
+        homography._check_not_mirrored(image)
         return homography
 
     @classmethod
@@ -94,7 +94,7 @@ class PlaneHomography:
         return _apply(self.plane_from_image_matrix, u_px, v_px)
 
     def image_from_plane(self, x: float, y: float) -> tuple[float, float]:
-        """(u, v), px. Raises ValueError for a point that is seen at no finite place."""
+        """(u, v), px. Raises ValueError for a point without a finite image."""
         return _apply(np.asarray(np.linalg.inv(self.plane_from_image_matrix), dtype=np.float64), x, y)
 
     def residuals(self) -> Floats:
@@ -105,7 +105,7 @@ class PlaneHomography:
         return np.asarray(np.linalg.norm(mapped - self.correspondences[:, 2:], axis=1), dtype=np.float64)
 
     def foreshortening(self, u_px: float, v_px: float) -> float:
-        """Height over width of the box around a small circle of the plane, as it is seen near (u, v).
+        """Height over width of the box around a small circle of the plane, in the image near (u, v).
 
         Straight from above it is 1; of a camera that is not rolled, it is the sine of its elevation.
         """
@@ -114,7 +114,7 @@ class PlaneHomography:
         across, down = np.column_stack([along_x, along_y]) - np.array([[u_px], [v_px]])
         return float(np.linalg.norm(down) / np.linalg.norm(across))
 
-    def _refuse_mirrored(self, image: Floats) -> None:
+    def _check_not_mirrored(self, image: Floats) -> None:
         depths = image @ self.plane_from_image_matrix[2, :2] + self.plane_from_image_matrix[2, 2]
         if np.any(depths <= 0) and np.any(depths >= 0):
             raise HomographyError("the horizon runs between the points: corners are mixed up, or a point is wrong")
@@ -130,8 +130,8 @@ def _points(points: ArrayLike, which: str) -> Floats:
     return array
 
 
-def _refuse_collinear(points: Floats, which: str) -> None:
-    """Refuse points among which no four are found of which no three lie on one line."""
+def _check_not_collinear(points: Floats, which: str) -> None:
+    """Raises HomographyError unless there are four points of which no three lie on one line."""
     distances = np.linalg.norm(points[:, None] - points[None], axis=2)
     i, j = np.unravel_index(int(np.argmax(distances)), distances.shape)
     a, b = points[i], points[j]  # the farthest apart, then the farthest from their line, then the best fourth

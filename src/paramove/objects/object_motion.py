@@ -1,6 +1,6 @@
-"""What one object does: unseen, resting or moving, and the moments between (thesis 5.2.6, step 3).
+"""The state of one object (unseen, resting or moving) and its transitions (thesis 5.2.6, step 3).
 
-All thresholds are in px of a 480 x 360 image (about 1.4 mm each) and in s of watching.
+All thresholds are in px of a 480 x 360 image (about 1.4 mm each) and in s of observation.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.objects.full_size import FullSize
-from paramove.objects.sinking import Sample, last_place
+from paramove.objects.sinking import Sample, last_position
 
 
 @dataclass(frozen=True)
@@ -20,16 +20,16 @@ class MotionThresholds:
 
     Attributes:
         moved_px: Opposite borders both displaced this far: 4 mm, ten times their scatter.
-        moved_s: ... for this long: three frames, so that a flicker is nothing.
+        moved_s: ... for this long: three frames, so that a flicker does not count.
         rest_px: All four borders stay within this range ...
         rest_s: ... for this long.
-        vanish_s: A moving object not seen for this long is gone.
-        hidden_s: A resting object not seen for this long is gone; longer, as it is rather hidden by the arm.
-        timeout_s: Waiting for a hand that covers the object to leave never takes longer.
-        clear_share: From this visible share on an object is seen in full.
-        part_share: Below this share it is not seen to rest: it is sunk for a good part, or hidden.
-        remnant_share: Below this share a moving object counts as not seen: its top may stay visible in an opening.
-        clear_view_s: Waiting for a clear view of an object that has come to rest.
+        vanish_s: A moving object not detected for this long is gone.
+        hidden_s: A resting object not detected for this long is gone; longer, as the arm probably occludes it.
+        timeout_s: Maximum waiting time for a hand that covers the object to leave.
+        clear_share: From this visible fraction on an object is fully visible.
+        part_share: Below this fraction it does not count as resting: it has partly sunk, or is occluded.
+        remnant_share: Below this fraction a moving object counts as undetected: its top may stay visible in an opening.
+        clear_view_s: Maximum waiting time for a clear view of an object that has come to rest.
     """
 
     moved_px: float = 3.0
@@ -52,10 +52,10 @@ class State(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Happening:
-    """A moment of one object; (u, v) px.
+class Transition:
+    """A transition of one object; (u, v) px.
 
-    `in_motion`: it vanished while it moved. `placed`: False if nobody saw where it happened.
+    `in_motion`: it vanished while it moved. `placed`: False if its position is unknown.
     """
 
     kind: Gesture.Kind
@@ -74,89 +74,89 @@ class ObjectMotion:
     def __init__(self, name: str, full_size: FullSize, thresholds: MotionThresholds) -> None:
         self.name = name
         self.state = State.UNSEEN
-        self.place: Sample | None = None
-        """Where the object rests, at its best view."""
+        self.position: Sample | None = None
+        """The best view of the object at rest."""
         self.blind = False
-        """There was a time without images after the object was last seen well."""
+        """There was a gap in the images after the object was last clearly visible."""
         self._full_size = full_size
         self._limits = thresholds
         self._history: deque[Sample] = deque()
         self._displaced_since: float | None = None
         self._still_since: float | None = None
-        self._told_area_px = 0.0
-        self._well_seen_s = 0.0
+        self._reported_area_px = 0.0
+        self._clearly_visible_s = 0.0
 
-    def update(self, sample: Sample | None, now_s: float, hand_near: bool) -> list[Happening]:
-        """Take in one frame: the object's sample in it or None.
+    def update(self, sample: Sample | None, now_s: float, hand_near: bool) -> list[Transition]:
+        """Processes one frame: the object's sample in it or None.
 
-        `hand_near`: the hand's box touches the place where the object was last seen.
+        `hand_near`: the hand's box touches the object's last known position.
         """
         if sample is not None:
             self._history.append(sample)
         while self._history and self._history[0].time_s < now_s - self.HISTORY_S - self._limits.timeout_s:
             self._history.popleft()
-        remnant = sample is not None and self.share(sample) < self._limits.remnant_share
+        remnant = sample is not None and self.visible_fraction(sample) < self._limits.remnant_share
         if sample is not None and not remnant:
-            self._well_seen_s, self.blind = sample.time_s, False
+            self._clearly_visible_s, self.blind = sample.time_s, False
         if sample is None or (remnant and self.state is State.MOVING):
             return self._unseen(now_s, hand_near)
         if self.state is State.RESTING:
             return self._while_resting(sample)
         return self._while_not_resting(sample, now_s, hand_near)
 
-    def share(self, sample: Sample) -> float:
-        """Visible share of the object's full area, 0 to 1."""
-        return self._full_size.visible_share(self.name, sample.u_px, sample.v_px, sample.area_px)
+    def visible_fraction(self, sample: Sample) -> float:
+        """Visible fraction of the object's full area, 0 to 1."""
+        return self._full_size.visible_fraction(self.name, sample.u_px, sample.v_px, sample.area_px)
 
-    def _unseen(self, now_s: float, hand_near: bool) -> list[Happening]:
+    def _unseen(self, now_s: float, hand_near: bool) -> list[Transition]:
         self._displaced_since = self._still_since = None
         if self.state is State.UNSEEN or not self._history:
             return []
-        silent_s = now_s - self._well_seen_s
+        undetected_s = now_s - self._clearly_visible_s
         needed_s = self._limits.vanish_s if self.state is State.MOVING else self._limits.hidden_s
-        if silent_s < needed_s or (hand_near and silent_s < self._limits.timeout_s):
+        if undetected_s < needed_s or (hand_near and undetected_s < self._limits.timeout_s):
             return []
         return [self._vanish()]
 
-    def _vanish(self) -> Happening:
+    def _vanish(self) -> Transition:
         moving = self.state is State.MOVING
-        u, v = last_place(self.name, list(self._history), self._full_size)
-        if not moving and self.place is not None:
-            u, v = self.place.u_px, self.place.v_px
-        unwatched = self.blind and moving  # it went on while nobody saw where to
-        self.state, self.place = State.UNSEEN, None
+        u, v = last_position(self.name, list(self._history), self._full_size)
+        if not moving and self.position is not None:
+            u, v = self.position.u_px, self.position.v_px
+        unobserved = self.blind and moving  # it moved on during a gap in the images
+        self.state, self.position = State.UNSEEN, None
         self._history.clear()
-        confidence = 0.2 if unwatched else 0.7 if moving else 1.0
-        return Happening(Gesture.KIND_VANISHED, u, v, confidence, moving, not unwatched)
+        confidence = 0.2 if unobserved else 0.7 if moving else 1.0
+        return Transition(Gesture.KIND_VANISHED, u, v, confidence, moving, not unobserved)
 
-    def _while_resting(self, sample: Sample) -> list[Happening]:
-        assert self.place is not None
-        if sample.displacement_px(self.place) >= self._limits.moved_px:
+    def _while_resting(self, sample: Sample) -> list[Transition]:
+        assert self.position is not None
+        if sample.displacement_px(self.position) >= self._limits.moved_px:
             since = self._displaced_since if self._displaced_since is not None else sample.time_s
             self._displaced_since = since
             if sample.time_s - since + 1e-6 < self._limits.moved_s:
                 return []
-            return [self._begin_to_move(self.place)]
+            return [self._begin_to_move(self.position)]
         self._displaced_since = None
         return self._better_view(sample)
 
-    def _begin_to_move(self, start: Sample) -> Happening:
+    def _begin_to_move(self, start: Sample) -> Transition:
         self.state, self._displaced_since, self._still_since = State.MOVING, None, None
-        return Happening(Gesture.KIND_MOVED, start.u_px, start.v_px, self.share(start))
+        return Transition(Gesture.KIND_MOVED, start.u_px, start.v_px, self.visible_fraction(start))
 
-    def _better_view(self, sample: Sample) -> list[Happening]:
-        """A hand or arm that hid a part has gone: say the better place once more."""
+    def _better_view(self, sample: Sample) -> list[Transition]:
+        """A hand or arm that hid a part has gone: reports the better position again."""
         still = self._still_samples(sample.time_s)
         if len(still) < 2 or still[-1].time_s - still[0].time_s < 0.7 * self._limits.rest_s:
             return []
         best = Sample.median(still)
-        assert self.place is not None
+        assert self.position is not None
         best.teach(self._full_size, self.name)
-        if best.area_px > self.place.area_px:
-            self.place = best
-        if best.area_px > 1.08 * self._told_area_px and self.share(best) >= self._limits.clear_share:
-            self._told_area_px = best.area_px
-            return [Happening(Gesture.KIND_RESTED, best.u_px, best.v_px, self.share(best))]
+        if best.area_px > self.position.area_px:
+            self.position = best
+        if best.area_px > 1.08 * self._reported_area_px and self.visible_fraction(best) >= self._limits.clear_share:
+            self._reported_area_px = best.area_px
+            return [Transition(Gesture.KIND_RESTED, best.u_px, best.v_px, self.visible_fraction(best))]
         return []
 
     def _still_samples(self, now_s: float) -> list[Sample]:
@@ -165,37 +165,37 @@ class ObjectMotion:
         latest = recent[-1]
         return recent if all(s.border_change_px(latest) <= self._limits.rest_px for s in recent) else []
 
-    def _while_not_resting(self, sample: Sample, now_s: float, hand_near: bool) -> list[Happening]:
+    def _while_not_resting(self, sample: Sample, now_s: float, hand_near: bool) -> list[Transition]:
         still = self._still_samples(now_s)
         if not still or len(self._history) < 2:
             self._still_since = None
-            return self._seen_in_motion(sample, now_s)
+            return self._detected_in_motion(sample, now_s)
         if self._still_since is None:
             self._still_since = still[0].time_s
         if now_s - self._still_since + 1e-6 < self._limits.rest_s:
             return []
         return self._come_to_rest(Sample.median(still), now_s - self._still_since, hand_near)
 
-    def _seen_in_motion(self, sample: Sample, now_s: float) -> list[Happening]:
+    def _detected_in_motion(self, sample: Sample, now_s: float) -> list[Transition]:
         if self.state is State.MOVING:
             return []
         recent = [s for s in self._history if s.time_s > now_s - self._limits.rest_s]
         first = recent[0]
         if now_s - first.time_s < self._limits.moved_s or sample.displacement_px(first) < 2 * self._limits.moved_px:
             return []
-        if self.share(sample) < self._limits.part_share / 2:
+        if self.visible_fraction(sample) < self._limits.part_share / 2:
             return []
         return [self._begin_to_move(first)]
 
-    def _come_to_rest(self, place: Sample, still_s: float, hand_near: bool) -> list[Happening]:
-        share = self.share(place)
+    def _come_to_rest(self, position: Sample, still_s: float, hand_near: bool) -> list[Transition]:
+        visible = self.visible_fraction(position)
         waited = still_s >= (self._limits.timeout_s if hand_near else self._limits.clear_view_s)
-        if share < self._limits.clear_share and not waited:
+        if visible < self._limits.clear_share and not waited:
             return []
-        if share < self._limits.part_share:
+        if visible < self._limits.part_share:
             return [self._vanish()] if self.state is State.MOVING else []
         kind = Gesture.KIND_RESTED if self.state is State.MOVING else Gesture.KIND_APPEARED
-        self.state, self.place, self._told_area_px = State.RESTING, place, place.area_px
+        self.state, self.position, self._reported_area_px = State.RESTING, position, position.area_px
         self._still_since = None
-        place.teach(self._full_size, self.name)
-        return [Happening(kind, place.u_px, place.v_px, share)]
+        position.teach(self._full_size, self.name)
+        return [Transition(kind, position.u_px, position.v_px, visible)]

@@ -1,4 +1,4 @@
-"""Pointing by nearness over time (thesis 5.2.6, step 4).
+"""Pointing by proximity over time (thesis 5.2.6, step 4).
 
 "The pointing is here identified by thresholding the distance between the color-tracked hand and the closest (tracked)
 object. If this threshold is maintained for some time, the robot removes the object."
@@ -25,11 +25,11 @@ class PointingThresholds:
         near: Distance of fingertip and object's axis, m: a finger that points ends about 1 cm from the object's side,
             and objects stand 5 cm apart or more.
         near_px: The same while there is no calibration, at about 1.4 mm per px.
-        clearer_by: The second closest object must be farther by this share of `near`.
-        hold_s: How long: a hand that passes by, or lets go of one object beside another, stays for up to 0.7 s.
-        still: The palm stays within this share of `near` meanwhile (the fingertip jumps to a knuckle at times).
+        clearer_by: The second closest object must be farther by this fraction of `near`.
+        hold_s: Minimum duration: a hand that passes by, or releases one object next to another, stays for up to 0.7 s.
+        still: The palm stays within this fraction of `near` meanwhile (the fingertip jumps to a knuckle at times).
         away: The hand has left beyond this multiple of `near`.
-        gap_s: Such a gap in the view of the hand is a flicker.
+        gap_s: A shorter gap in the detections of the hand is ignored.
     """
 
     near: float = 0.028
@@ -42,7 +42,7 @@ class PointingThresholds:
 
 
 class Pointing:
-    """Watches the hand and the objects at rest.
+    """Recognizes pointing of the hand at objects at rest.
 
     An object can be pointed at once the hand has been away from it since it came to rest, so that the hand that puts an
     object down does not point at it; and again after the hand has left.
@@ -73,7 +73,7 @@ class Pointing:
             else:
                 self._candidate = None
             return None
-        distances = {name: self._distance(hand, place, homography) for name, place in resting.items()}
+        distances = {name: self._distance(hand, position, homography) for name, position in resting.items()}
         self._free |= {name for name, distance in distances.items() if distance > self._limits.away}
         nearest = self._clearly_nearest(distances)
         if nearest is None:
@@ -82,10 +82,10 @@ class Pointing:
         return self._hold(nearest, np.array([hand.u_px, hand.v_px]), now_s, resting[nearest], homography)
 
     def _hold(
-        self, name: str, palm: Floats, now_s: float, place: Sample, homography: PlaneHomography | None
+        self, name: str, palm: Floats, now_s: float, position: Sample, homography: PlaneHomography | None
     ) -> str | None:
         moved = self._palm_then is not None and (
-            np.linalg.norm(palm - self._palm_then) / self._near_px(place, homography) > self._limits.still
+            np.linalg.norm(palm - self._palm_then) / self._near_px(position, homography) > self._limits.still
         )
         if name != self._candidate or moved:
             self._candidate, self._since_s, self._palm_then = name, now_s, palm
@@ -108,26 +108,26 @@ class Pointing:
             return None
         return ordered[0]
 
-    def _distance(self, hand: TrackedObject, place: Sample, homography: PlaneHomography | None) -> float:
-        """Distance in the image of fingertip and object's axis, in units of `near` at the object's place.
+    def _distance(self, hand: TrackedObject, position: Sample, homography: PlaneHomography | None) -> float:
+        """Distance in the image of fingertip and object's axis, in units of `near` at the object's position.
 
-        The finger is above the plane by an unknown height, so its own place on the plane is not known; the distance is
+        The finger is above the plane by an unknown height, so its own position on the plane is unknown; the distance is
         taken parallel to the image instead and scaled as the plane is at the object.
         """
-        tip = _fingertip(hand, place)
-        below = min(max(float(tip[1]), place.top_px), place.bottom_px)
-        return float(np.hypot(tip[0] - place.u_px, tip[1] - below)) / self._near_px(place, homography)
+        tip = _fingertip(hand, position)
+        below = min(max(float(tip[1]), position.top_px), position.bottom_px)
+        return float(np.hypot(tip[0] - position.u_px, tip[1] - below)) / self._near_px(position, homography)
 
-    def _near_px(self, place: Sample, homography: PlaneHomography | None) -> float:
+    def _near_px(self, position: Sample, homography: PlaneHomography | None) -> float:
         if homography is None:
             return self._limits.near_px
-        here = np.array(homography.plane_from_image(place.u_px, place.v_px))
-        beside = np.array(homography.plane_from_image(place.u_px + 1.0, place.v_px))
-        return self._limits.near / float(np.linalg.norm(beside - here))
+        here = np.array(homography.plane_from_image(position.u_px, position.v_px))
+        next_to_it = np.array(homography.plane_from_image(position.u_px + 1.0, position.v_px))
+        return self._limits.near / float(np.linalg.norm(next_to_it - here))
 
 
-def _fingertip(hand: TrackedObject, place: Sample) -> Floats:
-    """The extreme point of the hand's outline: its own tip if it has one, else the one towards the object; px."""
+def _fingertip(hand: TrackedObject, position: Sample) -> Floats:
+    """The extreme point of the hand's outline: a stretched finger's tip, else the point towards the object; px."""
     centre = np.array([hand.u_px, hand.v_px])
     if not hand.outline:
         return centre
@@ -137,5 +137,5 @@ def _fingertip(hand: TrackedObject, place: Sample) -> Floats:
     opposite = float(np.max(-(outline - centre) @ (tip - centre))) / float(reach.max() or 1.0)
     if reach.max() >= 1.25 * opposite:  # one finger out of the palm, whose other side is nearer to its middle
         return np.asarray(tip, dtype=np.float64)
-    towards = np.array([place.u_px, place.v_px]) - centre
+    towards = np.array([position.u_px, position.v_px]) - centre
     return np.asarray(outline[int(np.argmax((outline - centre) @ towards))], dtype=np.float64)

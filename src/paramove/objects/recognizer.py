@@ -9,20 +9,20 @@ from paramove.msgs.plane_calibration_pb2 import PlaneCalibration
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects.full_size import FullSize
 from paramove.objects.homography import PlaneHomography
-from paramove.objects.object_motion import Happening, MotionThresholds, ObjectMotion, State
-from paramove.objects.openings import SeenOpenings
+from paramove.objects.object_motion import MotionThresholds, ObjectMotion, State, Transition
+from paramove.objects.openings import OpeningTracker
 from paramove.objects.pointing import Pointing, PointingThresholds
 from paramove.objects.sinking import Sample
 
 HAND_SEEN_S = 0.18
 HAND_GONE_S = 0.5
 BLIND_S = 0.35
-"""Images farther apart: what happened in between was not seen. A few images are lost on any loaded machine."""
+"""Motion between images farther apart was not observed. Any loaded machine loses a few images."""
 LONGEST_STEP_S = 0.2
-"""More time than this between two images is no time of watching."""
+"""Maximum observation time that one image counts for."""
 MAX_PX = 1e6
 CLOCK_BACK_S = 5.0
-"""An image older than this is no late one: the clock, or an image's time, was wrong."""
+"""An image older than this is not delayed: the clock, or an image's time, was wrong."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +34,17 @@ class RecognizerOptions:
 
 
 class Recognizer:
-    """Keeps a small state per object and says what happens to it, in the order of names, objects before the hand.
+    """Keeps a small state per object and reports its changes, in the order of names, objects before the hand.
 
-    All durations are times of watching: while no image comes (the camera starts again, it is dark), they stand still.
+    All durations are observation times: they do not advance without images (the camera restarts, it is dark).
     """
 
     def __init__(self, options: RecognizerOptions | None = None) -> None:
         self._options = options or RecognizerOptions()
         self._full_size = FullSize()
-        self._openings = SeenOpenings()
+        self._openings = OpeningTracker()
         self._objects: dict[str, ObjectMotion] = {}
-        self._last_seen: dict[str, Sample] = {}
+        self._last_detected: dict[str, Sample] = {}
         self._pointing = Pointing(self._options.pointing)
         self._hand = _HandPresence()
         self._calibrated: tuple[PlaneCalibration, PlaneHomography] | None = None
@@ -52,7 +52,7 @@ class Recognizer:
         self._watched_s = 0.0
 
     def update(self, tracked: TrackedObjects, calibration: PlaneCalibration | None = None) -> list[Gesture]:
-        """What happens in this image. An image not newer than the one before is ignored.
+        """The gestures that this image completes. An image not newer than the one before is ignored.
 
         Raises HomographyError if the calibration holds no homography.
         """
@@ -68,16 +68,18 @@ class Recognizer:
         if not all(_in_some_image(one) for one in tracked.objects):
             usable = [one for one in tracked.objects if _in_some_image(one)]
             tracked = TrackedObjects(captured=tracked.captured, objects=usable)
-        self._openings.see(tracked.openings)
-        hand = next((seen for seen in tracked.objects if seen.kind == TrackedObject.KIND_HAND), None)
-        said: list[Gesture] = []
-        for name, happening in self._follow_objects(tracked, hand, now_s):
-            said.append(self._gesture(tracked, name, happening, homography))
-        said += [self._gesture(tracked, "", moment, homography) for moment in self._hand.update(hand, now_s)]
+        self._openings.update(tracked.openings)
+        hand = next((one for one in tracked.objects if one.kind == TrackedObject.KIND_HAND), None)
+        gestures: list[Gesture] = []
+        for name, transition in self._follow_objects(tracked, hand, now_s):
+            gestures.append(self._gesture(tracked, name, transition, homography))
+        gestures += [
+            self._gesture(tracked, "", transition, homography) for transition in self._hand.update(hand, now_s)
+        ]
         pointed_at = self._pointed_at(hand, now_s, homography)
         if pointed_at is not None:
-            said.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
-        return said
+            gestures.append(self._gesture(tracked, pointed_at[0], pointed_at[1], homography))
+        return gestures
 
     def _step_s(self, captured_s: float) -> float:
         """Time since the image before; 0 for one that is not newer."""
@@ -91,31 +93,35 @@ class Recognizer:
 
     def _follow_objects(
         self, tracked: TrackedObjects, hand: TrackedObject | None, now_s: float
-    ) -> list[tuple[str, Happening]]:
-        seen = {s.name: Sample.of(s, now_s) for s in tracked.objects if s.kind == TrackedObject.KIND_OBJECT}
-        self._last_seen |= seen
-        happened: list[tuple[str, Happening]] = []
-        for name in sorted(self._last_seen):
+    ) -> list[tuple[str, Transition]]:
+        detected = {s.name: Sample.of(s, now_s) for s in tracked.objects if s.kind == TrackedObject.KIND_OBJECT}
+        self._last_detected |= detected
+        transitions: list[tuple[str, Transition]] = []
+        for name in sorted(self._last_detected):
             if name not in self._objects:
                 self._objects[name] = ObjectMotion(name, self._full_size, self._options.motion)
-            near = hand is not None and _touch(hand, self._last_seen[name])
-            happened += [(name, moment) for moment in self._objects[name].update(seen.get(name), now_s, near)]
-        return happened
+            near = hand is not None and _touch(hand, self._last_detected[name])
+            transitions += [
+                (name, transition) for transition in self._objects[name].update(detected.get(name), now_s, near)
+            ]
+        return transitions
 
     def _pointed_at(
         self, hand: TrackedObject | None, now_s: float, homography: PlaneHomography | None
-    ) -> tuple[str, Happening] | None:
+    ) -> tuple[str, Transition] | None:
         resting = {
-            name: motion.place
+            name: motion.position
             for name, motion in self._objects.items()
-            if motion.state is State.RESTING and motion.place is not None
+            if motion.state is State.RESTING and motion.position is not None
         }
         any_moving = any(motion.state is State.MOVING for motion in self._objects.values())
         name = self._pointing.update(now_s, hand, resting, any_moving, homography)
         if name is None:
             return None
-        place = resting[name]
-        return name, Happening(Gesture.KIND_POINTED_AT, place.u_px, place.v_px, self._objects[name].share(place))
+        position = resting[name]
+        return name, Transition(
+            Gesture.KIND_POINTED_AT, position.u_px, position.v_px, self._objects[name].visible_fraction(position)
+        )
 
     def _homography(self, calibration: PlaneCalibration | None) -> PlaneHomography | None:
         if calibration is None:
@@ -125,28 +131,28 @@ class Recognizer:
         return self._calibrated[1]
 
     def _gesture(
-        self, tracked: TrackedObjects, name: str, happening: Happening, homography: PlaneHomography | None
+        self, tracked: TrackedObjects, name: str, transition: Transition, homography: PlaneHomography | None
     ) -> Gesture:
         gesture = Gesture(
             captured=tracked.captured,
-            kind=happening.kind,
+            kind=transition.kind,
             object=name,
-            u_px=happening.u_px,
-            v_px=happening.v_px,
-            confidence=happening.confidence,
+            u_px=transition.u_px,
+            v_px=transition.v_px,
+            confidence=transition.confidence,
         )
-        if homography is not None and name and happening.placed:
-            if happening.in_motion:
+        if homography is not None and name and transition.placed:
+            if transition.in_motion:
                 self._put_over_opening(gesture, homography)
             gesture.located, gesture.frame = True, homography.plane_frame
             gesture.x, gesture.y = homography.plane_from_image(gesture.u_px, gesture.v_px)
         return gesture
 
     def _put_over_opening(self, gesture: Gesture, homography: PlaneHomography) -> None:
-        """An object that vanished over an opening stood where one would be seen whose foot is the opening's middle.
+        """Moves a gesture over an opening to where an object with its foot in the opening's middle would be detected.
 
-        The homography says how much a circle on the plane is foreshortened, the object's own image how far below its
-        middle its foot is seen, and both together from where the camera looks.
+        The homography gives the foreshortening of a circle on the plane, and the object's own image the distance from
+        its middle down to its foot; together they give the camera's direction.
         """
         full = self._full_size.expected(gesture.object, gesture.u_px, gesture.v_px)
         if full is None:
@@ -158,16 +164,16 @@ class Recognizer:
 
 
 class _HandPresence:
-    """Says once when the hand comes and once when it has gone."""
+    """Reports once that the hand has appeared and once that it has gone."""
 
     def __init__(self) -> None:
         self._present = False
         self._change_s: float | None = None
-        self._place = (0.0, 0.0)
+        self._position = (0.0, 0.0)
 
-    def update(self, hand: TrackedObject | None, now_s: float) -> list[Happening]:
+    def update(self, hand: TrackedObject | None, now_s: float) -> list[Transition]:
         if hand is not None:
-            self._place = (hand.u_px, hand.v_px)
+            self._position = (hand.u_px, hand.v_px)
         if (hand is not None) == self._present:
             self._change_s = None
             return []
@@ -176,23 +182,23 @@ class _HandPresence:
             return []
         self._present, self._change_s = not self._present, None
         kind = Gesture.KIND_HAND_APPEARED if self._present else Gesture.KIND_HAND_VANISHED
-        return [Happening(kind, *self._place, confidence=1.0)]
+        return [Transition(kind, *self._position, confidence=1.0)]
 
 
-def _in_some_image(seen: TrackedObject) -> bool:
-    """Whether its numbers can be pixels: what is not, nobody has seen."""
-    box = (seen.left_px, seen.top_px, seen.width_px, seen.height_px)
-    outline = (number for point in seen.outline for number in (point.u_px, point.v_px))
-    numbers = (seen.u_px, seen.v_px, seen.area_px, *box, *outline)
+def _in_some_image(tracked: TrackedObject) -> bool:
+    """Whether its numbers are finite and can be pixels."""
+    box = (tracked.left_px, tracked.top_px, tracked.width_px, tracked.height_px)
+    outline = (number for point in tracked.outline for number in (point.u_px, point.v_px))
+    numbers = (tracked.u_px, tracked.v_px, tracked.area_px, *box, *outline)
     return all(abs(number) < MAX_PX for number in numbers)  # NaN is not below
 
 
-def _touch(hand: TrackedObject, place: Sample) -> bool:
+def _touch(hand: TrackedObject, position: Sample) -> bool:
     """Whether the hand's box, widened by half an object, overlaps the object's."""
-    margin = 0.5 * place.width_px
+    margin = 0.5 * position.width_px
     return (
-        hand.left_px - margin < place.right_px
-        and hand.left_px + hand.width_px + margin > place.left_px
-        and hand.top_px - margin < place.bottom_px
-        and hand.top_px + hand.height_px + margin > place.top_px
+        hand.left_px - margin < position.right_px
+        and hand.left_px + hand.width_px + margin > position.left_px
+        and hand.top_px - margin < position.bottom_px
+        and hand.top_px + hand.height_px + margin > position.top_px
     )

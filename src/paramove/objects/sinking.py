@@ -1,8 +1,8 @@
-"""Where an object was last seen at its full height, when it sank into an opening or went out of sight.
+"""The last position of an object at its full height, when it sank into an opening or went out of sight.
 
-While a standing cylinder sinks, the opening's near rim cuts it off from below: the lower border of what is seen stays
-where it is, on the rim, and the rest shrinks towards it. So the lower border is the best trace of the place, also while
-a hand hides the upper end. The middle of the object at its full height is found from it upwards.
+While a standing cylinder sinks, the opening's near rim cuts it off from below: the lower border of the visible
+part stays on the rim, and the rest shrinks towards it. So the lower border is the best evidence of the position, also
+while a hand hides the upper end. The middle of the object at its full height is computed from it.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from paramove.objects.full_size import FullSize, Size
 
 BORDER_PX = 2.0
 """The lower border scatters by about 0.3 px; on the rim it stays within this range."""
-MIN_HEIGHT_SHARE = 0.1
-"""Below this share of the height before sinking, the border is scatter."""
+MIN_HEIGHT_FRACTION = 0.1
+"""Below this fraction of the height before sinking, the border is scatter."""
 LAST_SAMPLES = 20
 """A second and a half: longer than any lowering into an opening."""
 STEEPEST_AXIS = 0.6
@@ -64,19 +64,19 @@ class Sample:
 
     @property
     def size(self) -> Size:
-        """As if nothing hid it."""
+        """The size as if the object were unoccluded."""
         lean = float(np.clip(self.lean, -STEEPEST_AXIS, STEEPEST_AXIS))
         return Size(self.area_px, self.height_px, self.width_px, self.bottom_px - self.v_px, lean)
 
     def teach(self, full_size: FullSize, name: str) -> None:
-        """Give this sample of an object at rest to what is known of full sizes."""
+        """Adds this sample of an object at rest to the known full sizes."""
         full_size.learn(name, self.u_px, self.v_px, self.size)
 
     def displacement_px(self, other: Sample) -> float:
-        """How far the object has moved for certain.
+        """Minimum distance that the object has moved.
 
-        Something in front of an object moves one border inwards, or both; motion moves opposite borders the same way.
-        So the smaller of the two counts, and nothing if they move apart or together.
+        Occlusion moves one border inwards, or both; motion moves opposite borders the same way. So the smaller of the
+        two counts, and none if they move apart or together.
         """
         across = _common(self.left_px - other.left_px, self.right_px - other.right_px)
         along = _common(self.top_px - other.top_px, self.bottom_px - other.bottom_px)
@@ -92,31 +92,31 @@ class Sample:
         )
 
 
-def last_place(name: str, samples: Sequence[Sample], full_size: FullSize) -> tuple[float, float]:
-    """Middle (u, v), px, of an object that is seen no more, where it was last at its full height.
+def last_position(name: str, samples: Sequence[Sample], full_size: FullSize) -> tuple[float, float]:
+    """Middle (u, v), px, of an object that has vanished, at its last full height.
 
-    If it sank into an opening, it is seen nearer to the camera than it was, by the gap between it and the rim.
+    If it sank into an opening, the result is nearer to the camera than the object, by the gap between it and the rim.
 
     Args:
-        samples: at least one, in the order of time, to the last one seen.
+        samples: at least one, in the order of time, up to the last detection.
     """
-    tallest = max(samples, key=lambda sample: sample.height_px)  # has to do for what was never seen at rest
+    tallest = max(samples, key=lambda sample: sample.height_px)  # the only estimate if it was never at rest
     full = full_size.expected(name, samples[-1].u_px, samples[-1].v_px) or tallest.size
     heights = sorted(s.height_px for s in samples[-LAST_SAMPLES:])
     carried_px = median(heights[len(heights) // 2 :])  # less than the full height where a hand holds the upper end
-    seen = [s for s in samples if s.height_px >= MIN_HEIGHT_SHARE * carried_px] or [samples[-1]]
-    bottom_px = median(s.bottom_px for s in _on_rim(seen))
-    full = full_size.expected(name, seen[-1].u_px, bottom_px - full.lower_px) or full
+    visible = [s for s in samples if s.height_px >= MIN_HEIGHT_FRACTION * carried_px] or [samples[-1]]
+    bottom_px = median(s.bottom_px for s in _on_rim(visible))
+    full = full_size.expected(name, visible[-1].u_px, bottom_px - full.lower_px) or full
     middle_px = bottom_px - full.lower_px
-    return seen[-1].u_px + full.lean * (middle_px - seen[-1].v_px), middle_px
+    return visible[-1].u_px + full.lean * (middle_px - visible[-1].v_px), middle_px
 
 
-def _on_rim(seen: Sequence[Sample]) -> list[Sample]:
-    """The last samples whose lower border is where that of the very last is, across and along."""
-    on_rim = [seen[-1]]
-    for sample in reversed(seen[:-1]):
+def _on_rim(visible: Sequence[Sample]) -> list[Sample]:
+    """The last samples with their lower border at that of the very last one, across and along."""
+    on_rim = [visible[-1]]
+    for sample in reversed(visible[:-1]):
         lifted = abs(sample.bottom_px - median(s.bottom_px for s in on_rim)) > BORDER_PX
-        if lifted or abs(sample.u_px - seen[-1].u_px) > ASIDE_PX:
+        if lifted or abs(sample.u_px - visible[-1].u_px) > ASIDE_PX:
             break
         on_rim.append(sample)
     return on_rim[::-1]

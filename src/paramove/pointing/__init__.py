@@ -1,4 +1,4 @@
-"""Pointing with the arm: targets of tracking in action space, and the window of thesis and paper over an arm's pose."""
+"""Pointing with the arm: targets of tracking in action space, and the paper's recent window of arm poses."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Models of the last part of pointing and of reaching, which say whether a window of tracked points is one (paper 5.4).
+"""Models of the last part of pointing and of reaching, for classifying windows of tracked points (paper 5.4).
 
 "A PHMM is trained for the last part of pointing movements. The recognition of the position is estimated as the most
 likely parameter of the PHMM over a recent time window of the elbow and wrist positions, which is recognized as pointing
@@ -25,10 +25,10 @@ PERSONS = 8
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a window of points is taken for.
+    """The result of comparing a window of points with the model.
 
     Attributes:
-        theta: coordinates (u, v) on the table of the place that is pointed at, (2,). covariance: of these, (2, 2).
+        theta: coordinates (u, v) on the table of the position that is pointed at, (2,). covariance: of theta, (2, 2).
         outlier_score: how far it is from the last part of a pointing movement.
         p_value: probability that a genuine one has at least this outlier score.
         log_density: of the window as pointing.
@@ -42,14 +42,14 @@ class Judgement:
 
 
 class LastPartModel:
-    """The last part of pointing, and of reaching where that can be told apart.
+    """The last part of pointing, and of reaching where the two can be distinguished.
 
     Args:
         pointing: of points over `FRAMES` frames, with correlated residuals.
-        reaching: the same of reaching; None where it does not compete.
+        reaching: the same for reaching; None where it does not compete.
 
     Attributes:
-        duration_s: mean of the last parts of pointing that were shown.
+        duration_s: mean of the demonstrated last parts of pointing.
     """
 
     def __init__(self, pointing: QuadraticPHMM, reaching: QuadraticPHMM | None) -> None:
@@ -60,20 +60,22 @@ class LastPartModel:
 
     @classmethod
     def of_points(cls, points: Sequence[str], folder: Path | None = None) -> LastPartModel:
-        """Trained with synthetic persons and kept in a folder, by default the user's cache.
+        """Trains with synthetic persons and caches the model in a folder, by default the user's cache.
 
-        The end of the finger beside the wrist tells a pointing hand from one that grasps. Without both, reaching for a
-        thing looks like pointing a little beyond it, so it does not compete.
+        Wrist and fingertip together distinguish a pointing hand from a grasping one. Without both, reaching for an
+        object looks like pointing a little beyond it, so reaching does not compete.
         """
         pointing = _trained("pointing", points, folder)
         both = {"wrist", "index"} <= set(points)
         return cls(pointing, _trained("reaching", points, folder) if both else None)
 
     def judged(self, window: Floats) -> Judgement:
-        """Of points over time (FRAMES, 3 n), m, in the models' frame."""
+        """Judges points over time (FRAMES, 3 n), m, in the models' frame."""
         examined = self._pointing.examine(window)
-        found = examined.estimate
-        return Judgement(found.theta, found.covariance, examined.outlier_score, examined.p_value, examined.log_density)
+        estimate = examined.estimate
+        return Judgement(
+            estimate.theta, estimate.covariance, examined.outlier_score, examined.p_value, examined.log_density
+        )
 
     def lead(self, window: Floats, judged: Judgement) -> float:
         """Logarithm of a window's density as pointing over that as reaching; infinite if reaching does not compete."""
@@ -81,16 +83,16 @@ class LastPartModel:
 
 
 def _trained(action: Action, points: Sequence[str], folder: Path | None) -> QuadraticPHMM:
-    """From the folder, or trained and kept there."""
+    """The model from the folder, or trained and cached there."""
 
     def train() -> QuadraticPHMM:
-        shown = last_parts(action, points, persons=PERSONS)
+        demonstrated = last_parts(action, points, persons=PERSONS)
         model = QuadraticPHMM(STATES, 2, 4, options=TrainingOptions(floor_deviation=0.003))
         model.description = MovementDescription(
-            f"last part of {action}", tuple(points), "m", FRAME, ("u", "v"), shown.duration_s,
-            rate_hz=(FRAMES - 1) / shown.duration_s,
+            f"last part of {action}", tuple(points), "m", FRAME, ("u", "v"), demonstrated.duration_s,
+            rate_hz=(FRAMES - 1) / demonstrated.duration_s,
         )  # fmt: skip
-        return model.fit(shown.sequences, shown.theta, shown.groups)
+        return model.fit(demonstrated.sequences, demonstrated.theta, demonstrated.groups)
 
     source = f"last parts of {action} by {PERSONS} synthetic persons, {'+'.join(points)}"
     return cached_model(QuadraticPHMM, f"last_part_{action}", source, train, folder)

@@ -1,4 +1,4 @@
-"""Where pointing gestures come from: what tracking in action space believes, or a window of tracked arm poses."""
+"""Sources of pointing gestures: the estimates of tracking in action space, or a window of tracked arm poses."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 class PointingSetup(OldNames):
-    """Parameters of what says where a person points.
+    """Parameters of the recognition of pointing.
 
     Attributes:
         pointing_from: "estimates" of the action tracker, or "poses" of a body tracker (paper 5.4).
-        person: File of the person's measures, for poses; without one, the synthetic demonstrator's. It is looked for in
-            the run's folder first, then in the workspace.
-        pointing_actions: What of the estimates is a gesture.
-        pointing_window: What of the poses is a gesture.
+        person: File of the person's measures, for poses; without one, the synthetic demonstrator's. The run's folder
+            is searched first, then the workspace.
+        pointing_actions: Which estimates are gestures.
+        pointing_window: Which poses are gestures.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -47,7 +47,7 @@ class PointingSetup(OldNames):
         return PointingSource(self._window(run_folder))
 
     def _window(self, run_folder: Path) -> PointingWindow:
-        # Movement models take a second to import: only who hears poses waits for them.
+        # Movement models take a second to import: import them only for poses.
         from paramove.action_space import measured_person
         from paramove.pointing.last_part_model import LastPartModel
         from paramove.pointing.window import PointingWindow
@@ -61,7 +61,7 @@ class PointingSource:
     """Turns the messages of one topic into gestures, and poses into a ball where they point.
 
     Attributes:
-        topic: What is listened to.
+        topic: The subscribed topic.
     """
 
     def __init__(self, gestures: PointingEvents | PointingWindow) -> None:
@@ -69,7 +69,7 @@ class PointingSource:
         self.topic = topics.ACTION_ESTIMATE if isinstance(gestures, PointingEvents) else topics.HUMAN_ARM_POSE
 
     def handle(self, topic: Topic, message: Any) -> Iterator[tuple[Topic, Any]]:
-        """What a message makes known; nothing from messages of another topic than that listened to."""
+        """The messages that follow from a message; none for other topics than the subscribed one."""
         if topic.name != self.topic.name:
             return
         gesture = self._gestures.update(message)

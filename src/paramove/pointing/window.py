@@ -1,8 +1,8 @@
-"""Pointing from a recent window of tracked elbow and hand positions (paper 5.4): said once, with its place.
+"""Pointing from a recent window of tracked elbow and hand positions (paper 5.4): reported once, with its target.
 
 At every new sample, windows of several lengths that end there are judged by the model of the last part of pointing. The
-one most like it counts. It is a pointing if it is not too strange, rather pointing than reaching, and leads to a place
-on the table; it is said as soon as no later window has been more like it for a moment.
+one with the lowest outlier score counts. It is a pointing if that score is low enough, pointing fits better than
+reaching, and its target is on the table; it is reported as soon as no later window has fitted better for `settled_s`.
 """
 
 from __future__ import annotations
@@ -26,45 +26,45 @@ from paramove.pointing.last_part_model import Judgement, LastPartModel
 LENGTHS = (0.6, 0.75, 0.95, 1.2, 1.5)
 """Of the windows that are tried, over the mean duration of the demonstrated last parts."""
 MIN_PERIOD_S = 0.03
-"""A tracker may be faster; windows are not judged more often than this."""
+"""Minimum time between judged windows; a tracker may be faster."""
 RESTARTED_S = 1.0
-"""A sample that is so much older than the latest is the first of a tracker that was started again."""
+"""A sample that is older than the latest by more than this is the first of a restarted tracker."""
 
 
 @dataclass(frozen=True)
-class WindowBelief:
-    """What the latest window says.
+class WindowEstimate:
+    """The estimate from the latest window.
 
     Attributes:
         captured_ns: of its last sample.
-        judgement: of the window most like pointing.
-        place: where that points, (3,), m, in the world. deviation: along each axis, (3,), m.
+        judgement: of the window that fits pointing best.
+        position: the target of that window, (3,), m, in the world. deviation: along each axis, (3,), m.
         hand: the last of the points at its end, (3,), m, in the world.
-        pointing: whether it is taken for pointing.
+        pointing: whether it counts as pointing.
     """
 
     captured_ns: int
     judgement: Judgement
-    place: Floats
+    position: Floats
     deviation: Floats
     hand: Floats
     pointing: bool
 
     @property
     def likeness(self) -> float:
-        """0 of what is no pointing to 1 of what is as pointing usually is."""
+        """From 0 (no pointing) to 1 (typical pointing)."""
         return float(self.judgement.p_value**0.25) if self.pointing else 0.0
 
 
 class PointingWindow:
-    """Hears arm poses and says each pointing once, when it has just been completed.
+    """Reports each pointing in a sequence of arm poses once, when it has just been completed.
 
     Args:
         model: of the last part of pointing, made for the points of the options.
         placement: where the person sits, and how large the person is.
 
     Attributes:
-        belief: what the window that ends with the latest pose says; None if there is none without a gap.
+        estimate: from the window that ends with the latest pose; None if there is no window without a gap.
     """
 
     def __init__(
@@ -80,20 +80,20 @@ class PointingWindow:
         self._times_ns: deque[int] = deque()
         self._samples: deque[Floats] = deque()
         self._judged_ns = -(10**18)
-        self._best: WindowBelief | None = None
-        self._said_at: Floats | None = None
-        self.belief: WindowBelief | None = None
+        self._best: WindowEstimate | None = None
+        self._reported_at: Floats | None = None
+        self.estimate: WindowEstimate | None = None
 
     def update(self, pose: ArmPose) -> Gesture | None:
         """The gesture that this sample completes, if there is one.
 
-        Late and repeated samples, and those without one of the points or in another frame, are left out. If time goes
-        back by more than a second, the tracker was started again, and nothing is known of what was before.
+        Late and repeated samples, and those without one of the points or in another frame, are ignored. If time goes
+        back by more than a second, the tracker was restarted, and the earlier samples are discarded.
         """
         captured_ns, sample = pose.captured.ToNanoseconds(), self._sample(pose)
         if self._times_ns and captured_ns < self._times_ns[-1] - RESTARTED_S * 1e9:
             self._clear()
-        self.belief = None
+        self.estimate = None
         if sample is None or (self._times_ns and captured_ns <= self._times_ns[-1]):
             return None
         if self._times_ns and captured_ns - self._times_ns[-1] > self._options.max_gap_s * 1e9:
@@ -108,35 +108,35 @@ class PointingWindow:
         if captured_ns - self._judged_ns < MIN_PERIOD_S * 1e9:
             return None
         self._judged_ns = captured_ns
-        self.belief = self._judged(captured_ns)
-        return self._told(captured_ns, sample[-3:])
+        self.estimate = self._judged(captured_ns)
+        return self._completed(captured_ns, sample[-3:])
 
     def ball(self) -> SceneUpdate | None:
         """A ball where the latest window points; green if it is like pointing, red if it is not (figure 16)."""
-        if self.belief is None:
+        if self.estimate is None:
             return None
         message = SceneUpdate()
         entity = message.entities.add(id="pointed_at", frame_id=WORLD_FRAME)
-        entity.timestamp.FromNanoseconds(self.belief.captured_ns)
+        entity.timestamp.FromNanoseconds(self.estimate.captured_ns)
         entity.lifetime.FromMilliseconds(1000)
         ball = entity.spheres.add()
-        ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = self.belief.place
+        ball.pose.position.x, ball.pose.position.y, ball.pose.position.z = self.estimate.position
         ball.pose.orientation.w = 1.0
         ball.size.x = ball.size.y = ball.size.z = BALL_M
-        ball.color.r, ball.color.g, ball.color.b = ball_colour(self.belief.likeness)
+        ball.color.r, ball.color.g, ball.color.b = ball_colour(self.estimate.likeness)
         ball.color.a = 1.0
         return message
 
     def _sample(self, pose: ArmPose) -> Floats | None:
-        """The points, (3 n,), m; None if one of them is missing or is at no place that an arm can be at."""
-        found = {point.name: (point.x, point.y, point.z) for point in pose.points}
-        if pose.frame != WORLD_FRAME or any(name not in found for name in self._options.points):
+        """The points, (3 n,), m; None if one of them is missing or farther away than an arm can be."""
+        points = {point.name: (point.x, point.y, point.z) for point in pose.points}
+        if pose.frame != WORLD_FRAME or any(name not in points for name in self._options.points):
             return None
-        sample = np.array([found[name] for name in self._options.points]).ravel()
+        sample = np.array([points[name] for name in self._options.points]).ravel()
         return sample if bool(np.all(np.abs(sample) < FARTHEST_M)) else None  # NaN is not below either
 
-    def _judged(self, now_ns: int) -> WindowBelief | None:
-        """What the window most like pointing says."""
+    def _judged(self, now_ns: int) -> WindowEstimate | None:
+        """The estimate from the window that fits pointing best."""
         times = (np.array(self._times_ns) - now_ns) * 1e-9
         lengths = [length for length in self._lengths_s if length <= -times[0]]
         if not lengths:
@@ -147,32 +147,34 @@ class PointingWindow:
         judged = [self._model.judged(window) for window in windows]
         chosen = int(np.argmin([one.outlier_score for one in judged]))
         best = judged[chosen]
-        place = self._placement.in_world(table_place(best.theta))
+        position = self._placement.in_world(table_place(best.theta))
         slopes = (table_place(np.eye(2)) - table_place(np.zeros(2))) * self._placement.scale
         deviation = np.sqrt(np.einsum("pi,pq,qi->i", slopes, best.covariance, slopes))
-        return WindowBelief(now_ns, best, place, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best))
+        return WindowEstimate(
+            now_ns, best, position, deviation, samples[-1, -3:], self._is_pointing(windows[chosen], best)
+        )
 
     def _is_pointing(self, window: Floats, judged: Judgement) -> bool:
         options = self._options
-        beside = np.maximum(-judged.theta, judged.theta - 1.0).max()
-        if judged.p_value < options.level or beside > options.margin:
+        outside = np.maximum(-judged.theta, judged.theta - 1.0).max()
+        if judged.p_value < options.level or outside > options.margin:
             return False
         return self._model.lead(window, judged) >= options.min_lead
 
-    def _told(self, now_ns: int, hand: Floats) -> Gesture | None:
-        """The best window of this stay at a place once it is over."""
-        if self._said_at is not None:
-            if np.linalg.norm(hand - self._said_at) < self._options.apart_m:
+    def _completed(self, now_ns: int, hand: Floats) -> Gesture | None:
+        """The gesture of the best window, once the pointing is over; one until the hand moves away."""
+        if self._reported_at is not None:
+            if np.linalg.norm(hand - self._reported_at) < self._options.apart_m:
                 return None
-            self._said_at = None
-        belief, best = self.belief, self._best
+            self._reported_at = None
+        estimate, best = self.estimate, self._best
         minimum = np.inf if best is None else best.judgement.outlier_score
-        if belief is not None and belief.pointing and belief.judgement.outlier_score < minimum:
-            self._best = best = belief
+        if estimate is not None and estimate.pointing and estimate.judgement.outlier_score < minimum:
+            self._best = best = estimate
         if best is None or now_ns - best.captured_ns < self._options.settled_s * 1e9:
             return None
-        self._said_at, self._best = best.hand, None
-        x, y, _ = best.place
+        self._reported_at, self._best = best.hand, None
+        x, y, _ = best.position
         gesture = Gesture(
             kind=Gesture.KIND_POINTED_AT, located=True, frame=WORLD_FRAME, x=x, y=y,
             confidence=certainty(best.deviation),
@@ -183,17 +185,17 @@ class PointingWindow:
 
 @dataclass(frozen=True)
 class PointingWindowOptions:
-    """What is looked at, and when it is a pointing.
+    """Which points are used, and when their window is a pointing.
 
     Attributes:
-        points: of the arm, as `ArmPose` names them. ("elbow", "wrist") are the paper's; they do not tell pointing from
-            reaching, which ("elbow", "wrist", "index") do.
-        level: a window of which a genuine pointing is stranger with less probability than this is none.
-        min_lead: logarithm of how much denser the window is as pointing than as reaching, at least.
-        settled_s: no window has been more like pointing for so long: it is over.
-        max_gap_s: without samples, or without one of the points, nothing is known of what happened meanwhile.
-        margin: how far beside the demonstrated places, as a share of their extent, a place may lie.
-        apart_m: the hand must have been so far away from where it was before it points again.
+        points: of the arm, as `ArmPose` names them. ("elbow", "wrist") are the paper's; they do not distinguish
+            pointing from reaching, which ("elbow", "wrist", "index") do.
+        level: minimum p-value of a pointing.
+        min_lead: logarithm of the minimum ratio of the window's density as pointing to that as reaching.
+        settled_s: a pointing is over after this time without a better window.
+        max_gap_s: a longer time without samples, or without one of the points, starts a new window.
+        margin: how far outside the demonstrated positions, as a fraction of their extent, a target may lie.
+        apart_m: minimum distance that the hand moves away before it can point again.
     """
 
     points: tuple[str, ...] = ("elbow", "wrist", "index")
@@ -210,4 +212,4 @@ class PointingWindowOptions:
             raise InputError(f"points: at least two different points of the arm expected, found {self.points}")
         for name in ("level", "settled_s", "max_gap_s", "apart_m"):
             if not 0.0 < getattr(self, name) < inf:
-                raise InputError(f"{name} is positive and finite, found {getattr(self, name)}")
+                raise InputError(f"{name}: a positive, finite number expected, found {getattr(self, name)}")

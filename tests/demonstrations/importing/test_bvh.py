@@ -72,7 +72,7 @@ def test_it_becomes_metres_forward_left_up(tmp_path):
     (take,) = import_file(path, ImportOptions(unit="cm", points={"elbow": ("Elbow",)}, zeros_are_lost=True)).takes
     assert_allclose(take.positions[0, 0], [0.0, -0.5, 1.5], rtol=0.0, atol=1e-12)  # x left -50, y up 150
     assert_allclose(take.positions[2, 0], [0.5, 0.0, 1.5], rtol=0.0, atol=1e-12)
-    with pytest.raises(DemonstrationError, match="does not tell its unit; give --unit"):
+    with pytest.raises(DemonstrationError, match="does not define its unit; give --unit"):
         import_file(path, ImportOptions())
 
 

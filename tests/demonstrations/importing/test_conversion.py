@@ -71,7 +71,7 @@ def test_targets_are_converted_with_the_points():
 @pytest.mark.parametrize(
     ("changes", "options", "sentence"),
     [
-        ({}, {}, "take.csv does not tell its unit; give --unit m, cm, mm"),
+        ({}, {}, "take.csv does not define its unit; give --unit m, cm, mm"),
         ({"unit": "inch"}, {}, "the unit is 'inch'; give --unit"),
         ({"unit": "m", "time": None}, {}, "has neither times nor a frame rate; give --rate"),
         ({"unit": "m", "time": np.array([0.0, 2.0, 1.0])}, {}, "the time of frame 2 is 1 s, not after 2 s"),

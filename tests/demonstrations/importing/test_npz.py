@@ -62,7 +62,7 @@ def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
         write(tmp_path, MANY | {"ok": [False, True, True], "reason": ["jump", "", ""]}), ImportOptions()
     )
     assert len(found.takes) == 1
-    assert "left out as the file says: movements 0 (jump)" in found.remarks[0]
+    assert "movements 0 (jump)" in found.remarks[0]
 
 
 @pytest.mark.parametrize(

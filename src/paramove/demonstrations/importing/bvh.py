@@ -1,7 +1,7 @@
-"""BVH files: a hierarchy of joints and the rotations of each; the points are the joints' places by forward kinematics.
+"""BVH files: a hierarchy of joints and the rotations of each; the points are the positions of the joints.
 
-A joint's place is its parent's place plus its OFFSET turned by all rotations above it. Rotations are about the joint's
-own axes in the order in which its channels are listed, in degrees. Position channels stand in place of the OFFSET. The
+A joint's position is its parent's position plus its OFFSET turned by all rotations above it. Rotations are about the
+joint's own axes in the order in which its channels are listed, in degrees. Position channels replace the OFFSET. The
 end of a limb ("End Site") is a point too: `<joint>_end`.
 """
 
@@ -25,7 +25,7 @@ MAX_LEVELS = 200
 MAX_JOINTS = 1000
 LINE_LETTERS = 2**20
 FRAMES_AT_ONCE = 10_000
-"""Of which the turns of all joints are in memory."""
+"""Number of frames whose rotations are in memory at once."""
 CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 
 
@@ -56,7 +56,7 @@ class Motion:
 
 
 def read_bvh(path: Path) -> list[RawTake]:
-    """Places of all joints over time. BVH tells no unit; by custom y points up, z forward, x left.
+    """Positions of all joints over time. BVH defines no unit; by custom y points up, z forward, x left.
 
     Raises DemonstrationError with the line of what is wrong.
     """
@@ -69,37 +69,39 @@ def read_bvh(path: Path) -> list[RawTake]:
 
 def joint_positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
     """Forward kinematics. Shapes: values (T, C), C channels of all joints in their order -> (T, J, 3)."""
-    places = np.zeros((len(values), len(joints), 3))
+    positions = np.zeros((len(values), len(joints), 3))
     for begin in range(0, len(values), FRAMES_AT_ONCE):
-        places[begin : begin + FRAMES_AT_ONCE] = _places(joints, values[begin : begin + FRAMES_AT_ONCE])
-    return places
+        positions[begin : begin + FRAMES_AT_ONCE] = _positions(joints, values[begin : begin + FRAMES_AT_ONCE])
+    return positions
 
 
-def _places(joints: tuple[Joint, ...], values: Floats) -> Floats:
-    places = np.zeros((len(values), len(joints), 3))
-    turns: list[Floats] = []
+def _positions(joints: tuple[Joint, ...], values: Floats) -> Floats:
+    positions = np.zeros((len(values), len(joints), 3))
+    rotations: list[Floats] = []
     column = 0
     for number, joint in enumerate(joints):
-        place = np.broadcast_to(joint.offset, (len(values), 3)).copy()
-        turn = np.broadcast_to(np.eye(3), (len(values), 3, 3))
+        position = np.broadcast_to(joint.offset, (len(values), 3)).copy()
+        rotation = np.broadcast_to(np.eye(3), (len(values), 3, 3))
         for channel in joint.channels:
             axis, kind = channel[0].lower(), channel[1:].lower()
             if kind == "position":
-                place[:, "xyz".index(axis)] = values[:, column]
+                position[:, "xyz".index(axis)] = values[:, column]
             else:
-                turn = turn @ Rotation.from_euler(axis, values[:, column : column + 1], degrees=True).as_matrix()
+                rotation = (
+                    rotation @ Rotation.from_euler(axis, values[:, column : column + 1], degrees=True).as_matrix()
+                )
             column += 1
         if joint.parent >= 0:
-            above = turns[joint.parent]
-            place = places[:, joint.parent] + np.einsum("tij,tj->ti", above, place)
-            turn = above @ turn
-        places[:, number] = place
-        turns.append(np.asarray(turn))
-    return places
+            above = rotations[joint.parent]
+            position = positions[:, joint.parent] + np.einsum("tij,tj->ti", above, position)
+            rotation = above @ rotation
+        positions[:, number] = position
+        rotations.append(np.asarray(rotation))
+    return positions
 
 
 def parse(text: str, source: str) -> Motion:
-    """A BVH text; raises DemonstrationError with `source` and line of what is wrong."""
+    """A BVH text; raises DemonstrationError with `source` and line of the fault."""
     return _Parser(text, source).motion()
 
 
@@ -131,7 +133,7 @@ class _Parser:
         if level > MAX_LEVELS or len(self._joints) == MAX_JOINTS:
             raise self._wrong(f"more than {MAX_LEVELS} joints below each other, or than {MAX_JOINTS} altogether")
         if any(joint.name == name for joint in self._joints):
-            raise self._wrong(f"a second joint '{name:.80}'; each needs a name of its own")
+            raise self._wrong(f"a second joint '{name:.80}'; each needs its own name")
         number = len(self._joints)
         self._joints.append(Joint(name, parent, np.zeros(3)))
         self._expect("{")
@@ -151,18 +153,18 @@ class _Parser:
     def _channels(self) -> tuple[str, ...]:
         self._expect("CHANNELS")
         count = self._number("how many channels there are")
-        found = tuple(self._next("the name of a channel") for _ in range(int(count)))
-        for name in found:
+        channels = tuple(self._next("the name of a channel") for _ in range(int(count)))
+        for name in channels:
             if not CHANNEL.fullmatch(name):
                 raise self._wrong(f"channel '{name:.40}'; expected such as Xposition or Zrotation")
-        return found
+        return channels
 
     def _values(self, frames: float) -> Floats:
         width = sum(len(joint.channels) for joint in self._joints)
         if len(self._joints) > 2 * width:
             raise self._wrong(f"{len(self._joints)} joints have only {width} channels")
         self._peek()
-        first, found = self._line, array("d")
+        first, numbers = self._line, array("d")
         rest = itertools.chain([self._words[::-1]], map(str.split, self._lines[first:]))
         for line, words in enumerate(rest, start=first):
             try:
@@ -171,16 +173,16 @@ class _Parser:
                 bad = next(word for word in words if not _is_number(word))
                 raise self._wrong(f"'{bad:.40}' is no number", line) from error
             if not all(map(math.isfinite, row)):
-                at = next(place for place, value in enumerate(row) if not math.isfinite(value))
-                raise self._wrong(f"{words[at]:.40} in frame {(len(found) + at) // max(width, 1)}", line)
-            found.extend(row)
-        if len(found) != width * frames or frames < 1 or width == 0:
+                at = next(index for index, value in enumerate(row) if not math.isfinite(value))
+                raise self._wrong(f"{words[at]:.40} in frame {(len(numbers) + at) // max(width, 1)}", line)
+            numbers.extend(row)
+        if len(numbers) != width * frames or frames < 1 or width == 0:
             raise self._wrong(
-                f"{len(found)} numbers follow; {frames:g} frames of {width} channels need {width * frames:g}. "
+                f"{len(numbers)} numbers follow; {frames:g} frames of {width} channels need {width * frames:g}. "
                 "The file is cut off, or its number of frames is wrong",
                 first,
             )
-        return np.array(found).reshape(-1, width)
+        return np.array(numbers).reshape(-1, width)
 
     def _peek(self) -> str:
         """The next word, "" at the end."""

@@ -1,6 +1,6 @@
-"""C3D files, the exchange format of motion capture; read by ezc3d in a process of its own.
+"""C3D files, the exchange format of motion capture; read by ezc3d in its own process.
 
-A damaged file can hang or crash ezc3d, so it is given a time limit and harms nobody.
+A damaged file can hang or crash ezc3d, so the process has a time limit.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ TIME_LIMIT_S = 120.0
 
 
 def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
-    """Points, names, unit and rate. Analog channels are not read; C3D does not tell which way its axes point.
+    """Points, names, unit and rate. Analog channels are not read; C3D does not define the directions of its axes.
 
     Raises DemonstrationError if the file cannot be read, which names the reader's complaint.
     """
     size_of(path, "C3D file", DemonstrationError)
     if importlib.util.find_spec("ezc3d") is None:
-        raise DemonstrationError(f"{path} is a C3D file; what reads these is installed by: pip install 'paramove[c3d]'")
+        raise DemonstrationError(f"{path} is a C3D file; install its reader with: pip install 'paramove[c3d]'")
     with tempfile.TemporaryDirectory(prefix="paramove-c3d-") as folder:
         result = Path(folder) / "result.npz"
         command = [sys.executable, c3d_process.__file__, str(path), str(result)]
@@ -37,16 +37,16 @@ def read_c3d(path: Path, time_limit_s: float = TIME_LIMIT_S) -> list[RawTake]:
         except subprocess.TimeoutExpired as error:
             raise DemonstrationError(f"{path} is not read within {time_limit_s:g} s: a damaged C3D file") from error
         if done.returncode != 0 or not result.is_file():
-            said = " ".join(done.stderr.split())[-300:] or f"the reader ended with {done.returncode}"
-            raise DemonstrationError(f"{path} cannot be read as C3D: {said}; export it again")
-        found = read_arrays(result, raising=DemonstrationError)
-    positions = np.asarray(found["positions"], dtype=np.float64)
-    names = tuple(str(name).strip() for name in found["points"])
-    rate_hz = float(found["rate_hz"])
+            complaint = " ".join(done.stderr.split())[-300:] or f"the reader ended with {done.returncode}"
+            raise DemonstrationError(f"{path} cannot be read as C3D: {complaint}; export it again")
+        arrays = read_arrays(result, raising=DemonstrationError)
+    positions = np.asarray(arrays["positions"], dtype=np.float64)
+    names = tuple(str(name).strip() for name in arrays["points"])
+    rate_hz = float(arrays["rate_hz"])
     if positions.shape[1] != len(names) or len(set(names)) < len(names) or not positions.size:
         raise DemonstrationError(
             f"{path} has {len(positions)} frames of {positions.shape[1]} points with {len(set(names))} names; "
             "expected points that have a name each"
         )
     time = np.arange(len(positions)) / rate_hz if np.isfinite(rate_hz) and rate_hz > 0.0 else None
-    return [RawTake(path.stem, time, positions, names, str(found["unit"]).strip() or None)]
+    return [RawTake(path.stem, time, positions, names, str(arrays["unit"]).strip() or None)]

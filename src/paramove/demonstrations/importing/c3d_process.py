@@ -1,4 +1,4 @@
-"""Reads one C3D file into an NPZ file; run as a program of its own (`c3d.py`), which a damaged file may hang or crash.
+"""Reads one C3D file into an NPZ file; run as a separate program (`c3d.py`), as a damaged file may hang or crash it.
 
 python c3d_process.py FILE.c3d RESULT.npz
 """
@@ -17,7 +17,7 @@ CPU_BYTES_PER_S = 2**20
 
 
 def text(read: str) -> str:
-    """Text of a C3D file, which does not tell its encoding: what is no UTF-8 is taken for Latin-1."""
+    """Text of a C3D file, which does not define its encoding: UTF-8, else Latin-1."""
     try:
         read.encode("utf-8")
     except UnicodeEncodeError:

@@ -35,13 +35,13 @@ PRESETS = {"z_up": "forward,left,up", "y_up": "left,up,forward"}
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What a file does not tell, or tells otherwise.
+    """Properties that a file does not define, or that replace the file's.
 
     Attributes:
-        unit: "m", "cm" or "mm"; None: as the file says.
-        axes: "z_up", "y_up" or the directions of x, y, z, such as "right,up,forward"; None: as the file says.
+        unit: "m", "cm" or "mm"; None: the file's.
+        axes: "z_up", "y_up" or the directions of x, y, z, such as "right,up,forward"; None: the file's.
         points: Name of a body point -> names in the file, of which the mean is taken; None: all, with their names.
-        rate_hz: Frame rate; None: as the file says.
+        rate_hz: Frame rate; None: the file's.
         zeros_are_lost: Whether a point at exactly (0, 0, 0) was lost in that frame.
     """
 
@@ -56,7 +56,7 @@ def axes_matrix(axes: str) -> Floats:
     """Matrix from a file's axes to x forward, y left, z up. Shape (3, 3), a permutation with signs.
 
     Takes "z_up", "y_up", three directions ("right,up,forward") or text with them ("x right, y up, z forward").
-    A left-handed file is converted too. Raises DemonstrationError that tells what is taken.
+    A left-handed file is converted too. Raises DemonstrationError with the accepted values.
     """
     text = PRESETS.get(axes, axes)
     if text == axes:
@@ -75,15 +75,15 @@ def axes_matrix(axes: str) -> Floats:
 
 
 def converted(raw: RawTake, options: ImportOptions, file: Path) -> Take:
-    """A take in metres, x forward, y left, z up, with the wanted points.
+    """A take in metres, x forward, y left, z up, with the requested points.
 
     Raises DemonstrationError if the unit, the rate or a point is not known.
     """
     unit = options.unit or raw.unit
     if unit is None:
-        raise DemonstrationError(f"{file} does not tell its unit; give --unit {', '.join(METRES)}")
+        raise DemonstrationError(f"{file} does not define its unit; give --unit {', '.join(METRES)}")
     if unit not in METRES:
-        raise DemonstrationError(f"{file}: the unit is '{unit}'; give --unit {', '.join(METRES)} to say what it means")
+        raise DemonstrationError(f"{file}: the unit is '{unit}'; give --unit {', '.join(METRES)} to define it")
     matrix = axes_matrix(options.axes or raw.axes or "z_up") * METRES[unit]
     positions = raw.positions.copy()
     if options.zeros_are_lost:
@@ -95,9 +95,9 @@ def converted(raw: RawTake, options: ImportOptions, file: Path) -> Take:
 
 def _theta(theta: tuple[float, ...], names: tuple[str, ...], matrix: Floats) -> tuple[float, ...]:
     values = np.array(theta, dtype=np.float64)
-    place = place_of_theta(names)
-    if place is not None:
-        values[place] = matrix @ values[place]
+    position = place_of_theta(names)
+    if position is not None:
+        values[position] = matrix @ values[position]
     return tuple(values.tolist())
 
 
@@ -122,26 +122,26 @@ def _time(raw: RawTake, options: ImportOptions, file: Path) -> Floats:
 
 
 def chosen_points(
-    positions: Floats, names: Sequence[str], wanted: Mapping[str, tuple[str, ...]] | None, file: Path
+    positions: Floats, names: Sequence[str], requested: Mapping[str, tuple[str, ...]] | None, file: Path
 ) -> tuple[Floats, tuple[str, ...]]:
     """Body points out of a file's points: each the mean of one or several; lost where one of them is.
 
     A file's name may be given without what stands before its last ':' (`Anna:RWRA`). Raises DemonstrationError with
     the names there are.
     """
-    if wanted is None:
+    if requested is None:
         return positions, tuple(names)
     short = {name.rpartition(":")[2]: number for number, name in enumerate(names)}
     full = {name: number for number, name in enumerate(names)}
     columns = []
-    for point, sources in wanted.items():
+    for point, sources in requested.items():
         unknown = [source for source in sources if source not in full and source not in short]
         if unknown:
             hint = "".join(f"; did you mean '{one}'?" for one in closest(unknown[0], short))
             raise DemonstrationError(f"{file} has no point '{unknown[0]}' for {point}{hint} It has {', '.join(names)}")
         numbers = [full.get(source, short.get(source, 0)) for source in sources]
         columns.append(positions[:, numbers].mean(axis=1) if len(numbers) > 1 else positions[:, numbers[0]])
-    return np.stack(columns, axis=1), tuple(wanted)
+    return np.stack(columns, axis=1), tuple(requested)
 
 
 def _as_list(value: object) -> object:
@@ -161,16 +161,16 @@ class MappingFile(BaseModel):
 
 
 def read_mapping_file(path: Path) -> ImportOptions:
-    """Options of a mapping file; raises DemonstrationError with file:line:column of what is wrong."""
+    """Options of a mapping file; raises DemonstrationError with file:line:column of the fault."""
     document = read_document(path, "mapping file", DemonstrationError, "it has lines such as points: {index: RFIN}")
     try:
-        found = MappingFile.model_validate(document.data)
+        mapping = MappingFile.model_validate(document.data)
     except ValidationError as error:
         first = error.errors()[0]
         keys = tuple(str(part) for part in first["loc"])
         known = nearest(keys[-1], MappingFile.model_fields) if first["type"] == "extra_forbidden" else first["msg"]
         raise DemonstrationError(f"{document.position(keys)}: {'.'.join(keys)}: {known}") from error
-    if found.axes is not None:
-        axes_matrix(found.axes)
-    points = None if found.points is None else {name: tuple(sources) for name, sources in found.points.items()}
-    return ImportOptions(found.unit, found.axes, points, found.rate, found.zeros_are_lost)
+    if mapping.axes is not None:
+        axes_matrix(mapping.axes)
+    points = None if mapping.points is None else {name: tuple(sources) for name, sources in mapping.points.items()}
+    return ImportOptions(mapping.unit, mapping.axes, points, mapping.rate, mapping.zeros_are_lost)

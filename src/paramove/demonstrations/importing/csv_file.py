@@ -20,7 +20,7 @@ TIMES = {"time": 1.0, "time_s": 1.0, "t": 1.0, "time_ms": 1e-3, "time_ns": 1e-9,
 """Names of columns with times, and their unit in seconds."""
 PASSED_OVER = {"frame", "frames", "index", "sample"}
 LINE_LETTERS = 2**20
-"""Of a line; a longer one is cut, and refused for its number of cells."""
+"""Maximum length of a line; a longer one is cut, and rejected for its number of cells."""
 LOST = {"", "nan", "na", "null", "none", "-"}
 
 
@@ -71,24 +71,24 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 def _columns(path: Path, header: list[str]) -> tuple[int | None, dict[str, list[int]]]:
     """Column of the time, and the columns of x, y, z of each point."""
     time = next((number for number, name in enumerate(header) if name.lower() in TIMES), None)
-    found: dict[str, dict[str, int]] = {}
+    columns: dict[str, dict[str, int]] = {}
     for number, name in enumerate(header):
         if number == time or name.lower() in PASSED_OVER:
             continue
         parts = COLUMN.fullmatch(name)
-        if parts is None or parts[2].lower() in found.get(parts[1], {}):
+        if parts is None or parts[2].lower() in columns.get(parts[1], {}):
             raise DemonstrationError(
                 f"{path}:1: column {number + 1} is called '{name:.80}'; expected wrist_x, wrist_y, wrist_z, once for "
                 f"each point, and {', '.join(TIMES)} for times"
             )
-        found.setdefault(parts[1], {})[parts[2].lower()] = number
-    for point, axes in found.items():
+        columns.setdefault(parts[1], {})[parts[2].lower()] = number
+    for point, axes in columns.items():
         if len(axes) < 3:
             missing = ", ".join(f"{point}_{axis}" for axis in "xyz" if axis not in axes)
             raise DemonstrationError(f"{path}:1: {missing} is missing; a point has three columns")
-    if not found:
+    if not columns:
         raise DemonstrationError(f"{path}:1: no column of a point; expected such as wrist_x, wrist_y, wrist_z")
-    return time, {point: [axes[axis] for axis in "xyz"] for point, axes in found.items()}
+    return time, {point: [axes[axis] for axis in "xyz"] for point, axes in columns.items()}
 
 
 def _numbers(path: Path, line: int, header: list[str], row: list[str]) -> list[float]:

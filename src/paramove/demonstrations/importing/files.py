@@ -1,4 +1,4 @@
-"""One file of motion capture, of whatever kind, as takes for a demonstration set."""
+"""One file of motion capture, of any kind, as takes for a demonstration set."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SUFFIXES = (*READERS, ".npz")
 
 @dataclass(frozen=True)
 class Imported:
-    """What a file gave.
+    """The content of a file.
 
     Attributes:
         takes: In metres, x forward, y left, z up.
@@ -54,9 +54,9 @@ def import_file(
 
     Args:
         path: Of one of `SUFFIXES`.
-        options: What the file does not tell.
-        label: What a file without labels shows; its `end` may be 0 for the last frame. None: it is left unlabelled.
-        max_gap: s; a point may be lost for so long in a labelled movement.
+        options: Properties that the file does not define.
+        label: For a file without labels; its `end` may be 0 for the last frame. None: it is left unlabelled.
+        max_gap: s; maximum time for which a point may be lost in a labelled movement.
         name: Begin of the recordings' names; None: the file's.
         find: Body point; every movement of it gets the label, instead of the whole take.
 
@@ -71,41 +71,41 @@ def import_file(
         raws, remarks = READERS[suffix](path), []
     else:
         raise DemonstrationError(f"{path}: files of motion capture end in {', '.join(SUFFIXES)}")
-    takes, refused = [], []
+    takes, rejected = [], []
     for raw in raws:
         take = converted(raw, options, path)
         if name is not None:
             take = replace(take, recording=recording_name(name + raw.name.removeprefix(path.stem)))
         if not take.labels and label is not None:
             take = replace(take, labels=_labels(take, label, find, max_gap, path))
-        sound, said, wrong = _checked(take, path, max_gap)
-        takes.append(sound)
-        remarks += said
-        refused += wrong
-    return Imported(tuple(takes), raws[0].parameter_names, tuple(remarks), tuple(refused))
+        checked, new_remarks, new_rejected = _checked(take, path, max_gap)
+        takes.append(checked)
+        remarks += new_remarks
+        rejected += new_rejected
+    return Imported(tuple(takes), raws[0].parameter_names, tuple(remarks), tuple(rejected))
 
 
 def _labels(take: Take, label: Label, find: str | None, max_gap: float, path: Path) -> tuple[Label, ...]:
-    """The label for the whole take, or for each movement that is found in it."""
+    """The label for the whole take, or for each movement that is detected in it."""
     if find is None:
         return (replace(label, end=label.end or len(take.time)),)
     try:
-        found = movements_by_speed(take.time, take.positions, take.point_names, find, max_gap)
+        movements = movements_by_speed(take.time, take.positions, take.point_names, find, max_gap)
     except DemonstrationError as error:
         raise DemonstrationError(f"{path}: {error}") from error
-    if not found:
+    if not movements:
         raise DemonstrationError(f"{path}: {find} never exceeds 15 cm/s; is the unit right?")
-    return tuple(replace(label, first=first, end=end) for first, end in found)
+    return tuple(replace(label, first=first, end=end) for first, end in movements)
 
 
 def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], list[str]]:
-    """The take with the labels of those movements in which no point is lost for too long; remarks; refusals."""
+    """The take with the labels of those movements in which no point is lost for too long; remarks; rejected ones."""
     _, filled, left = fill_gaps(take.time, take.positions, take.point_names, max_gap)
-    labels, remarks, refused = [], [], []
+    labels, remarks, rejected = [], [], []
     for label in take.labels:
         what = f"{path}: {label.action}, frames {label.first}-{label.end - 1}"
         if not 0 <= label.first < label.end - 1 <= len(take.time) - 1:
-            refused.append(f"{what}: the file has frames 0-{len(take.time) - 1}, and a movement has at least 2")
+            rejected.append(f"{what}: the file has frames 0-{len(take.time) - 1}, and a movement has at least 2")
             continue
         open_gaps = [gap for gap in left if gap.end > label.first and gap.first < label.end]
         shut = [gap for gap in filled if gap.end > label.first and gap.first < label.end]
@@ -113,18 +113,18 @@ def _checked(take: Take, path: Path, max_gap: float) -> tuple[Take, list[str], l
             gaps = "; ".join(map(str, open_gaps[:4])) + _more(len(open_gaps) - 4)
             always = [gap.point for gap in open_gaps if gap.end - gap.first == len(take.time)]
             hint = (
-                f" {', '.join(always)} is never seen: is it (0, 0, 0) on purpose (--zeros-are-places)?"
+                f" {', '.join(always)} is lost in all frames: is it (0, 0, 0) on purpose (--zeros-are-places)?"
                 if always
                 else ""
             )
-            refused.append(f"{what}: lost for longer than {max_gap:g} s: {gaps}.{hint}")
+            rejected.append(f"{what}: lost for longer than {max_gap:g} s: {gaps}.{hint}")
             continue
         if shut:
             remarks.append(f"{what}: filled {'; '.join(map(str, shut[:4]))}{_more(len(shut) - 4)}")
         labels.append(label)
     if not np.isfinite(take.positions).any():
-        refused.append(f"{path}: no point is seen in any frame")
-    return replace(take, labels=tuple(labels)), remarks, refused
+        rejected.append(f"{path}: all points are lost in all frames")
+    return replace(take, labels=tuple(labels)), remarks, rejected
 
 
 def _more(count: int) -> str:

@@ -72,7 +72,7 @@ def _many(path: Path, arrays: Arrays) -> tuple[list[RawTake], list[str]]:
         else:
             inside = slice(int(offsets[number]), int(offsets[number + 1]))
             takes.append(_take(path, arrays, number, flat[inside], names))
-    remarks = [f"{path}: left out as the file says: movements {', '.join(left_out)}"] if left_out else []
+    remarks = [f"{path}: left out because the file marks them: movements {', '.join(left_out)}"] if left_out else []
     if without:
         remarks.append(f"{path}: left out {without} movements that have no target")
     if not takes:

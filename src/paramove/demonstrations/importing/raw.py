@@ -1,4 +1,4 @@
-"""What a file of motion capture holds, in its own unit, axes and names."""
+"""The content of a file of motion capture, in its own unit, axes and names."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ class RawTake:
 
     Attributes:
         name: For the recording that it becomes a part of.
-        time: Shape (T,), s; None if the file tells neither times nor a rate.
+        time: Shape (T,), s; None if the file has neither times nor a rate.
         positions: Shape (T, P, 3), in the file's unit and axes; NaN where a point was lost.
         point_names: Of the P points, as the file has them.
-        unit: "m", "cm", "mm"; None if the file does not tell.
-        axes: Directions of x, y, z as `conversion.axes_matrix` takes them; None if the file does not tell.
-        labels: What the file says about movements; places in theta are in the file's unit and axes.
+        unit: "m", "cm", "mm"; None if the file does not define it.
+        axes: Directions of x, y, z as `conversion.axes_matrix` takes them; None if the file does not define it.
+        labels: The file's labels of movements; positions in theta are in the file's unit and axes.
         parameter_names: Of theta.
     """
 

@@ -1,11 +1,11 @@
-"""A person's reaching as progress along an arm's own way, deviation from it and opening of the hand."""
+"""A person's reaching as progress along an arm's own path, deviation from it and opening of the hand."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from paramove.motion.learned_way import AHEAD, LearnedWay, PlacedPerson
+from paramove.motion.learned_path import AHEAD, LearnedPath, PlacedPerson
 from tests.motion.reaching import movement
 
 AXIS = (0.012, 0.0)
@@ -16,15 +16,15 @@ def person() -> PlacedPerson:
     return PlacedPerson(movement(), MIDDLE, AXIS, 40)
 
 
-def way() -> LearnedWay:
+def way() -> LearnedPath:
     return person().approach(MIDDLE)
 
 
 def test_goes_from_the_beginning_to_the_end_beside_a_straight_line() -> None:
     learned = way()
     np.testing.assert_allclose(learned.progress[[0, -1]], [0.0, 1.0], rtol=0, atol=1e-9)
-    np.testing.assert_allclose(learned.beside[[0, -1]], 0.0, rtol=0, atol=1e-9)
-    assert np.linalg.norm(learned.beside, axis=1).max() > 0.02
+    np.testing.assert_allclose(learned.deviation[[0, -1]], 0.0, rtol=0, atol=1e-9)
+    assert np.linalg.norm(learned.deviation, axis=1).max() > 0.02
     assert learned.opening.min() >= 0.0
     assert learned.opening.max() <= 1.0
 
@@ -32,7 +32,7 @@ def test_goes_from_the_beginning_to_the_end_beside_a_straight_line() -> None:
 def test_of_a_reach_that_was_not_moved_it_is_the_movement_itself() -> None:
     """About an axis far away an arc is straight, so all that is left is the smoothing of the states."""
     states, opening = movement().approach(movement().centre)
-    learned = LearnedWay.of(states, opening, len(states))
+    learned = LearnedPath.of(states, opening, len(states))
     back = learned.between(states.gripper[0], states.gripper[-1], (-1e5, 0.0))
     gaps = np.linalg.norm(back[:, None] - states.gripper[None], axis=-1)
     assert gaps.min(axis=0).mean() < 0.008
@@ -52,16 +52,16 @@ def test_between_two_points_it_turns_about_the_axis() -> None:
 def test_a_shorter_way_deviates_less_in_proportion() -> None:
     learned = way()
     far = np.array([0.2, 0.0, 0.0]) + np.array([0.0, 0.0, 1.0]) * learned.length
-    for share in (1.0, 0.5):
-        end = np.array([0.2, 0.0, 0.0]) + share * (far - [0.2, 0.0, 0.0])
-        beside = learned.between(np.array([0.2, 0.0, 0.0]), end, AXIS) - learned.milder(0.0).between(
+    for fraction in (1.0, 0.5):
+        end = np.array([0.2, 0.0, 0.0]) + fraction * (far - [0.2, 0.0, 0.0])
+        deviation = learned.between(np.array([0.2, 0.0, 0.0]), end, AXIS) - learned.milder(0.0).between(
             np.array([0.2, 0.0, 0.0]), end, AXIS
         )
-        np.testing.assert_allclose(beside[:, :2], share * learned.beside[:, :2], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(deviation[:, :2], fraction * learned.deviation[:, :2], rtol=0, atol=1e-9)
 
 
 def test_raised_is_higher_in_the_middle_only() -> None:
-    lifted = way().raised(0.05).beside - way().beside
+    lifted = way().raised(0.05).deviation - way().deviation
     np.testing.assert_allclose(lifted[[0, -1]], 0.0, rtol=0, atol=1e-12)
     assert lifted[:, 2].max() == pytest.approx(0.05, rel=0.02)
 
@@ -76,7 +76,7 @@ def test_the_person_turns_towards_what_lies_far_aside() -> None:
         np.testing.assert_allclose(other.progress, ways[0].progress, rtol=0, atol=1e-9)
         cosine, sine = np.cos(turn), np.sin(turn)
         rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        np.testing.assert_allclose(other.beside, ways[0].beside @ rotation.T, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(other.deviation, ways[0].deviation @ rotation.T, rtol=0, atol=1e-9)
 
 
 def test_the_middle_of_the_training_lies_where_it_was_placed() -> None:

@@ -1,7 +1,7 @@
-"""A person's reaching as the way that a servo arm's hand takes: how far along and how far beside it is at each time.
+"""A person's reaching as a path for a servo arm's hand: its progress along a line and its deviation at each time.
 
-A small arm on a table does not begin where a person's hand does, and it turns about one upright axis. So the way from
-its hand to the target is its own, an arc about that axis, and the person's are the progress along the way, the
+A small arm on a table does not begin where a person's hand does, and it turns about one upright axis. So it
+takes its own path from its hand to the target, an arc about that axis; the person gives the progress along it, the
 deviation from it (the height of the arch above all), and the opening of the hand.
 """
 
@@ -18,31 +18,31 @@ from paramove.motion.reaching_movement import ArmPoses, ReachingMovement
 from paramove.motion.timing import minimum_jerk, smoothed
 
 AHEAD = np.deg2rad(45.0)
-"""Up to here a target lies before the person; where it lies further aside, the person is turned towards it."""
+"""Maximum azimuth of a target in front of the person; the person is turned towards targets further aside."""
 SMOOTHING = 4.0
-"""Points of a way over which it is smoothed: the states of a model are means of few frames each."""
+"""Number of points of a path over which it is smoothed: the states of a model are means of few frames each."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class LearnedWay:
+class LearnedPath:
     """N states of a movement from its beginning to its end.
 
     Attributes:
         progress: Along the straight line from the beginning to the end, [N], from 0 to 1.
-        beside: From that line, [N, 3], m, 0 at both ends.
+        deviation: From that line, [N, 3], m, 0 at both ends.
         length: Of the line, m.
         opening: Of the hand, ξ, 1 open, [N].
     """
 
     progress: Floats
-    beside: Floats
+    deviation: Floats
     length: float
     opening: Floats
 
     @classmethod
     def of(cls, states: ArmPoses, opening: Floats, points: int) -> Self:
-        """The way of the gripper, resampled to so many points."""
+        """The path of the gripper, resampled to `points` points."""
         at = np.linspace(0.0, 1.0, len(states))
         columns = np.concatenate([states.gripper, opening[:, None]], axis=1)
         values = smoothed(CubicSpline(at, columns, axis=0)(np.linspace(0.0, 1.0, points)), SMOOTHING)
@@ -50,41 +50,41 @@ class LearnedWay:
         line = gripper[-1] - gripper[0]
         length = float(np.linalg.norm(line))
         progress = (gripper - gripper[0]) @ line / length**2
-        beside = gripper - gripper[0] - progress[:, None] * line
-        return cls(progress, beside, length, np.clip(values[:, 3], 0.0, 1.0))
+        deviation = gripper - gripper[0] - progress[:, None] * line
+        return cls(progress, deviation, length, np.clip(values[:, 3], 0.0, 1.0))
 
-    def milder(self, share: float) -> Self:
-        """The same with a share of what the person does; the rest is straight and evenly timed."""
+    def milder(self, fraction: float) -> Self:
+        """The same with a fraction of the person's deviation and timing; the rest is straight and evenly timed."""
         even = minimum_jerk(np.linspace(0.0, 1.0, len(self.progress)))
-        progress = even + share * (self.progress - even)
-        return replace(self, progress=progress, beside=share * self.beside)
+        progress = even + fraction * (self.progress - even)
+        return replace(self, progress=progress, deviation=fraction * self.deviation)
 
     def raised(self, height: float) -> Self:
         """The same with an arch of this height, m, on top."""
         u = np.linspace(0.0, 1.0, len(self.progress))
-        return replace(self, beside=self.beside + (16.0 * height * u**2 * (1.0 - u) ** 2)[:, None] * _UP)
+        return replace(self, deviation=self.deviation + (16.0 * height * u**2 * (1.0 - u) ** 2)[:, None] * _UP)
 
     def between(self, start: Floats, end: Floats, axis: tuple[float, float]) -> Floats:
-        """The way from a point [3] to another about an upright axis (x, y), [N, 3]; without the region behind it.
+        """The path from a point [3] to another about an upright axis (x, y), [N, 3]; without the region behind it.
 
-        A way that is shorter than the person's deviates less, in proportion.
+        A path that is shorter than the person's deviates less, in proportion.
         """
         about = np.array([*axis, 0.0])
         ends = [_cylindrical(point - about) for point in (start, end)]
         radius, azimuth, height = (ends[0] + self.progress[:, None] * (ends[1] - ends[0])).T
-        way = about + np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=1)
-        share = min(1.0, float(np.linalg.norm(end - start)) / self.length)
-        return np.asarray(way + share * self.beside)
+        path = about + np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=1)
+        fraction = min(1.0, float(np.linalg.norm(end - start)) / self.length)
+        return np.asarray(path + fraction * self.deviation)
 
 
 class PlacedPerson:
-    """A person, as small as the arm, who sits at its table so that the trained targets lie before the arm.
+    """A person, as small as the arm, who sits at its table so that the trained targets lie in front of the arm.
 
     Args:
         movement: Converted to the length of the arm.
-        middle: Where the middle of the trained targets lies, [3], frame of the base, m.
+        middle: Position of the middle of the trained targets, [3], frame of the base, m.
         axis: Upright axis of the arm, x and y, m.
-        points: Of the ways.
+        points: Number of points of the paths.
     """
 
     def __init__(self, movement: ReachingMovement, middle: Floats, axis: tuple[float, float], points: int) -> None:
@@ -92,30 +92,30 @@ class PlacedPerson:
         self._shoulder = middle - movement.centre
         self._axis = np.array([*axis, 0.0])
 
-    def approach(self, target: Floats) -> LearnedWay:
+    def approach(self, target: Floats) -> LearnedPath:
         """To a target [3], frame of the base, m."""
-        turn, seen = self._seen(target)
-        return self._turned(turn, *self._movement.approach(seen))
+        turn, from_shoulder = self._relative(target)
+        return self._turned(turn, *self._movement.approach(from_shoulder))
 
-    def retreat(self, target: Floats) -> LearnedWay:
+    def retreat(self, target: Floats) -> LearnedPath:
         """Back from a target."""
-        turn, seen = self._seen(target)
-        return self._turned(turn, *self._movement.retreat(seen))
+        turn, from_shoulder = self._relative(target)
+        return self._turned(turn, *self._movement.retreat(from_shoulder))
 
     def within_training(self, target: Floats) -> bool | None:
         """Whether a target lies between the demonstrated ones."""
-        return self._movement.within_training(self._seen(target)[1])
+        return self._movement.within_training(self._relative(target)[1])
 
-    def _seen(self, target: Floats) -> tuple[float, Floats]:
-        """By how much the person is turned, and the target from the shoulder."""
+    def _relative(self, target: Floats) -> tuple[float, Floats]:
+        """The angle by which the person is turned, and the target relative to the shoulder."""
         x, y, _ = target - self._axis
         azimuth = float(np.arctan2(y, x))
         turn = azimuth - float(np.clip(azimuth, -AHEAD, AHEAD))
         return turn, _rotation(-turn) @ (target - self._axis) + self._axis - self._shoulder
 
-    def _turned(self, turn: float, states: ArmPoses, opening: Floats) -> LearnedWay:
-        way = LearnedWay.of(states, opening, self._points)
-        return replace(way, beside=way.beside @ _rotation(turn).T)
+    def _turned(self, turn: float, states: ArmPoses, opening: Floats) -> LearnedPath:
+        path = LearnedPath.of(states, opening, self._points)
+        return replace(path, deviation=path.deviation @ _rotation(turn).T)
 
 
 def _cylindrical(point: Floats) -> Floats:
