@@ -98,7 +98,7 @@ def test_another_connection_needs_an_overlay_that_says_what_it_is(folder):
     assert parameters(load(folder, "arm", ["real"], ["camera.port=/dev/two"]))["port"] == "/dev/two"
     assert parameters(load(folder, "arm", None, ["camera.rate_hz=3"]))["port"] == "/dev/one"
     (folder / "wrong.yaml").write_text(f"connections: [camer.port]\n{GOOD}")
-    with pytest.raises(DocumentError, match=r"'camer\.port' is no node\.parameter; did you mean 'camera'"):
+    with pytest.raises(DocumentError, match=r"'camer\.port' is not a node\.parameter; did you mean 'camera'"):
         load(folder, "wrong")
 
 
@@ -113,7 +113,7 @@ def test_seed_without_a_taker_is_refused(folder):
     [
         ("camera", "expected node.parameter=value"),
         ("camera=3", "expected node.parameter=value"),
-        ("camer.rate_hz=3", "there is no node 'camer'; did you mean 'camera'?"),
+        ("camer.rate_hz=3", "there is not a node 'camer'; did you mean 'camera'?"),
         ("camera.rate_hz=!!python/name:os.system", "tag .* is refused"),
         ("camera.rate_hz=[1", "it ends before a ']'"),
     ],
