@@ -113,7 +113,7 @@ def test_seed_without_a_taker_is_refused(folder):
     [
         ("camera", "expected node.parameter=value"),
         ("camera=3", "expected node.parameter=value"),
-        ("camer.rate_hz=3", "there is not a node 'camer'; did you mean 'camera'?"),
+        ("camer.rate_hz=3", "there is no node 'camer'; did you mean 'camera'?"),
         ("camera.rate_hz=!!python/name:os.system", "tag .* is refused"),
         ("camera.rate_hz=[1", "it ends before a ']'"),
     ],

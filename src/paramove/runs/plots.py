@@ -92,7 +92,7 @@ def _gestures(evaluation: RunEvaluation, axes: Axes) -> None:
     }
     heights = {name: 0.25 + 0.25 * place for place, name in enumerate(sorted(evaluation.run.truth.objects))}
     for kind, (mark, words) in marks.items():
-        said = [r.message for r in evaluation.run.heard(topics.GESTURES) if r.message.kind == kind]
+        said = [r.message for r in evaluation.run.received(topics.GESTURES) if r.message.kind == kind]
         known = [m for m in said if m.object in heights]
         axes.scatter(
             [m.captured.ToNanoseconds() * 1e-9 for m in known],
@@ -114,7 +114,7 @@ def plan(evaluation: RunEvaluation, figure: Figure) -> None:
     radius = 100 * truth.layout.openings[0].radius if truth.layout.openings else 0.0
     for place in truth.openings.values():
         axes.add_patch(Circle((100 * place[1], 100 * place[0]), radius, fill=False, ec=OTHER, lw=1.2))
-    said = run.heard(topics.CALIBRATION_PLANE)
+    said = run.received(topics.CALIBRATION_PLANE)
     corners = said[-1].message.correspondences if said else ()
     axes.plot([100 * c.y for c in corners], [100 * c.x for c in corners], "+", c="black", ms=9, label="corners placed")
     for rule in evaluation.rules:
@@ -201,7 +201,7 @@ def motion(evaluation: RunEvaluation, figure: Figure) -> None:
 
 def _joints(evaluation: RunEvaluation, axes: Axes) -> None:
     arm = evaluation.robot.arms["right"]
-    said = evaluation.run.heard(topics.ARM_JOINT_STATES)[::THINNING]
+    said = evaluation.run.received(topics.ARM_JOINT_STATES)[::THINNING]
     names = (*arm.joints, arm.fingers)
     angles = np.full((len(said), len(names)), np.nan)
     for row, recorded in enumerate(said):

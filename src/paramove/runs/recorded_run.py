@@ -105,7 +105,7 @@ class RecordedRun:
 
     Attributes:
         folder: Of the run.
-        said: Topic name -> messages in order; without those of `HEAVY`.
+        published: Topic name -> messages in order; without those of `HEAVY`.
         traffic: Counts of every recorded topic.
         truth: What really happened.
         verdict: Of `truth.json`.
@@ -116,7 +116,7 @@ class RecordedRun:
     """
 
     folder: Path
-    said: dict[str, list[Recorded]]
+    published: dict[str, list[Recorded]]
     traffic: Traffic
     truth: Truth
     verdict: dict[str, Any]
@@ -125,9 +125,9 @@ class RecordedRun:
     done: bool = False
     gaps: tuple[RecordingGap, ...] = ()
 
-    def heard(self, topic: topics.Topic) -> list[Recorded]:
+    def received(self, topic: topics.Topic) -> list[Recorded]:
         """Messages of a topic, in order."""
-        return self.said.get(topic.name, [])
+        return self.published.get(topic.name, [])
 
 
 def load_run(folder: Path) -> RecordedRun:
@@ -147,7 +147,7 @@ def load_run(folder: Path) -> RecordedRun:
     truth = _read_truth(truth_file, end_ns)
     return RecordedRun(
         folder=folder,
-        said=kept,
+        published=kept,
         traffic=traffic,
         truth=truth,
         verdict=_read_json(folder / "truth.json"),
@@ -187,7 +187,7 @@ def recording_in(folder: Path, name: str) -> PartedRecording:
 
 
 def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded]], Traffic]:
-    said: dict[str, list[Recorded]] = defaultdict(list)
+    published: dict[str, list[Recorded]] = defaultdict(list)
     traffic = Traffic()
     for recorded in recording.read():
         traffic.take(recorded)

@@ -106,7 +106,7 @@ class Motion:
 def stages_of(run: RecordedRun) -> list[dict[str, Any]]:
     """Stages in order: name, begin_s, end_s."""
     found: list[dict[str, Any]] = []
-    for recorded in run.heard(topics.APPLICATION_STAGE):
+    for recorded in run.received(topics.APPLICATION_STAGE):
         name = ApplicationStage.Stage.Name(recorded.message.stage).removeprefix("STAGE_").lower()
         if not found or found[-1]["stage"] != name:
             if found:
@@ -120,10 +120,10 @@ def relocations_of(run: RecordedRun) -> list[Relocation]:
     stages = stages_of(run)
     begins = [stage["begin_s"] for stage in stages]
     statuses: dict[str, list[Any]] = {}
-    for recorded in run.heard(topics.RELOCATION_STATUS):
+    for recorded in run.received(topics.RELOCATION_STATUS):
         statuses.setdefault(recorded.message.goal_id, []).append(recorded)
     found: dict[str, Relocation] = {}
-    for recorded in run.heard(topics.RELOCATION_GOAL):
+    for recorded in run.received(topics.RELOCATION_GOAL):
         goal, begun_s = recorded.message, recorded.publish_ns * 1e-9
         if goal.id not in found:
             # A goal said with a stage's last breath belongs to that stage: a stage never begins with a fetch.
@@ -158,7 +158,7 @@ def _hull_of(statuses: list[Any], name: str) -> str | None:
 def motions_of(run: RecordedRun) -> list[Motion]:
     """Every trajectory that was begun, in order."""
     progress: dict[str, list[tuple[float, float]]] = {}
-    for recorded in run.heard(topics.ARM_TRAJECTORY_STATUS):
+    for recorded in run.received(topics.ARM_TRAJECTORY_STATUS):
         status = recorded.message
         if status.state == TrajectoryStatus.STATE_EXECUTING and status.time_s > 0:
             at_s = status.captured.ToNanoseconds() * 1e-9
@@ -167,7 +167,7 @@ def motions_of(run: RecordedRun) -> list[Motion]:
             begun_s = progress[status.trajectory_id][0][0] - progress[status.trajectory_id][0][1]
             progress[status.trajectory_id].append((begun_s + status.duration_s, status.duration_s))
     found: dict[str, Motion] = {}
-    for recorded in run.heard(topics.ARM_TRAJECTORY):
+    for recorded in run.received(topics.ARM_TRAJECTORY):
         message = recorded.message
         if message.id in found or message.id not in progress:
             continue

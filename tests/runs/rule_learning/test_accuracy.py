@@ -40,7 +40,7 @@ def test_only_standing_objects_count_as_seen_at_rest(evaluated):
 
 def test_run_without_calibration_has_no_errors(evaluated):
     run = evaluated().run
-    run.said.pop("calibration/plane")
+    run.published.pop("calibration/plane")
     assert accuracy_of(run)["grid_mm"] == {"median": None, "max": None, "samples": 0, "p95": None}
 
 

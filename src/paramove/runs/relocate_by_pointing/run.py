@@ -96,7 +96,7 @@ def pointed_relocations_of(run: RecordedRun) -> list[PointedRelocation]:
     arrivals = _arrivals(run)
     gestures = [
         (recorded.publish_ns * 1e-9, recorded.message)
-        for recorded in run.heard(topics.GESTURES)
+        for recorded in run.received(topics.GESTURES)
         if recorded.message.kind == Gesture.KIND_POINTED_AT
     ]
     goals = [
@@ -109,7 +109,7 @@ def pointed_relocations_of(run: RecordedRun) -> list[PointedRelocation]:
 
 def summary_of(run: RecordedRun, relocations: list[PointedRelocation]) -> dict[str, Any]:
     """All numbers of a run, as plain JSON."""
-    speech = [recorded.message for recorded in run.heard(topics.SPEECH)]
+    speech = [recorded.message for recorded in run.received(topics.SPEECH)]
     asked = sum(one.request == Speech.REQUEST_POINT_AT_PLACE for one in speech)
     goals = relocations_of(run)
     errors = np.array([one.error for one in relocations if np.isfinite(one.error)])

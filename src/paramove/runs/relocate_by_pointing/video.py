@@ -44,8 +44,8 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     views = sum(1 for _ in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_VIEW.name}))
     if not views:
         return None
-    words = [(r.publish_ns, r.message.sentence) for r in run.heard(topics.SPEECH)]
-    states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.heard(topics.APPLICATION_STAGE)]
+    words = [(r.publish_ns, r.message.sentence) for r in run.received(topics.SPEECH)]
+    states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.received(topics.APPLICATION_STAGE)]
     path = run.folder / "relocations.mp4"
     title = f"relocation by pointing, seed {run.truth.layout.seed}"
     with replacing(path) as unfinished, VideoWriter(unfinished, SIZE, FRAMES_PER_S) as writer:

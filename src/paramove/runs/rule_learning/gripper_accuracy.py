@@ -59,7 +59,7 @@ class CommandedGripper:
 
     def __init__(self, run: RecordedRun, robot: RobotDescription, side: str = "right") -> None:
         arm = robot.arm(side)
-        states = [r for r in run.heard(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
+        states = [r for r in run.received(topics.WIRE_HOAP3_STATE) if len(r.message.target_counts) == robot.n_joints]
         self.time_s = np.array([r.message.captured.ToNanoseconds() for r in states]) * 1e-9
         counts = np.array([list(r.message.target_counts) for r in states]).reshape(-1, robot.n_joints)
         self.angles = robot.units.to_radians(counts)[:, arm.indices]

@@ -82,7 +82,7 @@ def grid_error(run: RecordedRun) -> MappedPoints | None:
 
 def calibration_of(run: RecordedRun) -> PlaneHomography | None:
     """The latest homography that the robot published."""
-    said = run.heard(topics.CALIBRATION_PLANE)
+    said = run.received(topics.CALIBRATION_PLANE)
     return PlaneHomography.from_message(said[-1].message) if said else None
 
 
@@ -90,7 +90,7 @@ def seen_at_rest(run: RecordedRun) -> list[SeenAtRest]:
     """Objects said to have appeared or come to rest that truly stood upright on the surface then."""
     truth = run.truth
     found = []
-    for recorded in run.heard(topics.GESTURES):
+    for recorded in run.received(topics.GESTURES):
         gesture = recorded.message
         if gesture.kind not in _AT_REST or not gesture.located or gesture.object not in truth.objects:
             continue

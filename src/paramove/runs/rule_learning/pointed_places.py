@@ -67,11 +67,11 @@ def pointed_places(run: RecordedRun) -> list[PointedPlace]:
 
     Without tracking in action space there is nothing.
     """
-    if not run.heard(topics.ACTION_ESTIMATE):
+    if not run.received(topics.ACTION_ESTIMATE):
         return []
     said = [
         recorded.message
-        for recorded in run.heard(topics.GESTURES)
+        for recorded in run.received(topics.GESTURES)
         if recorded.message.kind == Gesture.KIND_POINTED_AT and recorded.message.located and not recorded.message.object
     ]
     found = []

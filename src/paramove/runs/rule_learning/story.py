@@ -74,7 +74,7 @@ class Story:
 
     def __init__(self, run: RecordedRun, relocations: list[Relocation]) -> None:
         self._said = {
-            topic: _Latest(run.heard(topic))
+            topic: _Latest(run.received(topic))
             for topic in (
                 topics.APPLICATION_STAGE,
                 topics.SPEECH,
@@ -85,7 +85,7 @@ class Story:
             )
         }
         # What is drawn onto an image belongs to the time at which the image was taken.
-        tracked = run.heard(topics.OBJECTS_TRACKED)
+        tracked = run.received(topics.OBJECTS_TRACKED)
         self._said[topics.OBJECTS_TRACKED] = _Latest(tracked, [recorded.log_ns for recorded in tracked])
         self._relocations = relocations
 

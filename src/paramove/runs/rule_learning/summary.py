@@ -86,7 +86,7 @@ class RunEvaluation:
     @cached_property
     def rules(self) -> list[dict[str, Any]]:
         """What the robot believes in the end, beside the truth; one entry for each object that has an opening."""
-        said = self.run.heard(topics.RULES)
+        said = self.run.received(topics.RULES)
         believed = {rule.object: rule for rule in said[-1].message.rules} if said else {}
         truth = self.run.truth
         radius = min((float(o.radius) for o in truth.layout.openings), default=0.0)
@@ -138,7 +138,7 @@ class RunEvaluation:
                     "request": Speech.Request.Name(recorded.message.request).removeprefix("REQUEST_").lower(),
                     "sentence": recorded.message.sentence,
                 }
-                for recorded in run.heard(topics.SPEECH)
+                for recorded in run.received(topics.SPEECH)
             ],
             "topic_rates": run.traffic.rates(speakers(run.folder / "launch.yaml", self.workspace)),
             "loss": run.traffic.loss(),
@@ -211,7 +211,9 @@ class RunEvaluation:
 
     def _wall(self) -> dict[str, Any]:
         facts, verdict = self.run.facts, self.run.verdict
-        latest = {name: messages[-1].message for name, messages in self.run.said.items() if name.startswith("status/")}
+        latest = {
+            name: messages[-1].message for name, messages in self.run.published.items() if name.startswith("status/")
+        }
         return {
             "realtime_factor": verdict.get("realtime_factor"),
             "seconds": verdict.get("wall_s"),
