@@ -192,10 +192,10 @@ def _read_recording(recording: PartedRecording) -> tuple[dict[str, list[Recorded
     for recorded in recording.read():
         traffic.take(recorded)
         if recorded.topic not in HEAVY:
-            said[recorded.topic].append(recorded)
-    if not said:
+            published[recorded.topic].append(recorded)
+    if not published:
         raise RunFolderError(f"{_names(recording)} holds no message")
-    return dict(said), traffic
+    return dict(published), traffic
 
 
 def _end_of(said: dict[str, list[Recorded]], traffic: Traffic) -> tuple[int, bool]:
