@@ -78,7 +78,7 @@ def test_two_cameras_in_one_frame(folders, tmp_path):
     assert "left: 640 x 480 px, 11 views of 12 images" in done.stdout
     assert "px (good)" in done.stdout
     assert "to do better: 11 views were used; take 15 or more" in done.stdout
-    assert "together: a point on the board that all see is told to ±" in done.stdout
+    assert "a point on the board that all see ±" in done.stdout
     assert "cameras.yaml: 2 cameras in the frame 'table'" in done.stdout
     for found, eye in zip(read_cameras(out), EYES.values(), strict=True):
         assert (found.name, found.width_px, found.height_px) == (eye.name, 640, 480)

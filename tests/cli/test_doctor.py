@@ -77,7 +77,7 @@ def test_what_cannot_be_mended_is_told(emulator, here, monkeypatch):
 
     monkeypatch.setattr("paramove.diagnosis.serial_ports._hasten", refuse)
     done = call("doctor", "--only", "serial", "--by-id", here / "by-id", "--fix", "--yes")
-    assert "usb latency: not mended: no mode of low latency" in done.output
+    assert "usb latency: not fixed: no mode of low latency" in done.output
 
 
 def test_json_cannot_ask():

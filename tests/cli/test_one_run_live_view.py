@@ -47,7 +47,7 @@ def test_the_link_is_told_once_and_no_browser_opens_without_a_display(tmp_path, 
     view = live_view.AnnouncingView(shown, tmp_path)
     view.refresh([])
     assert shown.stories == []
-    file = LinkFile.kept_or_new(tmp_path, 4711)
+    file = LinkFile.stored_or_new(tmp_path, 4711)
     file.write()
     view.refresh([])
     view.refresh([])

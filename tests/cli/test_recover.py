@@ -30,9 +30,9 @@ def test_it_says_what_was_kept(killed):
     done = run(killed)
     assert done.exit_code == 0, done.output
     kept = len(list(read(killed)))
-    assert f"run.mcap: kept {kept} messages" in done.stdout
+    assert f"run.mcap: recovered {kept} messages" in done.stdout
     last = list(read(killed))[-1]
-    assert f"not known: what came after the message of {last.log_ns * 1e-9:.3f} s" in done.stdout
+    assert f"unknown: whether messages followed that of {last.log_ns * 1e-9:.3f} s" in done.stdout
     assert "never finished" in done.stdout
     assert len(list(read(killed.with_name("run.mcap")))) == kept
     again = run(killed)

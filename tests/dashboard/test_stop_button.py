@@ -37,7 +37,7 @@ def test_not_pressed_says_nothing() -> None:
         rig.button.look(SECOND)
     rig.gate(SafetyState.STATE_HOLD, "jump", SECOND)
     assert rig.said == []
-    assert rig.button.progress is Progress.NOT_ASKED
+    assert rig.button.progress is Progress.NOT_REQUESTED
     assert not rig.button.is_over(100 * SECOND)
 
 
@@ -63,7 +63,7 @@ def test_another_fault_is_no_confirmation() -> None:
     rig.pressed = True
     rig.button.look(SECOND)
     rig.gate(SafetyState.STATE_HOLD, "jump", SECOND)
-    assert rig.button.progress is Progress.ASKED
+    assert rig.button.progress is Progress.REQUESTED
 
 
 @pytest.mark.parametrize("state", [SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP])

@@ -191,7 +191,7 @@ def test_where_it_goes() -> None:
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
-    [(b"", "is empty"), (b"\x89MCAP0\r\n", "no message that can be read"), (b"text\n" * 99, "no message")],
+    [(b"", "is empty"), (b"\x89MCAP0\r\n", "no readable message"), (b"text\n" * 99, "no readable message")],
 )
 def test_what_holds_nothing_is_refused_and_nothing_is_written(tmp_path: Path, content: bytes, sentence: str) -> None:
     source = tmp_path / "run.mcap.part"

@@ -47,7 +47,7 @@ def test_node_is_stopped_and_started_and_the_run_goes_on(workspace, launcher):
     assert (row["state"], row["pid"], row["last_end"]) == ("stopped", None, "was stopped by hand")
     again = node("stop", "camera")
     assert again.exit_code == 1
-    assert again.output == "camera does not run (stopped)\n"
+    assert again.output == "camera is not running (stopped)\n"
     done = node("start", "camera")
     assert done.output == "camera is ready: all set\n"
     row = rows()["camera"]
@@ -80,7 +80,7 @@ def test_list_keeps_the_reason_of_an_end(workspace, launcher):
     [
         (("restart", "camra"), "there is no node 'camra'; did you mean 'camera'?"),
         (("stop", "lamp"), "there is no node 'lamp'; there are: arm, camera, main"),
-        (("start", "camera"), "camera runs already (ready)"),
+        (("start", "camera"), "camera is already running (ready)"),
         (("restart", "main"), "main cannot continue in a new process (restart: never in the launch file); end the run"),
     ],
 )
@@ -154,5 +154,5 @@ def test_socket_is_private_and_gone_afterwards(workspace):
     folder = Path(os.environ["XDG_RUNTIME_DIR"])
     with ControlServer(folder, lambda _: {}):
         assert (folder / "control").stat().st_mode & 0o777 == 0o600
-    with pytest.raises(NoRunError, match="start it with `paramove launch`"):
+    with pytest.raises(NoRunError, match="start one with `paramove launch`"):
         ask(folder, {"do": "list"})

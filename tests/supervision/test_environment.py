@@ -100,7 +100,7 @@ def test_a_module_that_hides_another_is_named(environment, tmp_path, made):
     (told,) = environment(PYTHONPATH=f"/no/such{os.pathsep}{tmp_path}").notes
     hidden = made.partition("/")[0]
     assert told.startswith(str(tmp_path / hidden))
-    assert f"hides the module {hidden.removesuffix('.py')}" in told
+    assert f"hides the required module {hidden.removesuffix('.py')}" in told
     assert "unset PYTHONPATH" in told
 
 
@@ -161,7 +161,7 @@ def test_a_run_folder_that_cannot_be_made_is_told_with_another_place(tmp_path):
     answer = launch("rule_learning", "--headless", "--runs", str(taken), PARAMOVE_DOMAIN="nowhere")
     assert answer.returncode in (1, 77)
     assert answer.stderr.startswith(f"{taken}: ")
-    assert f"Name another place: --runs {tempfile.gettempdir()}/paramove_runs" in answer.stderr
+    assert f"--runs {tempfile.gettempdir()}/paramove_runs" in answer.stderr
 
 
 def test_a_socket_folder_that_cannot_be_made_is_told_with_the_variable(tmp_path):

@@ -98,7 +98,7 @@ def test_another_connection_needs_an_overlay_that_says_what_it_is(folder):
     assert parameters(load(folder, "arm", ["real"], ["camera.port=/dev/two"]))["port"] == "/dev/two"
     assert parameters(load(folder, "arm", None, ["camera.rate_hz=3"]))["port"] == "/dev/one"
     (folder / "wrong.yaml").write_text(f"connections: [camer.port]\n{GOOD}")
-    with pytest.raises(DocumentError, match=r"'camer\.port' is no node\.parameter; did you mean 'camera'"):
+    with pytest.raises(DocumentError, match=r"'camer\.port' is not a node\.parameter; did you mean 'camera'"):
         load(folder, "wrong")
 
 

@@ -144,8 +144,10 @@ def test_parameters_that_were_right_are_not_checked_again_until_the_code_changes
     launch = launch_file.load(installed, "pointing")
     interfaces = read_interfaces(launch, installed)
     asked = []
-    ask = parameters._ask
-    monkeypatch.setattr(parameters, "_ask", lambda *arguments: asked.append(arguments) or ask(*arguments))
+    check = parameters._check_in_process
+    monkeypatch.setattr(
+        parameters, "_check_in_process", lambda *arguments: asked.append(arguments) or check(*arguments)
+    )
     for _ in range(2):
         check_wiring(launch, interfaces, installed)
     assert len(asked) == 1

@@ -1,4 +1,4 @@
-"""`paramove calibrate`: print the board and markers, and find lens and place of cameras from images of the board."""
+"""`paramove calibrate`: print the board and markers, and find lens and pose of cameras from images of the board."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ LIVE_TIMEOUT_NS = 10_000_000_000
 
 @app.command("board")
 def board(
-    out: Annotated[Path, typer.Option(metavar="FILE", help="PDF to write; an existing one is written anew")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="PDF to write; an existing one is overwritten")],
     paper: Annotated[str, typer.Option(help="a4, a3, letter or tabloid")] = "a4",
     square: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="side of a square, such as 30mm; default: what fills the paper")
     ] = None,
 ) -> None:
-    """Write a ChArUco board as PDF in true scale, with the words that say how to lay it on the table.
+    """Write a ChArUco board as PDF in true scale, with instructions how to lay it on the table.
 
     Exit codes: 0 written; 77 not allowed to write; 78 no such board.
     """
@@ -54,7 +54,7 @@ def board(
 
 @app.command("markers")
 def markers(
-    out: Annotated[Path, typer.Option(metavar="FILE", help="PDF to write; an existing one is written anew")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="PDF to write; an existing one is overwritten")],
     side: Annotated[str, typer.Option(metavar="LENGTH", help="of a marker's black square")] = "45mm",
     paper: Annotated[str, typer.Option(help="a4, a3, letter or tabloid")] = "a4",
 ) -> None:
@@ -84,7 +84,7 @@ def cameras(
             help="one per camera: a folder with images, a video file, or a live camera (0, /dev/video0)",
         ),
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="YAML file to write; an existing one is written anew")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="YAML file to write; an existing one is overwritten")],
     square: Annotated[
         str, typer.Option(metavar="LENGTH", help="side of a square as measured on the print, such as 30mm")
     ],
@@ -92,13 +92,13 @@ def cameras(
         str, typer.Option(metavar="LENGTH", help="of the plate that the sheet is glued to, such as 5mm")
     ] = "0mm",
     size: Annotated[
-        str, typer.Option(metavar="WxH", help="resolution that live cameras are asked for; files have their own")
+        str, typer.Option(metavar="WxH", help="resolution requested from live cameras; files have their own")
     ] = LIVE_SIZE,
 ) -> None:
-    """Find lens and place of cameras from images of the board; all places in the frame of the table.
+    """Find lens and pose of cameras from images of the board; all poses in the frame of the table.
 
     Images of a folder whose names begin with "table", and the last second of a video, show the board as it lies on the
-    table, in the same place for all cameras; the others show it at many angles.
+    table, at the same position for all cameras; the others show it at many angles.
 
     Exit codes: 0 written; 66 no such source; 77 not allowed to write; 78 images that do not calibrate, with the cause.
     """
@@ -136,7 +136,7 @@ def _pixels(text: str) -> tuple[int, int]:
 
 
 def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> list[Placement]:
-    """First all lenses, then all places: the board lies on the table once for all cameras."""
+    """First all lenses, then all poses: the board lies on the table once for all cameras."""
     from paramove.cameras import CalibrationError, calibrate_lens, check_square, place_camera
 
     sources = [_source(text, size) for text in texts]
@@ -145,34 +145,34 @@ def _calibrated(texts: Sequence[str], board: Board, size: tuple[int, int]) -> li
     if twice is not None:
         raise InputError(f"two sources are named {twice!r}: cameras are named after their folder or file; rename one")
     lenses: list[Lens] = []
-    shown: list[BoardView] = []
+    views_of_all: list[BoardView] = []
     for source in sources:
-        found = source.held()
-        if not found.views:
+        held = source.held()
+        if not held.views:
             raise CalibrationError(
-                f"{source.name}: board not found in any of {found.looked_at} images: it must be one of `paramove "
+                f"{source.name}: board not found in any of {held.looked_at} images: it must be one of `paramove "
                 "calibrate board`, flat, sharp and large in the image (a square 10 px or more), and not mirrored"
             )
-        shown += found.views
-        remarks = check_square(board, shown)
-        lens = calibrate_lens(source.name, found.views, board)
-        _tell_lens(lens, found.looked_at)
+        views_of_all += held.views
+        remarks = check_square(board, views_of_all)
+        lens = calibrate_lens(source.name, held.views, board)
+        _print_lens(lens, held.looked_at)
         lenses.append(lens)
     for remark in remarks:
         typer.echo(f"  {remark}")
     placed = []
     if any(_is_live(text) for text in texts):
-        typer.echo("now lay the board on the table as its words say, in view of all cameras, and leave it there")
+        typer.echo("now lay the board on the table as printed on it, in view of all cameras, and leave it there")
     for source, lens in zip(sources, lenses, strict=True):
         views = source.table().views
-        check_square(board, [*shown, *views])
+        check_square(board, [*views_of_all, *views])
         placed.append(place_camera(lens, views, board))
         _tell_place(placed[-1])
     _tell_agreement(placed, board)
     return placed
 
 
-def _tell_lens(lens: Lens, looked_at: int) -> None:
+def _print_lens(lens: Lens, looked_at: int) -> None:
     from paramove.cameras import GOOD_ERROR_PX
 
     verdict = "good" if lens.error_px < GOOD_ERROR_PX else f"not good, < {GOOD_ERROR_PX:g} px is"
@@ -200,7 +200,7 @@ def _tell_place(placement: Placement) -> None:
 
 
 def _tell_agreement(placed: Sequence[Placement], board: Board) -> None:
-    """What the cameras together make of the board's corners: how exactly places are told that all of them see."""
+    """Prints the accuracy of the board's corners as triangulated by all cameras."""
     if len(placed) < 2:
         return
     import numpy as np
@@ -210,9 +210,9 @@ def _tell_agreement(placed: Sequence[Placement], board: Board) -> None:
     rig = StereoRig([placement.camera for placement in placed])
     corners = board.corners()
     pixels = np.stack([placement.camera.project(corners) for placement in placed])
-    found = rig.triangulate(pixels, sigma_px=max(0.1, *(placement.error_px for placement in placed)))
-    deviation_mm = 1000.0 * float(np.nanmedian(found.deviations))
-    typer.echo(f"together: a point on the board that all see is told to ± {deviation_mm:.1f} mm")
+    points = rig.triangulate(pixels, sigma_px=max(0.1, *(placement.error_px for placement in placed)))
+    deviation_mm = 1000.0 * float(np.nanmedian(points.deviations))
+    typer.echo(f"together: accuracy of a point on the board that all see ± {deviation_mm:.1f} mm")
 
 
 def _is_live(text: str) -> bool:
@@ -225,7 +225,7 @@ def _source(text: str, size: tuple[int, int]) -> ImageSource:
     if not _is_live(text):
         return file_source(Path(text))
     name = f"camera{text}" if text.isdigit() else Path(text).name
-    return LiveImages(name, _live_frames(text, size), lambda sentence: typer.echo(printable(sentence)))
+    return LiveImages(name, _live_frames(text, size), lambda message: typer.echo(printable(message)))
 
 
 def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Image]]:
@@ -247,8 +247,8 @@ def _live_frames(device: str, size: tuple[int, int]) -> Iterator[tuple[float, Im
         frames.close()
 
 
-def _ended(sentence: str, code: int) -> typer.Exit:
-    typer.echo(printable(sentence), err=True)
+def _ended(message: str, code: int) -> typer.Exit:
+    typer.echo(printable(message), err=True)
     return typer.Exit(code)
 
 

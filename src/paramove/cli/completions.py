@@ -1,7 +1,7 @@
-"""What the shell offers after <Tab>: names of launch files, overlays, parameters, topics, nodes and runs.
+"""Completions after <Tab>: names of launch files, overlays, parameters, topics, nodes and runs.
 
 Called at every <Tab>, so it imports nothing heavy, and where nothing can be offered it offers nothing: an error here
-would appear in the middle of a line that somebody types.
+would appear in the middle of a line that is being typed.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _typed_launch() -> tuple[str, list[str]]:
 
 
 def typed_words(environment: Mapping[str, str]) -> list[str]:
-    """The words of the line that a shell asks about: bash says them in one variable, other shells in another."""
+    """The words of the line to complete: bash has them in one variable, other shells in another."""
     return (environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", "")).split()
 
 

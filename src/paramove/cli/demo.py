@@ -1,4 +1,4 @@
-"""`paramove demo`: the short word for `paramove launch rule_learning`, with the same options."""
+"""`paramove demo`: short for `paramove launch rule_learning`, with the same options."""
 
 import inspect
 from typing import Any

@@ -1,4 +1,4 @@
-"""`paramove demos`: demonstration sets listed, shown, drawn, labelled, imported, split and made up."""
+"""`paramove demos`: demonstration sets listed, shown, drawn, labelled, imported, split and synthesized."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def list_sets(
 ) -> None:
     """List the demonstration sets in a folder, by their labels alone.
 
-    Exit codes: 0; 66 there is none; 78 the labels of one are wrong, which is told.
+    Exit codes: 0; 66 there is none; 78 the labels of one are wrong, which is reported.
     """
     from paramove.demonstrations import FILE_NAME, DemonstrationError
 
@@ -96,42 +96,42 @@ def show(
     Exit codes: 0; 66 there is no set; 78 something in it cannot be used, with file, line and column.
     """
     with one_sentence():
-        shown = _loaded(folder)
+        demonstrations = _loaded(folder)
     facts = {
         "set": str(folder),
-        "description": shown.description,
-        "movements": len(shown),
-        "points": list(shown.point_names),
-        "frame": shown.frame,
-        "parameters": list(shown.parameter_names),
-        "groups": _groups(shown),
-        "remarks": list(shown.remarks),
+        "description": demonstrations.description,
+        "movements": len(demonstrations),
+        "points": list(demonstrations.point_names),
+        "frame": demonstrations.frame,
+        "parameters": list(demonstrations.parameter_names),
+        "groups": _groups(demonstrations),
+        "remarks": list(demonstrations.remarks),
     }
     if as_json:
-        typer.echo(json.dumps(facts | {"segments": _segments(shown)}, indent=2, ensure_ascii=False))
+        typer.echo(json.dumps(facts | {"segments": _segments(demonstrations)}, indent=2, ensure_ascii=False))
         return
     for key in ("set", "description", "points", "frame", "parameters"):
         value = facts[key]
         text = ", ".join(value) if isinstance(value, list) else str(value)
         typer.echo(f"{key + ':':<13}{printable(text) or '–'}")
     typer.echo()
-    table_of(_segments(shown) if segments else _groups(shown))
-    for remark in shown.remarks:
+    table_of(_segments(demonstrations) if segments else _groups(demonstrations))
+    for remark in demonstrations.remarks:
         typer.echo(remark)
 
 
 def _loaded(folder: Path, action: str | None = None, subject: str | None = None) -> DemonstrationSet:
     from paramove.demonstrations import DemonstrationSet
 
-    found = DemonstrationSet.load(folder)
-    return found if action is None and subject is None else found.select(action, subject)
+    loaded = DemonstrationSet.load(folder)
+    return loaded if action is None and subject is None else loaded.select(action, subject)
 
 
-def _groups(shown: DemonstrationSet) -> list[dict[str, Any]]:
+def _groups(demonstrations: DemonstrationSet) -> list[dict[str, Any]]:
     """A row for each action and person."""
     rows = []
-    for action, subject in sorted({(movement.action, movement.subject) for movement in shown}):
-        chosen = shown.select(action, subject)
+    for action, subject in sorted({(movement.action, movement.subject) for movement in demonstrations}):
+        chosen = demonstrations.select(action, subject)
         durations = sorted(movement.duration for movement in chosen)
         rows.append(
             {
@@ -148,7 +148,7 @@ def _groups(shown: DemonstrationSet) -> list[dict[str, Any]]:
     return rows
 
 
-def _segments(shown: DemonstrationSet) -> list[dict[str, Any]]:
+def _segments(demonstrations: DemonstrationSet) -> list[dict[str, Any]]:
     return [
         {
             "recording": movement.recording,
@@ -160,7 +160,7 @@ def _segments(shown: DemonstrationSet) -> list[dict[str, Any]]:
             "frames": len(movement.time),
             "seconds": movement.duration,
         }
-        for movement in shown
+        for movement in demonstrations
     ]
 
 
@@ -174,16 +174,20 @@ def plot(
     colour_by: Annotated[
         str | None, typer.Option(help="a parameter, or 'action' (default: the parameter that varies most)")
     ] = None,
-    body: Annotated[bool, typer.Option("--body", help="seen from the person, left arms mirrored")] = False,
+    body: Annotated[bool, typer.Option("--body", help="in the person's body frame, left arms mirrored")] = False,
 ) -> None:
     """Draw the paths of a body point in space and its coordinates over time, coloured by a parameter."""
     from paramove.demonstrations import plot_set, write_plot
 
     with one_sentence():
-        shown = _loaded(folder, action, subject)
+        demonstrations = _loaded(folder, action, subject)
         if body:
-            shown = shown.in_body_frame().with_right_arms()
-        write_plot(plot_set(shown, point, colour_by), output, f"{folder.resolve().name}: {len(shown)} movements")
+            demonstrations = demonstrations.in_body_frame().with_right_arms()
+        write_plot(
+            plot_set(demonstrations, point, colour_by),
+            output,
+            f"{folder.resolve().name}: {len(demonstrations)} movements",
+        )
     typer.echo(str(output))
 
 
@@ -203,9 +207,9 @@ def label(
     side: Annotated[Literal["right", "left"], typer.Option(help="which arm moves")] = "right",
     point: Annotated[str, typer.Option("--point", help="with --find: the point whose speed counts")] = "index",
 ) -> None:
-    """Add a label to a recording: the movement from --start to --end, or with --find every movement there is.
+    """Add a label to a recording: the movement from --start to --end, or with --find every movement.
 
-    Comments in labels.yaml are kept; repetitions are counted on. Where there is no labels.yaml, one is made.
+    Comments in labels.yaml are preserved; repetitions are counted on. Where there is no labels.yaml, one is made.
     """
     from paramove.demonstrations import FILE_NAME, Segment, load_labels, next_repetition
     from paramove.demonstrations import label as add_labels
@@ -253,10 +257,10 @@ def _found_in(recording: Path, point: str) -> list[tuple[float, float]]:
 
     poses = read_poses(recording)
     time = poses.time
-    found = movements_by_speed(time, poses.positions, poses.point_names, point)
-    if not found:
+    movements = movements_by_speed(time, poses.positions, poses.point_names, point)
+    if not movements:
         raise DemonstrationError(f"{recording}: {point} never exceeds 15 cm/s; there is no movement to label")
-    return [(float(time[first]), float(time[end - 1])) for first, end in found]
+    return [(float(time[first]), float(time[end - 1])) for first, end in movements]
 
 
 @app.command()
@@ -264,9 +268,9 @@ def split(
     folder: SetArgument,
     by: Annotated[
         Literal["movement", "subject", "theta"],
-        typer.Option(help="what is kept together: nothing, each person, each parameter cell"),
+        typer.Option(help="what is not split: nothing, each person, each parameter cell"),
     ] = "movement",
-    fraction: Annotated[float, typer.Option(min=0.001, max=0.999, help="share that tests")] = 0.25,
+    fraction: Annotated[float, typer.Option(min=0.001, max=0.999, help="fraction for testing")] = 0.25,
     bins: Annotated[
         int | None, typer.Option(min=1, help="with --by theta: cells per parameter (default: one per value)")
     ] = None,
@@ -300,14 +304,14 @@ def _refuse_sets(folders: Sequence[Path]) -> None:
 @app.command()
 def synthesize(
     folder: SetArgument,
-    action: Annotated[Literal["reaching", "pointing"], typer.Option(help="what is shown")] = "reaching",
+    action: Annotated[Literal["reaching", "pointing"], typer.Option(help="which movement")] = "reaching",
     columns: Annotated[int, typer.Option(min=1, max=50, help="targets across the table")] = 3,
     rows: Annotated[int, typer.Option(min=1, max=50, help="targets away from the person")] = 3,
     repetitions: Annotated[int, typer.Option(min=1, max=1000, help="movements to each target")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="the same seed gives the same set")] = 0,
     add: Annotated[bool, typer.Option("--add", help="to a set that is there already")] = False,
 ) -> None:
-    """Make up a set: a synthetic person reaches for, or points at, a raster of targets over 80 x 30 cm of a table."""
+    """Synthesize a set: a synthetic person reaches for, or points at, a grid of targets over 80 x 30 cm of a table."""
     from paramove.demonstrations import synthetic_takes, write_set
 
     with one_sentence():

@@ -36,11 +36,13 @@ MappingOption = Annotated[
 def import_files(
     files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="C3D, BVH, CSV or NPZ")],
     to: Annotated[Path, typer.Option(metavar="SET", help="folder of the demonstration set")],
-    unit: Annotated[Literal["m", "cm", "mm"] | None, typer.Option(help="if the file does not tell")] = None,
+    unit: Annotated[Literal["m", "cm", "mm"] | None, typer.Option(help="if the file does not have it")] = None,
     axes: Annotated[
         str | None, typer.Option(help="z_up, y_up, or directions of x, y, z such as right,up,forward")
     ] = None,
-    rate: Annotated[float | None, typer.Option(min=0.001, help="frames per second, if the file does not tell")] = None,
+    rate: Annotated[
+        float | None, typer.Option(min=0.001, help="frames per second, if the file does not have it")
+    ] = None,
     point: PointsOption = None,
     mapping: MappingOption = None,
     zeros_are_places: Annotated[
@@ -55,7 +57,9 @@ def import_files(
     find: Annotated[
         str | None, typer.Option("--find", metavar="POINT", help="label each movement of POINT, by its speed")
     ] = None,
-    max_gap: Annotated[float, typer.Option(min=0.0, max=1.0, help="s; longer losses of a point are refused")] = 0.1,
+    max_gap: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="s; movements with longer losses of a point are rejected")
+    ] = 0.1,
     skip_refused: Annotated[bool, typer.Option("--skip-refused", help="import the rest")] = False,
     name: Annotated[str | None, typer.Option(help="of the recording (default: the file's)")] = None,
     add: Annotated[bool, typer.Option("--add", help="to a set that is there already")] = False,
@@ -74,7 +78,7 @@ def import_files(
     given = words(parameters)
     label = None if action is None else Label(0, 0, action, values, subject, repetition or 0, side)
     if find is not None and label is None:
-        raise typer.BadParameter("movements that are found need an --action", param_hint="--find")
+        raise typer.BadParameter("--find needs an --action", param_hint="--find")
     with one_sentence():
         options = import_options(mapping, unit, axes, rate, point, zeros_are_places)
         results = [import_file(file, options, label, max_gap, name, find) for file in files]
@@ -97,7 +101,7 @@ def import_options(
     point: list[str] | None,
     zeros_are_places: bool,
 ) -> ImportOptions:
-    """What the mapping file says, with what the command line says laid over it."""
+    """The mapping file's options, overlaid with those of the command line."""
     from paramove.demonstrations.importing import ImportOptions, axes_matrix, read_mapping_file
 
     options = read_mapping_file(mapping) if mapping is not None else ImportOptions()
@@ -120,15 +124,15 @@ def import_options(
 
 
 def _tell(results: list[Imported], skip_refused: bool) -> None:
-    """Prints remarks; ends the command if a movement was refused, unless the rest is wanted."""
+    """Prints remarks; ends the command if a movement was rejected, unless the rest is to be imported."""
     for result in results:
         for remark in result.remarks:
             typer.echo(remark)
-    refused = [line for result in results for line in result.refused]
-    if refused and not skip_refused:
+    rejected = [line for result in results for line in result.refused]
+    if rejected and not skip_refused:
         hint = "nothing was imported; --skip-refused imports the rest, --max-gap fills longer losses"
-        raise ended("\n".join([*refused, hint]), exit_codes.CONFIGURATION)
-    for line in refused:
+        raise ended("\n".join([*rejected, hint]), exit_codes.CONFIGURATION)
+    for line in rejected:
         typer.echo(f"left out: {line}", err=True)
 
 
@@ -158,7 +162,7 @@ def _write(
 
 
 def _counted(labels: tuple[Label, ...], there: dict[tuple[object, ...], int]) -> tuple[Label, ...]:
-    """Labels whose repetitions go on from those there are; `there` is brought up to date."""
+    """Labels whose repetitions continue the existing ones; `there` is updated."""
     result = []
     for label in labels:
         key = (label.action, label.theta, label.subject, label.side)

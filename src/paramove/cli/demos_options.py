@@ -44,7 +44,7 @@ def one_sentence() -> Iterator[None]:
 
 
 def ended(text: str, code: int) -> typer.Exit:
-    """What ends a command; its lines go to standard error."""
+    """The exception that ends a command; prints its lines to standard error."""
     for line in text.splitlines():
         typer.echo(printable(line), err=True)
     return typer.Exit(code)

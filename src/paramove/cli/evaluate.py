@@ -1,4 +1,4 @@
-"""`paramove evaluate`: repeats experiments and says how well they went."""
+"""`paramove evaluate`: repeats experiments and measures their success."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from paramove.cli.evaluation_io import (
 from paramove.documents import exit_codes
 from paramove.workspace import Workspace
 
-app = typer.Typer(name="evaluate", help="Repeat experiments and say how well they went.", no_args_is_help=True)
+app = typer.Typer(name="evaluate", help="Repeat experiments and measure their success.", no_args_is_help=True)
 STUDIES = ("kills", "faults", "imitation", "real", "peers", "chapter2", "chapter4", "chapter6", "real-images")
 """Commands of release 0.1.0 that are programs of the clone now."""
 
 RUNS = Path("runs/evaluation")
 
 RunsOption = Annotated[
-    Path | None, typer.Option(help="where runs and results are kept (default: runs/evaluation); finished ones are used")
+    Path | None,
+    typer.Option(help="where runs and results are stored (default: runs/evaluation); finished ones are used"),
 ]
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="NODE.PARAM=VALUE", help="as in paramove launch; may be repeated")
@@ -55,9 +56,9 @@ def rule_learning(
         bool, typer.Option("--drop-recordings", help="delete the recording of a successful run (about 0.5 GB each)")
     ] = False,
 ) -> None:
-    """Run the rule-learning demo once per seed, headless, and judge every run by the truth.
+    """Run the rule-learning demo once per seed, headless, and judge every run by the ground truth.
 
-    Ctrl-C and the same command again: goes on with the seeds that are missing. Exit codes: 0 at least 9 of 10 runs
+    Ctrl-C and the same command again: continues with the missing seeds. Exit codes: 0 at least 9 of 10 runs
     succeeded; 3 fewer did; 130 interrupted.
     """
     console = Console(highlight=False, emoji=False)
@@ -126,13 +127,13 @@ for _name in STUDIES:
 def _homography_table(rows: list[dict[str, Any]]) -> Table:
     table = Table(title="error of the robot's own homography, mm", show_edge=False, pad_edge=False)
     table.add_column("seed", justify="right")
-    for heading in ("grid median", "95 %", "max", "objects seen at rest: median", "max", "number"):
+    for heading in ("grid median", "95 %", "max", "objects detected at rest: median", "max", "number"):
         table.add_column(heading, justify="right")
     for row in rows:
-        grid, seen = row["grid_mm"], row["seen_at_rest_mm"]
-        values = (grid["median"], grid["p95"], grid["max"], seen["median"], seen["max"])
+        grid, at_rest = row["grid_mm"], row["seen_at_rest_mm"]
+        values = (grid["median"], grid["p95"], grid["max"], at_rest["median"], at_rest["max"])
         cells = ["–" if value is None else f"{value:.2f}" for value in values]
-        table.add_row(str(row["seed"]), *cells, str(seen["samples"]))
+        table.add_row(str(row["seed"]), *cells, str(at_rest["samples"]))
     return table
 
 
@@ -150,18 +151,17 @@ def _batch(
     from paramove.runs import BatchOptions, finished, run_batch
     from paramove.supervision import check, load
 
-    wanted, workspace = seeds_in(seeds), Workspace.here()
-    check(load(workspace, "rule_learning", overlays or None, settings), workspace)  # what is wrong is said at once
+    requested, workspace = seeds_in(seeds), Workspace.here()
+    # Reports errors before the first run.
+    check(load(workspace, "rule_learning", overlays or None, settings), workspace)
     folder = (runs or workspace.root / RUNS).resolve()
     options = BatchOptions(
         workspace.root, folder, jobs, video, video, not drop_recordings, tuple(settings), tuple(overlays)
     )
-    results = {} if again else finished(folder, wanted, settings, overlays)
+    results = {} if again else finished(folder, requested, settings, overlays)
     if results:
-        console.print(
-            f"results of {len(results)} seeds are taken from {folder} (--again runs them anew)", soft_wrap=True
-        )
-    missing = [seed for seed in wanted if seed not in results]
+        console.print(f"results of {len(results)} seeds are taken from {folder} (--again repeats them)", soft_wrap=True)
+    missing = [seed for seed in requested if seed not in results]
     with Progress(*PROGRESS, console=console, disable=not missing) as progress:
         task = progress.add_task("runs", total=len(missing))
         running: list[int] = []
@@ -181,9 +181,11 @@ def _batch(
         try:
             run_batch(missing, options, begun, ended)
         except KeyboardInterrupt:
-            console.print(f"interrupted; {len(results)} of {len(wanted)} results are kept in {folder}", soft_wrap=True)
+            console.print(
+                f"interrupted; {len(results)} of {len(requested)} results are stored in {folder}", soft_wrap=True
+            )
             raise typer.Exit(130) from None
-    return [results[seed] for seed in wanted]
+    return [results[seed] for seed in requested]
 
 
 if __name__ == "__main__":

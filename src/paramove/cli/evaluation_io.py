@@ -1,4 +1,4 @@
-"""What `paramove evaluate` and the studies take in and give out alike: seeds, numbers as JSON."""
+"""Input and output shared by `paramove evaluate` and the studies: seeds, numbers as JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PROGRESS = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
 
 
 def seeds_in(text: str) -> list[int]:
-    """Seeds of `--seeds`; a text that names none is a wrong use of the command."""
+    """Seeds of `--seeds`; a text without any is a wrong use of the command."""
     from paramove.runs import SeedsError, seeds_of
 
     try:
@@ -26,7 +26,7 @@ def seeds_in(text: str) -> list[int]:
 
 
 def write_numbers(file: Path | None, numbers: Any, console: Console) -> None:
-    """Writes what `--json` asks for: to the file and says so, or to standard output for `-`."""
+    """Writes the numbers of `--json`: to the file, whose name is printed, or to standard output for `-`."""
     if file is None:
         return
     text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"

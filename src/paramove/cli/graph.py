@@ -19,7 +19,7 @@ MEASURED_S = 2.0
 
 
 class Format(enum.Enum):
-    """How the graph is written."""
+    """Format of the output."""
 
     TEXT = "text"
     MERMAID = "mermaid"
@@ -53,8 +53,8 @@ def graph(
     """
     from paramove.supervision import as_mermaid, as_svg, as_text
 
-    found = _running(domain) if live or name is None else _launched(name, overlays)
-    text = {Format.TEXT: as_text, Format.MERMAID: as_mermaid, Format.SVG: as_svg}[form](found)
+    graph = _running(domain) if live or name is None else _launched(name, overlays)
+    text = {Format.TEXT: as_text, Format.MERMAID: as_mermaid, Format.SVG: as_svg}[form](graph)
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -88,11 +88,11 @@ def _running(domain: str | None) -> Graph:
     from paramove.supervision import running_graph
 
     folder = bus_folder(domain)
-    found = running_graph(folder, folder.name, MEASURED_S)
-    if not found.nodes:
+    graph = running_graph(folder, folder.name, MEASURED_S)
+    if not graph.nodes:
         typer.echo("no node is on the bus; name a launch file, such as `paramove graph rule_learning`", err=True)
         raise typer.Exit(1)
-    return found
+    return graph
 
 
 if __name__ == "__main__":

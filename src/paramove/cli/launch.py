@@ -37,7 +37,7 @@ def launch(
         typer.Option(
             "--with",
             metavar="OVERLAY",
-            help="lay launch/overlays/OVERLAY.yaml over it",
+            help="overlay it with launch/overlays/OVERLAY.yaml",
             autocompletion=completions.overlays,
         ),
     ] = None,
@@ -68,16 +68,16 @@ def launch(
         ),
     ] = None,
 ) -> None:
-    """Run an application: start its nodes, keep them running, end them in order, judge the run.
+    """Run an application: start its nodes, restart failed ones, end them in order, judge the run.
 
     Exit codes: 0 success; 1 failed, or judged a failure; 2 usage; 66 no such launch file; 75 another run is going on;
     78 the launch file is wrong; 124 time limit; 129, 130, 143 ended by a closed terminal, Ctrl-C, SIGTERM;
     141 the program that read the output has ended.
     Ctrl-C once ends the run in order, twice at once. Ctrl-Z does nothing.
     """
-    from paramove.cli.one_run import Wanted, run  # heavy, and not needed to complete a line or to print help
+    from paramove.cli.one_run import RunOptions, run  # heavy, and not needed to complete a line or to print help
 
-    raise typer.Exit(run(Wanted(name, overlays, settings or [], seed, headless, runs, page), check))
+    raise typer.Exit(run(RunOptions(name, overlays, settings or [], seed, headless, runs, page), check))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`paramove logs`: what the nodes of a run wrote, in the order of time."""
+"""`paramove logs`: log lines of the nodes of a run, in the order of time."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ class Level(enum.StrEnum):
 
 @app.command()
 def logs(
-    follow: Annotated[bool, typer.Option("--follow", "-f", help="go on as the logs grow, until the run ends")] = False,
+    follow: Annotated[
+        bool, typer.Option("--follow", "-f", help="continue as the logs grow, until the run ends")
+    ] = False,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
     level: Annotated[Level, typer.Option(help="this level and above")] = Level.INFO,
     run: Annotated[
@@ -50,7 +52,7 @@ def logs(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print a JSON object per line")] = False,
 ) -> None:
-    """Show what the nodes of a run logged and what was done to them, in the order of time.
+    """Show the log lines of a run's nodes and the supervisor's events, in the order of time.
 
     Lines without a level, such as tracebacks, count as warnings.
     """
@@ -74,10 +76,10 @@ def logs(
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _run_folder(wanted: Path | None) -> Path:
-    folder = wanted or Workspace.here().root / "runs" / "latest"
+def _run_folder(requested: Path | None) -> Path:
+    folder = requested or Workspace.here().root / "runs" / "latest"
     if not (folder / "logs").is_dir():
-        hint = "give the folder of a run with --run" if wanted is None else "a run's folder holds logs/ and run.yaml"
+        hint = "give the folder of a run with --run" if requested is None else "a run's folder holds logs/ and run.yaml"
         typer.echo(f"{folder} holds no logs; {hint}", err=True)
         raise typer.Exit(66)
     return folder.resolve()

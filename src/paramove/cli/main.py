@@ -1,4 +1,4 @@
-"""The `paramove` command. Mounts the sub-commands; each lies in a file of its own.
+"""The `paramove` command. Mounts the sub-commands; each is in a file of its own.
 
 A module named here has an attribute `app`, a `typer.Typer`: with a name (`Typer(name="topic")`) it becomes a group of
 commands, without one its commands are mounted as they are. Only the module of the command that is called is imported,
@@ -23,18 +23,18 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("paramove.cli.demo", "Run the demonstration: `paramove launch rule_learning`."),
     "launch": ("paramove.cli.launch", "Run an application from its launch file."),
     "graph": ("paramove.cli.graph", "Draw the nodes and topics of a launch file, or of what is running."),
-    "topic": ("paramove.cli.topic", "Look at what is said on the bus."),
+    "topic": ("paramove.cli.topic", "Look at topics, messages and rates on the bus."),
     "node": ("paramove.cli.node", "Look at the nodes on the bus."),
-    "logs": ("paramove.cli.logs", "Show what the nodes of a run wrote, in the order of time."),
+    "logs": ("paramove.cli.logs", "Show the log lines of a run's nodes, in the order of time."),
     "calibrate": ("paramove.cli.calibrate", "Print the calibration board; calibrate cameras."),
     "arm": ("paramove.cli.arm", "Find, set up, calibrate, check, move and stop an arm of servos."),
     "demos": ("paramove.cli.demos", "List, show, plot, label, import, split and synthesize demonstrations."),
     "train": ("paramove.cli.train", "Train movement models from demonstrations."),
     "models": ("paramove.cli.models", "List, show, plot and compare movement models."),
-    "recognize": ("paramove.cli.recognize", "Say which action a movement is, and with which parameters."),
+    "recognize": ("paramove.cli.recognize", "Recognize the action of a movement and its parameters."),
     "synthesize": ("paramove.cli.synthesize", "Make the movement for given parameters."),
     "recover": ("paramove.cli.recover", "Rebuild a recording whose writer was killed or whose bytes are damaged."),
-    "evaluate": ("paramove.cli.evaluate", "Repeat experiments and say how well they went."),
+    "evaluate": ("paramove.cli.evaluate", "Repeat experiments and measure their success."),
     "warm": ("paramove.cli.warm", "Compile kernels and train the reaching model, so that the first run starts fast."),
     "doctor": ("paramove.cli.doctor", "Check this machine and its installation."),
 }
@@ -43,8 +43,8 @@ EXTRAS = dict.fromkeys(("av", "cv2", "dynamixel_sdk", "mujoco", "serial", "webso
 """Module -> the extra of the package that brings it."""
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         from paramove import __version__
 
         typer.echo(f"paramove {__version__}")
@@ -59,15 +59,15 @@ def _callback(
     """Learns parametric human movements from a few demonstrations; recognises, tracks and synthesises them."""
 
 
-def build(wanted: str | None) -> typer.Typer:
-    """The command line with the command `wanted` in full and the others by their help only."""
+def build(requested: str | None) -> typer.Typer:
+    """The command line with the command `requested` in full and the others by their help only."""
     app = typer.Typer(name="paramove", no_args_is_help=True, pretty_exceptions_enable=False)
     app.callback()(_callback)
-    for name, (module, sentence) in COMMANDS.items():
-        if name == wanted:
+    for name, (module, help_text) in COMMANDS.items():
+        if name == requested:
             app.add_typer(importlib.import_module(module).app)
         else:
-            app.command(name, help=sentence)(_placeholder(name))
+            app.command(name, help=help_text)(_placeholder(name))
     return app
 
 
@@ -79,7 +79,7 @@ def _placeholder(name: str) -> Callable[[], None]:
 
 
 def wanted_command(arguments: Sequence[str], environment: Mapping[str, str]) -> str | None:
-    """The command that is called, or whose options a shell asks for at a <Tab>; None where there is none yet."""
+    """The command that is called, or whose options a shell completes; None if there is none yet."""
     if "_PARAMOVE_COMPLETE" in environment:
         arguments = typed_words(environment)
     return next((argument for argument in arguments[1:] if not argument.startswith("-")), None)
@@ -99,7 +99,7 @@ def main() -> None:
             f"pip install 'paramove[{EXTRAS[package]}]'\n"
         )
         sys.exit(UNAVAILABLE)
-    except InputError as error:  # of a command that has nothing more to say of it
+    except InputError as error:  # of a command that does not handle it
         sys.stderr.write(f"{error}\n")
         sys.exit(error.exit_code)
 

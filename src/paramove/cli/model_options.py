@@ -59,7 +59,7 @@ def model_files(folder: Path) -> list[Path]:
 
 
 def classifier_of(paths: Sequence[Path]) -> MovementClassifier:
-    """All models that are named, which compete for a movement; a classifier's folder knows beginnings too.
+    """All given models, which compete for a movement; a classifier's folder recognizes beginnings, too.
 
     Raises InputError if a file is missing or damaged, or two models are of the same action.
     """

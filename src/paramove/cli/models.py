@@ -29,13 +29,13 @@ def list_models(
 ) -> None:
     """List the movement models in a folder.
 
-    Exit codes: 0; 66 there is none; 78 one is damaged, which is told.
+    Exit codes: 0; 66 there is none; 78 one is damaged, which is reported.
     """
     from paramove.phmm import INDEX_FILE, ParametricHMM
 
     rows, wrong = [], []
-    found = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + "*.npz")})
-    for file in (file for file in found if file.name != INDEX_FILE and _is_model(file)):
+    files = sorted({file for depth in range(DEPTH) for file in folder.glob("*/" * depth + "*.npz")})
+    for file in (file for file in files if file.name != INDEX_FILE and _is_model(file)):
         try:
             rows.append(_row(file, ParametricHMM.load(file)))
         except InputError as error:
@@ -51,14 +51,14 @@ def list_models(
 
 
 def _is_model(file: Path) -> bool:
-    """Whether an .npz calls itself a model; others, such as recordings, are passed over."""
+    """Whether an .npz calls itself a model; others, such as recordings, are ignored."""
     from paramove.documents import read_arrays
 
     names = {"format_version", "header"}
     try:
         return names == read_arrays(file, only=names).keys()
     except InputError:
-        return True  # damaged: to be told
+        return True  # damaged: to be reported
 
 
 def _row(file: Path, model: ParametricHMM) -> dict[str, Any]:
@@ -173,7 +173,7 @@ def plot(
     output: Annotated[Path, typer.Option(metavar="FILE", help="a .png, .svg, .pdf or .html")] = Path("model.png"),
     point: PointOption = None,
 ) -> None:
-    """Draw what a model knows: its movements for a raster of theta, their scatter, durations, where theta is visible.
+    """Draw what a model knows: its movements for a grid of theta, their scatter, durations, where theta is visible.
 
     Exit codes: 0; 66 there is no such file; 78 it is damaged, or has no such point.
     """
@@ -194,7 +194,7 @@ def compare(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare models: what they were told, how far apart their movements are, and how well they explain a set.
+    """Compare models: their training, how far apart their movements are, and how well they explain a set.
 
     Exit codes: 0; 2 fewer than two; 66 a file is missing; 78 one is damaged, or they have other points or parameters.
     """
@@ -207,8 +207,8 @@ def compare(
         models = [loaded(file) for file in files]
         facts = [_facts(file, model) for file, model in zip(files, models, strict=True)]
         distances = table_of_distances(models)
-        shown = None if on is None else DemonstrationSet.load(on)
-        explained = None if shown is None else [on_set(model, shown) for model in models]
+        demonstrations = None if on is None else DemonstrationSet.load(on)
+        explained = None if demonstrations is None else [on_set(model, demonstrations) for model in models]
     if as_json:
         text = {"models": facts, "distances": distances, "on": explained}
         typer.echo(json.dumps(text, indent=2, ensure_ascii=False))
@@ -224,12 +224,12 @@ def _tell(
 ) -> None:
     letters = [chr(ord("A") + number) if number < 26 else str(number) for number in range(len(files))]
     lines = [dict(_lines(one)) for one in facts]
-    shown = [name for name in lines[0] if name not in ("sha256", "file") and all(name in line for line in lines)]
+    names = [name for name in lines[0] if name not in ("sha256", "file") and all(name in line for line in lines)]
     for letter, file in zip(letters, files, strict=True):
         typer.echo(f"{letter}: {file}")
     typer.echo()
-    same = [name for name in shown if len({line[name] for line in lines}) == 1]
-    for name in shown:
+    same = [name for name in names if len({line[name] for line in lines}) == 1]
+    for name in names:
         for letter, line in zip(["same"] if name in same else letters, lines, strict=False):
             typer.echo(f"{name:<22}{letter:<6}{printable(line[name])}")
     typer.echo("\ndistance of their movements over the theta of both: root mean square (largest), cm")

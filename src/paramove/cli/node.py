@@ -1,4 +1,4 @@
-"""`paramove node`: the nodes on the bus, looked at and, one at a time, stopped, started or restarted."""
+"""`paramove node`: lists the nodes on the bus; stops, starts or restarts one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ app = typer.Typer(name="node", help="Look at the nodes on the bus; stop, start o
 
 NameArgument = Annotated[str, typer.Argument(help="name in the launch file", autocompletion=completions.nodes)]
 WaitOption = Annotated[float, typer.Option("--wait", min=0.0, metavar="SECONDS", help="for it to be done")]
-REFUSED = 1
+REJECTED = 1
 LOOK_PERIOD_S = 0.05
 
 
@@ -40,9 +40,9 @@ def list_nodes(
         supervised = {row["node"]: row for row in ask(folder, {"do": "list"})["nodes"]}
     except NoRunError:  # nodes that were started one by one
         supervised = {}
-    found = inspection.statuses(folder, seconds)
-    nodes = {**supervised, **found}
-    rows = [_row(node, found.get(node), node in found, supervised.get(node), seconds) for node in nodes]
+    statuses = inspection.statuses(folder, seconds)
+    nodes = {**supervised, **statuses}
+    rows = [_row(node, statuses.get(node), node in statuses, supervised.get(node), seconds) for node in nodes]
     if not rows and not as_json:
         typer.echo("no node is on the bus")
     show(rows, as_json)
@@ -50,7 +50,7 @@ def list_nodes(
 
 @app.command()
 def stop(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption = 10.0) -> None:
-    """Stop one node. A required one with `restart: never` takes the run with it; no other node does."""
+    """Stop one node. Stopping a required one with `restart: never` ends the run; no other does."""
     _do("stop", name, bus_folder(domain), wait_s)
 
 
@@ -67,23 +67,23 @@ def restart(name: NameArgument, domain: DomainOption = None, wait_s: WaitOption 
 
 
 def _do(action: str, name: str, folder: Path, wait_s: float) -> None:
-    """Asks the supervisor and follows what comes of it."""
+    """Sends a request to the supervisor and follows its result."""
     try:
         before = _supervised(folder, name)
         answer = ask(folder, {"do": action, "node": name})
         if not answer["ok"]:
             typer.echo(answer["sentence"], err=True)
-            raise typer.Exit(REFUSED)
-        found = _followed(folder, name, action, wait_s, None if action == "stop" else (before or {}).get("pid"))
+            raise typer.Exit(REJECTED)
+        row = _followed(folder, name, action, wait_s, None if action == "stop" else (before or {}).get("pid"))
     except NoRunError as error:
         typer.echo(str(error), err=True)
-        raise typer.Exit(REFUSED) from None
-    if found is None:
+        raise typer.Exit(REJECTED) from None
+    if row is None:
         typer.echo(f"{name}: {action} is done, and the run has ended with it")
         return
-    typer.echo(f"{name} is {found['state']}: {found['sentence']}")
-    if found["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):
-        raise typer.Exit(REFUSED)
+    typer.echo(f"{name} is {row['state']}: {row['sentence']}")
+    if row["state"] not in (("stopped",) if action == "stop" else ("ready", "degraded")):
+        raise typer.Exit(REJECTED)
 
 
 def _followed(folder: Path, name: str, action: str, wait_s: float, old_pid: int | None) -> dict[str, Any] | None:
@@ -111,7 +111,7 @@ def _supervised(folder: Path, name: str) -> dict[str, Any] | None:
 def _row(
     node: str, status: NodeStatus | None, alive: bool, supervised: dict[str, Any] | None, seconds: float
 ) -> dict[str, Any]:
-    """A line of the list, from what the node says and what its supervisor knows of it."""
+    """A line of the list, from the node's status and its supervisor."""
     if status is None:
         status = NodeStatus(sentence=f"alive, did not answer within {seconds:g} s" if alive else "")
     state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower() if status.state else "busy"

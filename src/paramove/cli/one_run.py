@@ -1,4 +1,4 @@
-"""One run for the terminal: checks, says what it found, runs, and turns every error into a line and an exit code."""
+"""One run for the terminal: checks, prints notes, runs, and turns every error into a line and an exit code."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ OVERLAY = "view"
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What the command line asks for; see `paramove launch --help`."""
+class RunOptions:
+    """Options of the command line; see `paramove launch --help`."""
 
     name: str
     overlays: Sequence[str] | None
@@ -53,13 +53,13 @@ class Wanted:
     page: bool = False
 
 
-def run(wanted: Wanted, check_only: bool) -> int:
+def run(options: RunOptions, check_only: bool) -> int:
     """Runs an application, or only checks it; returns the exit code. Never waits for the terminal."""
     with QueuedOutput() as output:
-        return _run(wanted, check_only, output)
+        return _run(options, check_only, output)
 
 
-def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
+def _run(options: RunOptions, check_only: bool, output: QueuedOutput) -> int:
     console = Console(highlight=False, markup=False, emoji=False)
     errors = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
     launch = None
@@ -68,11 +68,11 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
         environment = examined(os.environ, workspace.root)
         for note in environment.notes:
             errors.print(f"note: {note}")
-        overlays, settings = wanted.overlays, list(wanted.settings)
-        if wanted.page:
-            overlays, title = with_page(workspace, wanted.name, overlays)
+        overlays, settings = options.overlays, list(options.settings)
+        if options.page:
+            overlays, title = with_page(workspace, options.name, overlays)
             settings.insert(0, title)
-        launch = load(workspace, wanted.name, overlays, settings, wanted.seed, wanted.headless)
+        launch = load(workspace, options.name, overlays, settings, options.seed, options.headless)
         if check_only:
             application.check(launch, workspace)
             console.print("\n".join(_found(launch, environment, workspace)), soft_wrap=True)
@@ -80,8 +80,8 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
         outcome, folder = application.run(
             launch,
             workspace,
-            lambda folder: _view(console, output, folder, environment, workspace, wanted.headless),
-            wanted.runs,
+            lambda folder: _view(console, output, folder, environment, workspace, options.headless),
+            options.runs,
         )
     except LaunchFileMissingError as error:
         errors.print(str(error))
@@ -89,7 +89,7 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
     except (DocumentError, DomainNameError) as error:
         errors.print(str(error))
         if launch is not None and (left_out := _left_out(launch)):
-            errors.print(f"note: --with leaves out what is laid over by default; name it too: --with {left_out}")
+            errors.print(f"note: --with replaces the default overlays; to apply them too: --with {left_out}")
         return exit_codes.CONFIGURATION
     except DomainError as error:
         errors.print(str(error))
@@ -98,10 +98,10 @@ def _run(wanted: Wanted, check_only: bool, output: QueuedOutput) -> int:
         errors.print(str(error))
         return exit_codes.PERMISSION
     except OSError as error:
-        errors.print(_about_files(error, (wanted.runs or workspace.root / "runs").resolve(), environment))
+        errors.print(_about_files(error, (options.runs or workspace.root / "runs").resolve(), environment))
         return exit_codes.PERMISSION if isinstance(error, PermissionError) else exit_codes.FAILURE
     if output.dropped:
-        errors.print("note: the terminal took nothing for a while, so lines are missing; `paramove logs` shows them")
+        errors.print("note: the terminal blocked for a while, so lines are missing; `paramove logs` shows them")
     console.print(f"{_verdict(outcome)}{outcome.reason}. Run folder: {folder.path}", soft_wrap=True)
     return outcome.code
 
@@ -127,14 +127,14 @@ def _found(launch: Launch, environment: Environment, workspace: Workspace) -> li
 
 
 def _about_files(error: OSError, runs: Path, environment: Environment) -> str:
-    """The system's message with what to do: another place for runs, or for sockets."""
-    place = Path(os.fsdecode(error.filename)) if error.filename else Path()
-    message = f"{place}: {error.strerror or error}"
-    if place in (environment.sockets, *environment.sockets.parents[:2]):
+    """The system's message with what to do: another folder for runs, or for sockets."""
+    path = Path(os.fsdecode(error.filename)) if error.filename else Path()
+    message = f"{path}: {error.strerror or error}"
+    if path in (environment.sockets, *environment.sockets.parents[:2]):
         return f"{message}; sockets lie in {environment.sockets}. Set XDG_RUNTIME_DIR to a folder of yours"
-    if place in (runs, *runs.parents) or place.is_relative_to(runs):
+    if path in (runs, *runs.parents) or path.is_relative_to(runs):
         other = Path(tempfile.gettempdir()) / "paramove_runs"
-        return f"{message}; the folder of the run is made in {runs}. Name another place: --runs {other}"
+        return f"{message}; the folder of the run is made in {runs}. Choose another folder: --runs {other}"
     return message
 
 
@@ -168,7 +168,7 @@ def with_page(workspace: Workspace, name: str, overlays: Sequence[str] | None) -
 
 
 class AnnouncingView:
-    """Another view that also tells the page's link as soon as there is one, and opens it where there is a display.
+    """Another view that also prints the page's link as soon as there is one, and opens it where there is a display.
 
     Args:
         view: Shows the run.
@@ -178,7 +178,7 @@ class AnnouncingView:
     def __init__(self, view: View, run_folder: Path) -> None:
         self._view = view
         self._run_folder = run_folder
-        self._told = False
+        self._link_printed = False
 
     @property
     def closed_by(self) -> signal.Signals | None:
@@ -199,8 +199,8 @@ class AnnouncingView:
 
     def refresh(self, nodes: Iterable[SupervisedNode]) -> None:
         """As the other view; looks for the link."""
-        if not self._told and (link := link_in(self._run_folder)):
-            self._told = True
+        if not self._link_printed and (link := link_in(self._run_folder)):
+            self._link_printed = True
             self._view.story(f"live page: {link}")
             if _has_display():
                 threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()  # it may take seconds
@@ -212,5 +212,5 @@ class AnnouncingView:
 
 
 def _has_display() -> bool:
-    """Whether a person sits at this machine's screen and looks at this terminal."""
+    """Whether a person at this machine's screen uses this terminal."""
     return sys.stdout.isatty() and bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,4 +1,4 @@
-"""`paramove recognize`: which action a movement is, with which parameters, and how surely."""
+"""`paramove recognize`: the action of a movement, its parameters and their uncertainty."""
 
 from __future__ import annotations
 
@@ -37,25 +37,27 @@ def recognize(
     ],
     model: ModelsOption,
     unfinished: Annotated[
-        bool, typer.Option("--unfinished", help="it is the beginning of a movement: say what it will be")
+        bool, typer.Option("--unfinished", help="it is the beginning of a movement: predict the rest")
     ] = False,
     find: Annotated[
         str | None, typer.Option("--find", metavar="POINT", help="each movement of POINT, by its speed")
     ] = None,
     mapping: demos_import.MappingOption = None,
-    unit: Annotated[str | None, typer.Option(help="m, cm or mm, if the file does not tell")] = None,
+    unit: Annotated[str | None, typer.Option(help="m, cm or mm, if the file does not have it")] = None,
     axes: Annotated[str | None, typer.Option(help="as in `paramove demos import`")] = None,
-    rate: Annotated[float | None, typer.Option(min=0.001, help="frames per second, if the file does not tell")] = None,
+    rate: Annotated[
+        float | None, typer.Option(min=0.001, help="frames per second, if the file does not have it")
+    ] = None,
     point: demos_import.PointsOption = None,
     plot: PlotOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say which action a movement is and with which parameters; of several models, which explains it best.
+    """Recognize the action of a movement and its parameters; of several models, the one that explains it best.
 
     Theta comes with the region that holds it in 95 % of the cases. A movement with a p-value below 1 % is rejected
     as none of the known actions.
 
-    Exit codes: 0, also where nothing known was seen; 66 a file is missing; 78 a file or the movement cannot be used.
+    Exit codes: 0, also for an unknown action; 66 a file is missing; 78 a file or the movement cannot be used.
     """
     from paramove.cli.recognize import movements_of
     from paramove.training import Examiner
@@ -69,7 +71,7 @@ def recognize(
         console = Console(stderr=True, highlight=False, emoji=False)
         many = len(movements) > 20
         try:
-            found = [
+            recognitions = [
                 examiner.examine(movement, finished=not unfinished)
                 for movement in track(movements, "movements", console=console, transient=True, disable=not many)
             ]
@@ -79,53 +81,55 @@ def recognize(
             from paramove.demonstrations import write_plot
             from paramove.training import plot_recognition
 
-            write_plot(plot_recognition(examiner.models, found), plot, f"{source.name}: {len(found)} movements")
-    _tell(found, as_json)
+            write_plot(
+                plot_recognition(examiner.models, recognitions), plot, f"{source.name}: {len(recognitions)} movements"
+            )
+    _print(recognitions, as_json)
     if plot is not None and not as_json:
         typer.echo(str(plot))
 
 
-def _tell(found: list[Recognition], as_json: bool) -> None:
+def _print(recognitions: list[Recognition], as_json: bool) -> None:
     from paramove.training import confusion
 
-    facts = [one.facts() for one in found]
-    table = confusion(found)
+    facts = [one.facts() for one in recognitions]
+    table = confusion(recognitions)
     if as_json:
         typer.echo(json.dumps({"movements": facts, "confusion": table or None}, indent=2, ensure_ascii=False))
     elif len(facts) == 1:
-        for name, value in _lines(facts[0], found[0]):
+        for name, value in _lines(facts[0], recognitions[0]):
             typer.echo(f"{name + ':':<16}{printable(value)}")
     else:
         table_of([_row(number, one) for number, one in enumerate(facts)])
-        _summary(found, table)
+        _summary(recognitions, table)
 
 
-def _lines(facts: dict[str, Any], found: Recognition) -> list[tuple[str, str]]:
+def _lines(facts: dict[str, Any], recognition: Recognition) -> list[tuple[str, str]]:
     """One movement, in words."""
     from paramove.training import percent, with_unit
 
     others = sorted(facts["posterior"].items(), key=lambda item: -item[1])
     rows = [("movement", f"{facts['movement']} ({facts['seconds']:.3g} s)")]
-    if found.known and len(others) == 1:
-        rows.append(("action", f"{found.action}, the only one that was asked"))
-    elif found.known:
-        rows.append(("action", ", ".join(f"{name} {percent(share)}" for name, share in others[:4])))
+    if recognition.known and len(others) == 1:
+        rows.append(("action", f"{recognition.action}, the only one that was asked"))
+    elif recognition.known:
+        rows.append(("action", ", ".join(f"{name} {percent(probability)}" for name, probability in others[:4])))
     else:
-        rows.append(("action", f"none of the known ones; the nearest is {found.action}"))
+        rows.append(("action", f"none of the known ones; the nearest is {recognition.action}"))
     rows += [
         (with_unit(name), f"{value:.4g} ± {facts['theta_region_95'][name]:.2g} (95 %)")
         for name, value in facts["theta"].items()
     ]
-    if found.outside:
-        rows.append(("beware", f"{', '.join(found.outside)} outside what the model was trained with"))
-    p_value = "this model has none" if found.p_value is None else percent(found.p_value)
+    if recognition.outside:
+        rows.append(("beware", f"{', '.join(recognition.outside)} outside what the model was trained with"))
+    p_value = "this model has none" if recognition.p_value is None else percent(recognition.p_value)
     rows += [("p-value", p_value), ("log-likelihood", f"{facts['log_likelihood']:.1f}")]
     if "labelled_action" in facts:
         rows.append(("labelled", facts["labelled_action"]))
-    if found.labelled is not None:
-        told = ", ".join(f"{value:.4g}" for value in found.labelled)
+    if recognition.labelled is not None:
+        label = ", ".join(f"{value:.4g}" for value in recognition.labelled)
         inside = "inside" if facts["labelled_theta_in_region"] else "outside"
-        rows.append(("labelled theta", f"{told}: {inside} the region"))
+        rows.append(("labelled theta", f"{label}: {inside} the region"))
     return rows
 
 
@@ -147,7 +151,7 @@ def _row(number: int, facts: dict[str, Any]) -> dict[str, Any]:
     return row
 
 
-def _summary(found: list[Recognition], table: dict[str, dict[str, int]]) -> None:
+def _summary(recognitions: list[Recognition], table: dict[str, dict[str, int]]) -> None:
     import numpy as np
 
     if table:
@@ -156,22 +160,22 @@ def _summary(found: list[Recognition], table: dict[str, dict[str, int]]) -> None
         table_of([{"": name} | {other: row.get(other, 0) for other in taken} for name, row in sorted(table.items())])
         right = sum(row.get(name, 0) for name, row in table.items())
         typer.echo(f"{right} of {sum(sum(row.values()) for row in table.values())} right")
-    labelled = [one for one in found if one.labelled is not None and one.action == one.movement.action]
+    labelled = [one for one in recognitions if one.labelled is not None and one.action == one.movement.action]
     if labelled:
         errors = np.stack([one.estimate.theta - one.labelled for one in labelled if one.labelled is not None])
         rms = np.sqrt((errors**2).mean(axis=0))
         inside = sum(bool(one.facts()["labelled_theta_in_region"]) for one in labelled)
         names = labelled[0].parameter_names
-        told = ", ".join(f"{name} {value:.3g}" for name, value in zip(names, rms, strict=True))
-        typer.echo(f"error of theta, RMS: {told}; {inside} of {len(labelled)} labels lie in the 95 % region")
+        rms_text = ", ".join(f"{name} {value:.3g}" for name, value in zip(names, rms, strict=True))
+        typer.echo(f"error of theta, RMS: {rms_text}; {inside} of {len(labelled)} labels lie in the 95 % region")
 
 
 def movements_of(path: Path, options: ImportOptions, find: str | None = None) -> list[Movement]:
     """All movements of a file or folder.
 
     Args:
-        path: a demonstration set; a recording, whose labels beside it count; C3D, BVH, CSV or NPZ.
-        options: what a file of motion capture does not tell.
+        path: a demonstration set; a recording with its labels next to it; C3D, BVH, CSV or NPZ.
+        options: what a file of motion capture does not contain.
         find: body point: every movement of it, by its speed. None: the labelled ones, else all frames as one.
 
     Raises DemonstrationError if nothing is there or it cannot be used.
@@ -208,7 +212,7 @@ def _of_take(take: Take, parameter_names: tuple[str, ...], path: Path, find: str
     if find is not None:
         spans = movements_by_speed(take.time, take.positions, take.point_names, find, MAX_GAP_S)
         if not spans:
-            raise DemonstrationError(f"{path}: {find} never exceeds 15 cm/s: no movement is found; is the unit right?")
+            raise DemonstrationError(f"{path}: {find} never exceeds 15 cm/s: no movement found; check the unit")
         labels = [Label(first, end, "") for first, end in spans]
     else:
         labels = list(take.labels) or [Label(0, len(take.time), "")]

@@ -28,7 +28,7 @@ def recover_recording(
 ) -> None:
     """Rebuild a finished recording from one whose writer was killed or whose bytes are damaged.
 
-    Everything that can be read is kept; the file itself is only read, and no file is written over.
+    Everything readable is recovered; the file itself is only read, and no file is overwritten.
 
     Exit codes: 0 recovered, or nothing to recover; 2 the output exists; 66 no such file; 75 it is being written;
     78 nothing in it can be read.
@@ -49,8 +49,8 @@ def recover_recording(
         typer.echo("\n".join(_lines(result)))
 
 
-def _ended(sentence: str, code: int) -> typer.Exit:
-    typer.echo(printable(sentence), err=True)
+def _ended(message: str, code: int) -> typer.Exit:
+    typer.echo(printable(message), err=True)
     return typer.Exit(code)
 
 
@@ -75,14 +75,14 @@ def _lines(result: Recovery) -> list[str]:
         return [f"{result.source} is whole ({kept}): nothing to recover"]
     counted = f"{result.lost} messages, {result.seconds_lost:.3f} s"
     if not result.lost_is_exact:
-        counted = f"at least {counted}, and what these bytes held" if result.lost else "what these bytes held"
-    lines = [f"{result.destination}: kept {kept}", f"lost {counted}{':' if result.damages else ''}"]
+        counted = f"at least {counted}, and the content of these bytes" if result.lost else "the content of these bytes"
+    lines = [f"{result.destination}: recovered {kept}", f"lost {counted}{':' if result.damages else ''}"]
     lines += [f"  bytes {one.begin}-{one.end}: {one.what}" for one in result.damages[:MAX_DAMAGES]]
     if len(result.damages) > MAX_DAMAGES:
         lines.append(f"  and {len(result.damages) - MAX_DAMAGES} more")
     if result.known_until_s is not None:
         lines += [
-            f"not known: what came after the message of {result.known_until_s:.3f} s, as its writer never finished it",
+            f"unknown: whether messages followed that of {result.known_until_s:.3f} s, as its writer never finished it",
             f"  it wrote last at {result.last_written.isoformat(timespec='seconds')}; a recorder that was killed takes "
             "0.5 s with it at most, a power failure may cost 2 s",
         ]

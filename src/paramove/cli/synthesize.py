@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 
 RATE_HZ = 60.0
-"""Of models that do not tell the rate of their demonstrations."""
+"""For models without the rate of their demonstrations."""
 SECONDS = 1.0
-"""Of models that do not tell how long their demonstrations last."""
+"""For models without the duration of their demonstrations."""
 
 
 @app.command()
@@ -40,7 +40,7 @@ def synthesize(
 ) -> None:
     """Make the movement for the parameters theta.
 
-    Exit codes: 0, also for theta outside what the model was trained with, which is told; 2 wrong arguments or a
+    Exit codes: 0, also for theta outside the training range, with a warning; 2 wrong arguments or a
     recording that exists; 66 there is no model; 78 it is damaged, or theta has another number of components.
     """
     import numpy as np
@@ -83,11 +83,11 @@ def _check(model: ParametricHMM, theta: object) -> None:
     low_high = [f"{with_unit(name)}: {a:.4g} to {b:.4g}" for name, a, b in zip(names, low, high, strict=True)]
     if len(values) != len(names):
         raise InputError(f"theta has {len(names)} components ({'; '.join(low_high)}), found {len(values)} in --theta")
-    outside = [told for told, value, minimum, maximum in zip(low_high, values, low, high, strict=True)
+    outside = [bounds for bounds, value, minimum, maximum in zip(low_high, values, low, high, strict=True)
                if not minimum <= value <= maximum]  # fmt: skip
     if outside:
         typer.echo(
-            printable(f"theta is outside what the model was trained with, the movement is extrapolated: "
+            printable(f"theta is outside the training range, the movement is extrapolated: "
                       f"{'; '.join(outside)}"),
             err=True,
         )  # fmt: skip

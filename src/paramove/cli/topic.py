@@ -41,7 +41,7 @@ def list_topics(domain: DomainOption = None, as_json: JsonOption = False) -> Non
 def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = False, wait_s: float = 1.0) -> None:
     """Show one topic: its row of the table, its publisher and the number of its messages."""
     folder, topic = bus_folder(domain), topic_named(name)
-    found = inspection.publisher_of(folder, topic)
+    publisher = inspection.publisher_of(folder, topic)
     row: dict[str, Any] = {
         "topic": topic.name,
         "type": topic.type_name,
@@ -49,10 +49,10 @@ def info(name: NameArgument, domain: DomainOption = None, as_json: JsonOption = 
         "profile": topic.profile.value,
         "frame": topic.frame,
         "recorded": topic.recorded,
-        "alive": found.alive,
-        "publisher": found.holder if found.alive else "none",
+        "alive": publisher.alive,
+        "publisher": publisher.holder if publisher.alive else "none",
     }
-    if found.alive:
+    if publisher.alive:
         (measured,) = inspection.measure(folder, [topic], wait_s)
         row |= {"answers": measured.welcomed, "epoch": measured.epoch, "published": measured.sequence}
     if as_json:
@@ -127,18 +127,18 @@ def hz(
 
 def readable(message: Any) -> dict[str, Any]:
     """A message as JSON values; long byte fields only by their length."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for field, value in message.ListFields():
         repeated = not isinstance(value, str | bytes) and hasattr(value, "__len__") and not field.message_type
         if field.message_type and hasattr(value, "ListFields"):
-            found[field.name] = readable(value)
+            values[field.name] = readable(value)
         elif field.message_type:
-            found[field.name] = [readable(item) for item in value]
+            values[field.name] = [readable(item) for item in value]
         elif repeated:
-            found[field.name] = [_scalar(field, item) for item in value]
+            values[field.name] = [_scalar(field, item) for item in value]
         else:
-            found[field.name] = _scalar(field, value)
-    return found
+            values[field.name] = _scalar(field, value)
+    return values
 
 
 def _scalar(field: Any, value: Any) -> Any:

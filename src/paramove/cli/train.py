@@ -45,8 +45,8 @@ def train(
         Literal["correlated", "independent"] | None,
         typer.Option(help="whether whole performances are modelled, or frames as in the thesis"),
     ] = None,
-    body: Annotated[bool, typer.Option("--body", help="seen from the person, left arms mirrored")] = False,
-    leave_out: Annotated[LeaveOut, typer.Option(help="train again without each, and ask about it")] = "theta",
+    body: Annotated[bool, typer.Option("--body", help="in the person's body frame, left arms mirrored")] = False,
+    leave_out: Annotated[LeaveOut, typer.Option(help="train again without each, and test with it")] = "theta",
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help=".npz, or a folder (default: models/ACTION.npz, models/SET)"),
@@ -65,9 +65,9 @@ def train(
 
     console = Console(stderr=True, highlight=False, emoji=False, markup=False)
     with one_sentence():
-        shown = DemonstrationSet.load(folder)
+        demonstrations = DemonstrationSet.load(folder)
         examples = examples_of(
-            shown, action=action, parameters=words(parameters), body=body, source=folder.resolve().name
+            demonstrations, action=action, parameters=words(parameters), body=body, source=folder.resolve().name
         )
         for remark in examples.remarks:
             console.print(printable(remark), soft_wrap=True)
@@ -114,18 +114,18 @@ def _trained(
     try:
         with console.status("training: " + ", ".join(examples.actions)):
             trained = train_and_write(examples, make, goal)
-        written = f"written is {goal}, but not how well it does on what it has not seen"
+        written = f"{goal} was written, but not its accuracy on data that it was not trained with"
         if leave_out == "none":
             return trained
         with Progress(*PROGRESS, console=console, transient=True) as progress:
             result = []
             for one in trained:
-                shown = progress.add_task(f"without each {leave_out}: {one.action}", total=None)
+                task_id = progress.add_task(f"without each {leave_out}: {one.action}", total=None)
 
-                def told(done: int, total: int, task: TaskID = shown) -> None:
+                def report(done: int, total: int, task: TaskID = task_id) -> None:
                     progress.update(task, completed=done, total=total)
 
-                result.append(with_check(one, make[one.action], leave_out, told))
+                result.append(with_check(one, make[one.action], leave_out, report))
             return result
     except KeyboardInterrupt:
         raise ended(f"interrupted: {written}", INTERRUPTED) from None
@@ -135,14 +135,14 @@ def _trained(
         raise InputError(f"nothing can be learned so: {_with_points(str(error), examples.point_names)}") from error
 
 
-def _with_points(sentence: str, names: tuple[str, ...]) -> str:
-    """The sentence with names of body points for numbers of dimensions."""
+def _with_points(message: str, names: tuple[str, ...]) -> str:
+    """The message with names of body points for numbers of dimensions."""
 
-    def named(found: re.Match[str]) -> str:
-        point, axis = divmod(int(found[1]), 3)
-        return f"{names[point]}_{'xyz'[axis]}" if point < len(names) else found[0]
+    def named(match: re.Match[str]) -> str:
+        point, axis = divmod(int(match[1]), 3)
+        return f"{names[point]}_{'xyz'[axis]}" if point < len(names) else match[0]
 
-    return re.sub(r"dimension (\d+)", named, sentence)
+    return re.sub(r"dimension (\d+)", named, message)
 
 
 def _tell(trained: list[Trained], report: Path | None, as_json: bool) -> None:

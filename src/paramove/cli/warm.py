@@ -108,9 +108,11 @@ def _camera() -> CalibratedCamera:
 
     from paramove.cameras import CalibratedCamera
 
-    place = np.array([[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]])
+    camera_from_table = np.array(
+        [[0.0, -1.0, 0.0, -0.2], [0.0, 0.0, -1.0, 0.2], [1.0, 0.0, 0.0, 1.5], [0.0, 0.0, 0.0, 1.0]]
+    )
     lens = np.array([[300.0, 0.0, 159.5], [0.0, 300.0, 119.5], [0.0, 0.0, 1.0]])
-    return CalibratedCamera("camera", 320, 240, lens, np.zeros(4), place)
+    return CalibratedCamera("camera", 320, 240, lens, np.zeros(4), camera_from_table)
 
 
 def _images() -> None:

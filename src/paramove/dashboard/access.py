@@ -1,6 +1,6 @@
-"""Who may see the page: rules for one HTTP request, without sockets.
+"""Access control of the page: rules for one HTTP request, without sockets.
 
-The page listens on loopback, which other users of the machine and every web site open in a browser can reach, too. So a
+The page listens on loopback, which other users of the machine and any web site in a browser can reach, too. So a
 request must
 
 1. be a GET for a host name of ours (against DNS rebinding: a foreign name that was made to point here),
@@ -25,7 +25,7 @@ PAGE = "/"
 
 
 class Kind(enum.Enum):
-    """What to answer a request with."""
+    """Kind of answer to a request."""
 
     REFUSED = "refused"
     PAGE = "page"
@@ -35,13 +35,13 @@ class Kind(enum.Enum):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What follows from a request.
+    """Decision about a request.
 
     Attributes:
-        status: HTTP status of a refusal.
-        sentence: Why it is refused, for a person; holds nothing of the request.
-        file: Name of the file asked for.
-        by_token: The page was asked for with the token, which is spent now.
+        status: HTTP status of a rejection.
+        sentence: Why it is rejected, for a person; has nothing of the request.
+        file: Name of the requested file.
+        by_token: The page was requested with the token, which is used up now.
     """
 
     kind: Kind
@@ -53,27 +53,27 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Secrets:
-    """Random words: the link's token, the session (cookie) and the key (for the socket)."""
+    """Random strings: the link's token, the session (cookie) and the key (for the socket)."""
 
     token: str = field(repr=False)
     session: str = field(repr=False)
     key: str = field(repr=False)
 
 
-def _refused(status: http.HTTPStatus, sentence: str) -> Verdict:
-    return Verdict(Kind.REFUSED, status, sentence)
+def _rejected(status: http.HTTPStatus, message: str) -> Verdict:
+    return Verdict(Kind.REFUSED, status, message)
 
 
 FORBIDDEN, NOT_FOUND = http.HTTPStatus.FORBIDDEN, http.HTTPStatus.NOT_FOUND
 WITHOUT_LINK = (
     "This page opens by the link that `paramove launch --view` prints. A link works once; "
-    "a fresh one stands in live_page.json in the folder of the run."
+    "a fresh one is in live_page.json in the folder of the run."
 )
 
 
 @dataclass
 class Access:
-    """Judges requests.
+    """Checks requests.
 
     Args:
         port: Where the page listens.
@@ -97,25 +97,25 @@ class Access:
 
     def judge(self, method: str, target: str, headers: Iterable[tuple[str, str]]) -> Verdict:
         """What to answer; `target` is the request line's path with its query, as it was sent."""
-        found: dict[str, list[str]] = {}
+        values: dict[str, list[str]] = {}
         for name, value in headers:
-            found.setdefault(name.lower(), []).append(value)
+            values.setdefault(name.lower(), []).append(value)
         if method != "GET":
-            return _refused(http.HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is answered here.")
-        if len(found.get("host", ())) != 1 or found["host"][0] not in self.hosts:
-            return _refused(FORBIDDEN, f"Only {' and '.join(self.hosts)} are answered here.")
+            return _rejected(http.HTTPStatus.METHOD_NOT_ALLOWED, "Only GET is accepted.")
+        if len(values.get("host", ())) != 1 or values["host"][0] not in self.hosts:
+            return _rejected(FORBIDDEN, f"Only {' and '.join(self.hosts)} are accepted as Host.")
         path, _, query = target.partition("?")
         parameters = parse_qs(query, max_num_fields=4) if query.count("&") < 4 else {}
         if path == PAGE and _same(parameters.get("token", [""])[0], self.secrets.token):
             return Verdict(Kind.PAGE, by_token=True)
         if path == SOCKET:
-            return self._socket(found, parameters.get("key", [""])[0])
-        if not self._has_session(found):
-            return _refused(FORBIDDEN, WITHOUT_LINK)
+            return self._socket(values, parameters.get("key", [""])[0])
+        if not self._has_session(values):
+            return _rejected(FORBIDDEN, WITHOUT_LINK)
         if path == PAGE:
             return Verdict(Kind.PAGE)
         name = path.removeprefix("/")
-        return Verdict(Kind.FILE, file=name) if name in self.files else _refused(NOT_FOUND, "There is nothing here.")
+        return Verdict(Kind.FILE, file=name) if name in self.files else _rejected(NOT_FOUND, "Not found.")
 
     def _has_session(self, headers: dict[str, list[str]]) -> bool:
         """Whether any cookie is ours; what other programs of this host store is split, never parsed."""
@@ -125,9 +125,9 @@ class Access:
     def _socket(self, headers: dict[str, list[str]], key: str) -> Verdict:
         origins = headers.get("origin", [])
         if not _same(key, self.secrets.key):
-            return _refused(FORBIDDEN, WITHOUT_LINK)
+            return _rejected(FORBIDDEN, WITHOUT_LINK)
         if origins != [f"http://{headers['host'][0]}"]:
-            return _refused(FORBIDDEN, "Only the page itself may open the socket.")
+            return _rejected(FORBIDDEN, "Only the page itself may open the socket.")
         return Verdict(Kind.SOCKET)
 
 

@@ -1,7 +1,7 @@
-"""`live_page.json` in the run's folder: the link for a person, and what a page needs to come back after a failure.
+"""`live_page.json` in the run's folder: the link for a person, and what a page needs to restart after a failure.
 
 Only its owner may read it (mode 0600). With the same port, session and key a restarted page answers the browsers that
-were connected before. The secrets are worth nothing once the page has ended; the file then goes.
+were connected before. The secrets are useless once the page has ended; the file is then removed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 NAME = "live_page.json"
 
 
-def _word() -> str:
+def _secret() -> str:
     return secrets.token_urlsafe(24)
 
 
@@ -40,18 +40,20 @@ class LinkFile:
 
     @property
     def link(self) -> str:
-        """What a person opens; works once."""
+        """Link to open in a browser; works once."""
         return f"http://127.0.0.1:{self.port}/?token={self.secrets.token}"
 
     @classmethod
-    def kept_or_new(cls, folder: Path, port: int) -> LinkFile:
+    def stored_or_new(cls, folder: Path, port: int) -> LinkFile:
         """The file of a page that ran before in this run, else a new one that is not written yet."""
         path = folder / NAME
         try:
-            kept = json.loads(path.read_text(encoding="utf-8"))
-            return cls(path, int(kept["port"]), Secrets(str(kept["token"]), str(kept["session"]), str(kept["key"])))
+            stored = json.loads(path.read_text(encoding="utf-8"))
+            return cls(
+                path, int(stored["port"]), Secrets(str(stored["token"]), str(stored["session"]), str(stored["key"]))
+            )
         except (OSError, ValueError, KeyError, TypeError):
-            return cls(path, port, Secrets(_word(), _word(), _word()))
+            return cls(path, port, Secrets(_secret(), _secret(), _secret()))
 
     def at(self, port: int) -> LinkFile:
         """The same at another port."""
@@ -59,10 +61,10 @@ class LinkFile:
 
     def with_fresh_token(self) -> LinkFile:
         """The same with a token that was never used."""
-        return replace(self, secrets=replace(self.secrets, token=_word()))
+        return replace(self, secrets=replace(self.secrets, token=_secret()))
 
     def write(self) -> None:
-        """Writes the file at once and whole. On a full disk the page goes on with the file as it was."""
+        """Writes the file at once and whole. On a full disk the file stays as it was."""
         content = {
             "link": self.link,
             "port": self.port,

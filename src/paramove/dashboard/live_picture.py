@@ -1,4 +1,4 @@
-"""All that the page shows of a running application: hears messages, gives what has changed."""
+"""Content of the page: handles messages of a running application and gives the changed sections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 from pydantic import BaseModel, ConfigDict
 
 from paramove.bus import Received, topics
-from paramove.dashboard.beliefs import Beliefs
+from paramove.dashboard.estimates import Estimates
 from paramove.dashboard.node_table import NodeTable
 from paramove.dashboard.robot_shape import RobotShape
 from paramove.msgs.node_status_pb2 import NodeStatus
@@ -42,8 +42,8 @@ class LivePicture:
         robot: Its shape, joints and base pose.
         title: Of the page.
         surface: The working surface and the objects on it.
-        side: Arm in whose shoulder's frame the nodes speak of places; with a servo arm it is the base's.
-        wall_s: Monotonic clock on the wall; the nodes say their status by it.
+        side: Arm whose shoulder's frame positions are in; with a servo arm it is the base's.
+        wall_s: Monotonic wall clock, for the age of the nodes' statuses.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class LivePicture:
     ) -> None:
         origin, self._gripper = _sites_of(robot, side)
         self._shape = RobotShape(robot.model_path, dict(zip(robot.joint_names, robot.base_pose, strict=True)))
-        self._beliefs = Beliefs((surface.x, surface.y))
+        self._estimates = Estimates((surface.x, surface.y))
         self._nodes = NodeTable()
         self._wall_s = wall_s
         self._given: dict[str, Any] = {}
@@ -71,39 +71,39 @@ class LivePicture:
             "surface": {"x": surface.x, "y": surface.y, "z": surface.z},
             "object": {"radius": surface.object_radius, "height": surface.object_height},
         }
-        beliefs = self._beliefs
+        estimates = self._estimates
         self._handlers: dict[str, Callable[[Any, float], None]] = {
-            topics.APPLICATION_STAGE.name: beliefs.on_stage,
-            topics.SPEECH.name: beliefs.on_speech,
-            topics.RULES.name: beliefs.on_rules,
-            topics.CALIBRATION_PLANE.name: beliefs.on_plane,
-            topics.OBJECTS_TRACKED.name: beliefs.on_tracked,
-            topics.GESTURES.name: beliefs.on_gesture,
-            topics.RELOCATION_GOAL.name: beliefs.on_goal,
-            topics.RELOCATION_STATUS.name: beliefs.on_goal_status,
+            topics.APPLICATION_STAGE.name: estimates.on_stage,
+            topics.SPEECH.name: estimates.on_speech,
+            topics.RULES.name: estimates.on_rules,
+            topics.CALIBRATION_PLANE.name: estimates.on_plane,
+            topics.OBJECTS_TRACKED.name: estimates.on_tracked,
+            topics.GESTURES.name: estimates.on_gesture,
+            topics.RELOCATION_GOAL.name: estimates.on_goal,
+            topics.RELOCATION_STATUS.name: estimates.on_goal_status,
         }
 
-    def handle(self, heard: Received) -> None:
-        """Take in one message of any topic that the page knows."""
-        if heard.topic.name in self._handlers:
-            self._handlers[heard.topic.name](heard.message, heard.captured_ns * 1e-9)
-        elif heard.topic.name == topics.CAMERA_IMAGE.name:
-            self._image = bytes(heard.message.data)
-        elif heard.topic.name == topics.ACTION_OUTLINE.name:
-            self._arm = _drawn_arm(heard.message)
-        elif heard.topic.name == topics.ARM_JOINT_STATES.name:
-            self._joints = heard.message
-        elif heard.topic.name == topics.ARM_SAFETY.name:
-            self._safety = _safety(heard.message)
-        elif heard.topic.type is NodeStatus:
-            self._nodes.handle(heard.message, self._wall_s())
+    def handle(self, received: Received) -> None:
+        """Handles one message of any topic that the page uses."""
+        if received.topic.name in self._handlers:
+            self._handlers[received.topic.name](received.message, received.captured_ns * 1e-9)
+        elif received.topic.name == topics.CAMERA_IMAGE.name:
+            self._image = bytes(received.message.data)
+        elif received.topic.name == topics.ACTION_OUTLINE.name:
+            self._arm = _drawn_arm(received.message)
+        elif received.topic.name == topics.ARM_JOINT_STATES.name:
+            self._joints = received.message
+        elif received.topic.name == topics.ARM_SAFETY.name:
+            self._safety = _safety(received.message)
+        elif received.topic.type is NodeStatus:
+            self._nodes.handle(received.message, self._wall_s())
 
     def changes(self, now_ns: int, stop: dict[str, Any]) -> dict[str, Any]:
-        """Sections that are not what they were at the last call.
+        """Sections that have changed since the last call.
 
         Args:
             now_ns: Time of the bus clock.
-            stop: What has become of a person's stop.
+            stop: Progress of a person's stop.
         """
         if self._joints is not None:
             self._shape.move({joint.name: joint.position for joint in self._joints.joints})
@@ -111,7 +111,7 @@ class LivePicture:
         sections = {
             "world": self._world,
             "clock": round(now_ns * 1e-9, 1),
-            **self._beliefs.sections(now_ns * 1e-9),
+            **self._estimates.sections(now_ns * 1e-9),
             "robot": {"poses": self._shape.poses(), "gripper": _rounded(self._shape.site(self._gripper))},
             "arm": self._arm,
             "safety": self._safety,
@@ -130,7 +130,7 @@ class LivePicture:
 
 
 def _sites_of(robot: RobotDescription, side: str) -> tuple[str, str]:
-    """Where the frame of places has its origin, and the gripper's site."""
+    """Sites of the origin of positions and of the gripper."""
     if robot.chain is not None:
         return robot.chain.sites.base, robot.chain.sites.end_effector
     sites = robot.arm(side).sites
@@ -178,7 +178,7 @@ def _rounded(values: Any) -> list[float]:
 
 
 def _finite(content: Any) -> Any:
-    """The same with None for numbers that JSON does not know."""
+    """The same with None for numbers that JSON does not have."""
     if isinstance(content, float):
         return content if math.isfinite(content) else None
     if isinstance(content, dict):

@@ -1,4 +1,4 @@
-"""How the nodes fare, from what each says of itself."""
+"""Table of the nodes, from their statuses."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def subscribe_to_nodes(bus: Bus) -> None:
 @dataclass
 class _Node:
     status: NodeStatus
-    heard_s: float
+    received_s: float
     restarts: int = 0
     processing_ms: float | None = None  # mean of the messages between its last two statuses
 
 
 class NodeTable:
-    """Latest status of each node. Times are of the wall's monotonic clock, s."""
+    """Latest status of each node. Times are of the monotonic wall clock, s."""
 
     def __init__(self) -> None:
         self._nodes: dict[str, _Node] = {}
 
     def handle(self, status: NodeStatus, now_s: float) -> None:
-        """Take in what a node says; a new process id means that it was started again."""
+        """Handles a node's status; a new process id means that it was restarted."""
         before = self._nodes.get(status.node)
         node = _Node(status, now_s)
         if before is not None:
@@ -52,7 +52,7 @@ class NodeTable:
                 "ms": None if node.processing_ms is None else round(node.processing_ms, 1),
                 "lost": sum(count.lost for count in node.status.received),
                 "restarts": node.restarts,
-                "silent_s": round(now_s - node.heard_s),
+                "silent_s": round(now_s - node.received_s),
             }
             for name, node in sorted(self._nodes.items())
         ]

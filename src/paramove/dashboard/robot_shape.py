@@ -1,4 +1,4 @@
-"""A robot as simple bodies: what it is made of, once, and where its parts are for given joint angles."""
+"""A robot as simple bodies: their shapes, once, and their poses for given joint angles."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class RobotShape:
 
     Args:
         model_path: The MJCF file. Geoms of other types than sphere, capsule, ellipsoid, cylinder, box are left out.
-        base_pose: Joint name -> angle, rad, of the pose until joint angles are heard.
+        base_pose: Joint name -> angle, rad, of the pose until joint angles are received.
     """
 
     def __init__(self, model_path: Path, base_pose: Mapping[str, float] | None = None) -> None:
@@ -39,11 +39,11 @@ class RobotShape:
         ]
         bodies = sorted({int(self._model.geom_bodyid[geom]) for geom in self._geoms})
         self._bodies = np.array(bodies, dtype=np.intp)
-        self._places = {body: place for place, body in enumerate(bodies)}
+        self._index_of_body = {body: index for index, body in enumerate(bodies)}
         self.move(base_pose or {})
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Takes the joint angles, rad; unknown joints and values that are not finite are passed over."""
+        """Takes the joint angles, rad; unknown joints and values that are not finite are ignored."""
         for name, angle in angles.items():
             joint = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_JOINT, name)
             if joint >= 0 and np.isfinite(angle):
@@ -55,7 +55,7 @@ class RobotShape:
         return np.array(self._data.site(name).xpos, dtype=np.float64)
 
     def parts(self) -> list[dict[str, Any]]:
-        """Each geom: the place of its body in `poses`, type, size as in MJCF, pose in the body, colour."""
+        """Each geom: the index of its body in `poses`, type, size as in MJCF, pose in the body, colour."""
         model = self._model
         parts = []
         for geom in self._geoms:
@@ -63,7 +63,7 @@ class RobotShape:
             colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
             parts.append(
                 {
-                    "body": self._places[int(model.geom_bodyid[geom])],
+                    "body": self._index_of_body[int(model.geom_bodyid[geom])],
                     "type": _TYPES[int(model.geom_type[geom])],
                     "size": _rounded(model.geom_size[geom]),
                     "place": _rounded(model.geom_pos[geom]),

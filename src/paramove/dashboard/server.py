@@ -1,9 +1,9 @@
 """The page's server: a few files and one socket for each browser, on loopback, in a thread of its own.
 
-The bus's thread leaves the latest content with `show` and never waits. Each browser is sent what has changed since it
-was last sent something, once it has said "next": it has drawn what it got before. So a slow one gets fewer pictures but
-no older ones, and nothing piles up, not even in the sockets. The only other word that a browser may say is "stop"; it
-makes `pressed` readable, which the bus's thread watches.
+The bus's thread leaves the latest content with `show` and never waits. Each browser is sent the changes since its
+last message once it has sent "next", which means that it has drawn that message. So a slow one gets fewer pictures but
+no older ones, and nothing is queued, not even in the sockets. The only other message of a browser is "stop"; it makes
+`pressed` readable, which the bus's thread watches.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ all ports of this host, which are easily more than the library's 8192 bytes."""
 ADDRESS = "127.0.0.1"
 MAX_BROWSERS = 16
 MAX_CONNECTIONS = 64
-"""Open connections, those included that have not asked for anything yet."""
+"""Open connections, including those without a request yet."""
 OPENING_S = 5.0
-"""Time to ask for something, and to read the answer."""
+"""Timeout for a request, and for reading the answer."""
 SEND_PERIOD_S = 0.05
-BEAT_PERIOD_S = 1.0
-LOGGED_REFUSALS = 20
-FAREWELL_S = 3.0
+HEARTBEAT_PERIOD_S = 1.0
+LOGGED_REJECTIONS = 20
+FAREWELL_TIMEOUT_S = 3.0
 STOP, NEXT = "stop", "next"
 
 MEDIA_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
@@ -61,21 +61,21 @@ class PageServer:
         port: 0: a free one. A page that was restarted in the same run takes the port it had.
 
     Attributes:
-        pressed: An eventfd that can be read once somebody has pressed the stop button.
-        link: What a person opens.
+        pressed: An eventfd that can be read once the stop button was pressed.
+        link: Link to open in a browser.
     """
 
     def __init__(self, folder: Path, port: int = 0) -> None:
         self._files = _read_files()
-        self._link_file = LinkFile.kept_or_new(folder, port)
+        self._link_file = LinkFile.stored_or_new(folder, port)
         self._access = Access(0, frozenset(self._files) - {START}, self._link_file.secrets)
         self._sections: dict[str, tuple[int, str]] = {}
         self._image: tuple[int, bytes] = (0, b"")
         self._version = 0
-        self._shown_s = time.monotonic()
+        self._updated_s = time.monotonic()
         self._browsers = 0
         self._connections = 0
-        self._refusals = 0
+        self._rejections = 0
         self._farewell = "The run has ended."
         self._leaving = asyncio.Event()
         self._loop = asyncio.new_event_loop()
@@ -86,7 +86,7 @@ class PageServer:
 
     @property
     def link(self) -> str:
-        """What a person opens; works once, and then there is a fresh one."""
+        """Link to open in a browser; works once, and then there is a fresh one."""
         return self._link_file.link
 
     @property
@@ -96,11 +96,11 @@ class PageServer:
 
     @property
     def watched(self) -> bool:
-        """Whether any browser looks."""
+        """Whether any browser is connected."""
         return self._browsers > 0
 
     def was_pressed(self) -> bool:
-        """Whether the stop button was pressed since this was last asked."""
+        """Whether the stop button was pressed since the last call."""
         try:
             return os.eventfd_read(self.pressed) > 0
         except BlockingIOError:
@@ -108,16 +108,16 @@ class PageServer:
 
     def show(self, sections: Mapping[str, Any], image: bytes | None = None) -> None:
         """Replaces sections of the page, JSON values, and the camera's image, a JPEG. Never waits."""
-        self._shown_s = time.monotonic()
+        self._updated_s = time.monotonic()
         for name, content in sections.items():
             self._version += 1
             self._sections[name] = (self._version, json.dumps(content, separators=(",", ":"), allow_nan=False))
         if image is not None:
             self._image = (self._image[0] + 1, image)
 
-    def say_farewell(self, sentence: str) -> None:
-        """What browsers are told when the server ends."""
-        self._farewell = sentence
+    def say_farewell(self, message: str) -> None:
+        """Sets the message that browsers get when the server ends."""
+        self._farewell = message
 
     def __enter__(self) -> PageServer:
         self._thread.start()
@@ -131,12 +131,12 @@ class PageServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is not None:  # the page will be started again: browsers had better wait for it
+        if kind is not None:  # the page will be restarted: browsers wait for it
             self._farewell = ""
         self._loop.call_soon_threadsafe(self._leaving.set)
         self._thread.join()
         os.close(self.pressed)
-        if kind is None:  # after a failure the page comes back with the same secrets
+        if kind is None:  # a page restarted after a failure has the same secrets
             self._link_file.remove()
 
     def _run(self) -> None:
@@ -154,8 +154,8 @@ class PageServer:
         self._link_file = self._link_file.at(self._access.port)
         self._started.set()
         await self._leaving.wait()
-        end_s = time.monotonic() + FAREWELL_S
-        while self._browsers and time.monotonic() < end_s:  # the farewell goes out
+        end_s = time.monotonic() + FAREWELL_TIMEOUT_S
+        while self._browsers and time.monotonic() < end_s:  # until the farewell is sent
             await asyncio.sleep(SEND_PERIOD_S)
         server.close()
         await server.wait_closed()
@@ -173,33 +173,33 @@ class PageServer:
             "max_size": 64,
             "max_queue": 4,
             "server_header": None,
-            "logger": _silent(),
+            "logger": _quiet_logger(),
         }
         try:
             return await serve(self._attend, port=self._link_file.port, **options)
         except OSError:
-            if not self._link_file.path.exists():  # the port was asked for
+            if not self._link_file.path.exists():  # the port was chosen by the user
                 raise
             _log.warning("port %d of the page before is taken; another one is used", self._link_file.port)
             return await serve(self._attend, port=0, **options)
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Files and refusals; None lets the socket be opened."""
+        """Response with a file or a rejection; None opens the socket."""
         verdict = self._access.judge(request.method, request.path, request.headers.raw_items())
         if verdict.kind is Kind.SOCKET:
             if self._browsers < MAX_BROWSERS:
                 return None
-            sentence = f"{MAX_BROWSERS} browsers look already; close one of them."
-            verdict = Verdict(Kind.REFUSED, http.HTTPStatus.SERVICE_UNAVAILABLE, sentence)
+            message = f"{MAX_BROWSERS} browsers are already connected; close one of them."
+            verdict = Verdict(Kind.REFUSED, http.HTTPStatus.SERVICE_UNAVAILABLE, message)
         if verdict.kind is Kind.REFUSED:
-            self._note(request, verdict)
+            self._log_rejection(request, verdict)
             return self._response(verdict.status, "text/plain", verdict.sentence.encode() + b"\n")
         if verdict.kind is Kind.FILE:
             return self._response(http.HTTPStatus.OK, MEDIA_TYPES[Path(verdict.file).suffix], self._files[verdict.file])
         return self._page(verdict.by_token)
 
     def _page(self, by_token: bool) -> Response:
-        """The page. Who came by the token gets the session and the key, and the token is spent."""
+        """The page. With the token it has the session and the key, and the token is used up."""
         secrets = self._access.secrets
         key = secrets.key.encode() if by_token else b""
         response = self._response(http.HTTPStatus.OK, "text/html", self._files[START].replace(KEY_MARK, key))
@@ -232,20 +232,20 @@ class PageServer:
         )
         return Response(status.value, status.phrase, headers, body)
 
-    def _note(self, request: Request, verdict: Verdict) -> None:
-        self._refusals += 1
-        if self._refusals <= LOGGED_REFUSALS:
+    def _log_rejection(self, request: Request, verdict: Verdict) -> None:
+        self._rejections += 1
+        if self._rejections <= LOGGED_REJECTIONS:
             path = request.path.partition("?")[0]
-            _log.warning("refused with %d: %.20r %.80r: %s", verdict.status, request.method, path, verdict.sentence)
+            _log.warning("rejected with %d: %.20r %.80r: %s", verdict.status, request.method, path, verdict.sentence)
 
     async def _attend(self, connection: ServerConnection) -> None:
-        """Serves one browser until it goes."""
+        """Serves one browser until it disconnects."""
         self._browsers += 1
         ready = asyncio.Event()
         ready.set()
         listening = asyncio.create_task(self._listen(connection, ready))
         try:
-            await self._tell(connection, ready)
+            await self._send_changes(connection, ready)
         except ConnectionClosed:
             pass
         finally:
@@ -254,44 +254,44 @@ class PageServer:
 
     async def _listen(self, connection: ServerConnection, ready: asyncio.Event) -> None:
         try:
-            async for word in connection:
-                if word == STOP:
+            async for message in connection:
+                if message == STOP:
                     os.eventfd_write(self.pressed, 1)
-                elif word == NEXT:
+                elif message == NEXT:
                     ready.set()
                 else:
-                    await connection.close(1008, f"only {STOP!r} and {NEXT!r} are understood")
+                    await connection.close(1008, f"only {STOP!r} and {NEXT!r} are accepted")
                     return
         except ConnectionClosed:
             return
 
-    async def _tell(self, connection: ServerConnection, ready: asyncio.Event) -> None:
+    async def _send_changes(self, connection: ServerConnection, ready: asyncio.Event) -> None:
         """Sends what is new, an image first, whenever the browser is ready for it."""
-        told: dict[str, int] = {}
-        image_told = 0
-        said_s = 0.0
+        sent: dict[str, int] = {}
+        image_sent = 0
+        sent_s = 0.0
         while not self._leaving.is_set():
             await asyncio.sleep(SEND_PERIOD_S)
             if not ready.is_set():
                 continue
-            new = {name: item for name, item in dict(self._sections).items() if told.get(name) != item[0]}
+            new = {name: item for name, item in dict(self._sections).items() if sent.get(name) != item[0]}
             number, image = self._image
-            if not new and number == image_told and time.monotonic() - said_s < BEAT_PERIOD_S:
+            if not new and number == image_sent and time.monotonic() - sent_s < HEARTBEAT_PERIOD_S:
                 continue
             ready.clear()
-            said_s = time.monotonic()
-            if number != image_told:
-                image_told = number
+            sent_s = time.monotonic()
+            if number != image_sent:
+                image_sent = number
                 await connection.send(image)
-            told.update((name, version) for name, (version, _) in new.items())
-            await connection.send(_text({name: text for name, (_, text) in new.items()}, said_s - self._shown_s))
+            sent.update((name, version) for name, (version, _) in new.items())
+            await connection.send(_text({name: text for name, (_, text) in new.items()}, sent_s - self._updated_s))
         if self._farewell:
             await connection.send(_text({"ended": json.dumps(self._farewell)}, 0.0))
         await connection.close(1001 if self._farewell else 1012)
 
 
 class _Connection(ServerConnection):
-    """A connection that is dropped at once where too many are open."""
+    """A connection that is dropped at once if too many are open."""
 
     def __init__(self, page: PageServer, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -310,7 +310,7 @@ class _Connection(ServerConnection):
 
 
 def _text(sections: Mapping[str, str], quiet_s: float) -> str:
-    """One message of sections that are JSON already, and how long ago the run last said something."""
+    """One message of sections that are JSON already, and how long ago the run last sent an update."""
     parts = [f"{json.dumps(name)}:{text}" for name, text in sections.items()]
     return "{" + ",".join([*parts, f'"beat":{{"quiet_s":{quiet_s:.1f}}}']) + "}"
 
@@ -320,8 +320,8 @@ def _read_files() -> dict[str, bytes]:
     return {item.name: item.read_bytes() for item in folder.iterdir() if Path(item.name).suffix in MEDIA_TYPES}
 
 
-def _silent() -> logging.Logger:
-    """For the library, which would write a traceback for every broken request."""
+def _quiet_logger() -> logging.Logger:
+    """For the library, which would otherwise log a traceback for every broken request."""
     logger = _log.getChild("websockets")
     logger.setLevel(logging.CRITICAL)
     logger.propagate = False

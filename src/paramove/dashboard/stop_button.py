@@ -1,4 +1,4 @@
-"""What becomes of a person's stop: asked, heard by the gate, at rest. Without clock and sockets."""
+"""Progress of a person's stop: requested, received by the gate, at rest. Without clock and sockets."""
 
 from __future__ import annotations
 
@@ -11,67 +11,67 @@ from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
 from paramove.safety import PERSON_STOP
 
 SOURCE = "page"
-SHOWN_S = 3.0
+DISPLAY_S = 3.0
 """The page shows the stopped arm so long before the run ends."""
 
 
 class Progress(enum.Enum):
     """How far a stop has come."""
 
-    NOT_ASKED = "not asked"
-    ASKED = "asked"
+    NOT_REQUESTED = "not asked"
+    REQUESTED = "asked"
     STOPPING = "stopping"
     STOPPED = "stopped"
 
 
 class StopButton:
-    """`look` at every tick and whenever somebody pressed, `hear` every message.
+    """Call `look` at every tick and whenever the button was pressed, and `handle` with every message.
 
-    The request is said again at every look until the gate has confirmed it: what is said once could be lost.
+    The request is published at every `look` until the gate has confirmed it, because one message could be lost.
 
     Args:
-        was_pressed: Whether somebody pressed since the last call.
-        say: Says the request.
+        was_pressed: Whether the button was pressed since the last call.
+        publish: Publishes the request.
     """
 
-    def __init__(self, was_pressed: Callable[[], bool], say: Callable[[StopRequest], None]) -> None:
-        self.progress = Progress.NOT_ASKED
+    def __init__(self, was_pressed: Callable[[], bool], publish: Callable[[StopRequest], None]) -> None:
+        self.progress = Progress.NOT_REQUESTED
         self.sentence = ""
         self._was_pressed = was_pressed
-        self._say = say
-        self._asked_ns = 0
+        self._publish = publish
+        self._requested_ns = 0
         self._stopped_ns: int | None = None
 
     def look(self, now_ns: int) -> None:
-        """Says what is to be said now."""
-        if self._was_pressed() and self.progress is Progress.NOT_ASKED:
-            self.progress, self._asked_ns = Progress.ASKED, now_ns
-        if self.progress is Progress.ASKED:
+        """Publishes the request if the button was pressed and the gate has not confirmed it."""
+        if self._was_pressed() and self.progress is Progress.NOT_REQUESTED:
+            self.progress, self._requested_ns = Progress.REQUESTED, now_ns
+        if self.progress is Progress.REQUESTED:
             request = StopRequest(source=SOURCE)
-            request.captured.FromNanoseconds(self._asked_ns)
-            self._say(request)
+            request.captured.FromNanoseconds(self._requested_ns)
+            self._publish(request)
 
-    def handle(self, heard: Received) -> None:
-        """Of all messages the gate's: whether it has heard the stop, and whether the arm rests.
+    def handle(self, received: Received) -> None:
+        """Handles the gate's states: whether it has received the stop, and whether the arm rests.
 
-        That it was this page that asked does not matter: it may have been restarted in between.
+        A stop from another page counts, too: this one may have been restarted in between.
         """
-        if heard.topic.name != topics.ARM_SAFETY.name:
+        if received.topic.name != topics.ARM_SAFETY.name:
             return
-        safety: SafetyState = heard.message
+        safety: SafetyState = received.message
         sentences = [fault.sentence for fault in safety.faults if fault.code == PERSON_STOP]
         if not sentences:
             return
         self.sentence = sentences[0]
         if safety.state in (SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP):
             self.progress = Progress.STOPPED
-            self._stopped_ns = heard.published_ns if self._stopped_ns is None else self._stopped_ns
+            self._stopped_ns = received.published_ns if self._stopped_ns is None else self._stopped_ns
         else:
             self.progress = Progress.STOPPING
 
     def is_over(self, now_ns: int) -> bool:
-        """Whether the arm has been at rest for long enough to be seen at rest."""
-        return self._stopped_ns is not None and now_ns - self._stopped_ns >= SHOWN_S * 1e9
+        """Whether the page has shown the arm at rest for long enough."""
+        return self._stopped_ns is not None and now_ns - self._stopped_ns >= DISPLAY_S * 1e9
 
     def section(self) -> dict[str, Any]:
         """For the page."""

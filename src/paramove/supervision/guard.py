@@ -35,11 +35,11 @@ def _print(message: str) -> None:
     """Prints to standard error, which is the launcher's. A terminal that blocks for 1 s ends this process."""
     signal.alarm(1)
     with contextlib.suppress(OSError):
-        os.write(2, f"{sentence}\n".encode())
+        os.write(2, f"{message}\n".encode())
 
 
 def end_groups(groups: set[int], grace_s: float) -> None:
-    """SIGTERM to each process group, SIGKILL to those that are left after `grace_s`; stopped ones are continued, so that they can end."""
+    """SIGTERM and SIGCONT to each process group, SIGKILL to those that are left after `grace_s`."""
     deadline_s = time.monotonic() + grace_s
     left = {group for group in groups if _send(group, signal.SIGTERM) and _send(group, signal.SIGCONT)}
     while left and time.monotonic() < deadline_s:

@@ -132,11 +132,11 @@ def _topics(expression: ast.expr, assigned: dict[str, ast.expr], path: Path) -> 
         case ast.Name(id=name) if name in assigned:
             return _topics(assigned[name], assigned, path)
         case ast.Attribute(value=ast.Name(id="topics"), attr=name):
-            value = getattr(topics, name, None)
-            if isinstance(value, Topic):
-                return (value,)
-            if isinstance(value, tuple) and all(isinstance(topic, Topic) for topic in value):
-                return value
+            named = getattr(topics, name, None)
+            if isinstance(named, Topic):
+                return (named,)
+            if isinstance(named, tuple) and all(isinstance(topic, Topic) for topic in named):
+                return named
             raise InterfaceError(f"{path}:{expression.lineno}: there is no topic topics.{name} in paramove.bus.topics")
     raise _NotPlainError
 

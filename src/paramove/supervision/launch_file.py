@@ -1,4 +1,4 @@
-"""Launch files read, overlaid, changed by `--set` and checked; every error has the position in the file and a remedy."""
+"""Launch files: read, overlaid, changed by `--set` and checked; errors have the position in the file and a remedy."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def test_arming_asks_first(words, line, code, heard):
     [
         ("refused", 3, "hold, not armed: reason 1; reason 2"),
         ("disarmed", 69, "disarmed, not armed: the arm's driver does not answer"),
-        ("silent", 69, "no safety gate is heard within 5 s"),
+        ("silent", 69, "no data from a safety gate within 5 s"),
         ("taken", 75, "only one program may arm an arm; stop that one first; `paramove arm estop` stops the arm"),
     ],
 )

@@ -175,7 +175,7 @@ def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
     monkeypatch.setattr("paramove.cli.arm.jog.SILENT_S", 0.0)
     with running(folder, ["q"]) as arm:
         done = jogged(monkeypatch, arm, "a")
-    assert "not heard" in done.stdout
+    assert "no data" in done.stdout
     assert "is the arm's driver running?" in done.stdout
 
 
@@ -187,7 +187,7 @@ def test_without_an_arm_it_says_so(folder, monkeypatch):
         done = CliRunner().invoke(build("arm"), ["arm", "jog"])
     os.close(write)
     assert done.exit_code == 69
-    assert "no arm is heard within 0.2 s" in done.stderr
+    assert "no data from an arm within 0.2 s" in done.stderr
 
 
 def test_beside_another_speaker_it_does_not_begin(folder):

@@ -39,34 +39,34 @@ def bench(
     with open_arm(by_id, serial, data, baud_rate) as arm:
         numbers = sorted({servo.number for servo in arm.chain.ping_all()})
         if not numbers:
-            where = f"no servo answers at {arm.chain.port.baud_rate}; `paramove arm scan` asks at other baud rates"
+            where = f"no servo answers at {arm.chain.port.baud_rate}; `paramove arm scan` tries other baud rates"
             raise ended(where, exit_codes.UNAVAILABLE)
-        found = bench_bus(arm.chain, numbers, rounds)
+        bench = bench_bus(arm.chain, numbers, rounds)
         device = arm.adapter.device
         timer_ms = latency_timer_ms(device)
     finding = "" if timer_ms is None else slow_timer(device, timer_ms)
     if as_json:
-        values = {name: None if value != value else value for name, value in asdict(found).items()}
+        values = {name: None if value != value else value for name, value in asdict(bench).items()}
         typer.echo(json.dumps(values | {"latency_timer_ms": timer_ms}, indent=2))
     else:
-        _tell(found)
+        _print(bench)
     if finding:
         typer.echo(finding, err=True)
-    if found.complete < MIN_COMPLETE * found.rounds:
+    if bench.complete < MIN_COMPLETE * bench.rounds:
         finding = "answers are missing or damaged: `paramove arm scan` shows who answers, and how"
         typer.echo(finding, err=True)
-    if rate and rate > max(found.rates_hz, default=0):
-        finding = f"the bus cannot hold {rate} Hz: at most {max(found.rates_hz, default=0)} Hz of those tried"
+    if rate and rate > max(bench.rates_hz, default=0):
+        finding = f"the bus cannot hold {rate} Hz: at most {max(bench.rates_hz, default=0)} Hz of those tried"
         typer.echo(finding, err=True)
     if finding:
         raise typer.Exit(FINDING)
 
 
-def _tell(found: BusBench) -> None:
-    typer.echo(f"{found.servos} servos at {found.baud_rate}: {found.complete} of {found.rounds} reads complete")
-    if not math.isnan(found.p50_ms):
-        times = f"p50 {found.p50_ms:.2f} ms, p99 {found.p99_ms:.2f} ms, longest {found.longest_ms:.2f} ms"
+def _print(bench: BusBench) -> None:
+    typer.echo(f"{bench.servos} servos at {bench.baud_rate}: {bench.complete} of {bench.rounds} reads complete")
+    if not math.isnan(bench.p50_ms):
+        times = f"p50 {bench.p50_ms:.2f} ms, p99 {bench.p99_ms:.2f} ms, longest {bench.longest_ms:.2f} ms"
         typer.echo(f"one read of all positions and velocities: {times}")
-    typer.echo(", ".join(f"{name} {count}" for name, count in found.errors.items()))
-    rates = ", ".join(f"{rate} Hz" for rate in found.rates_hz)
+    typer.echo(", ".join(f"{name} {count}" for name, count in bench.errors.items()))
+    rates = ", ".join(f"{rate} Hz" for rate in bench.rates_hz)
     typer.echo(f"can hold: {rates or 'none of the usual rates'}")

@@ -1,4 +1,4 @@
-"""`paramove arm calibrate`: what the counts of an arm's servos mean, found by moving it by hand."""
+"""`paramove arm calibrate`: calibrates the counts of an arm's servos, as a person moves it by hand."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def calibrate(
     for this adapter to the data folder. A file that is there is replaced.
 
     Exit codes: 0 calibrated; 1 ended before, and the old file stays; 69 no adapter, or a servo does not answer;
-    77 the data folder cannot be written, which is told at the start; 78 what was shown does not fit the description,
+    77 the data folder cannot be written, which is checked first; 78 the measurements do not fit the description,
     with the cause; 130 Ctrl-C, and the old file stays.
     """
     from paramove.robots.dynamixel import ArmCalibrator, check_can_be_kept, load_plan

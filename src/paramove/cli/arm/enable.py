@@ -1,4 +1,4 @@
-"""`paramove arm enable` and `disable`: a person arms or disarms the arm of what is running, from any terminal."""
+"""`paramove arm enable` and `disable`: a person arms or disarms the arm of the running application."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def enable(
     yes: Annotated[bool, typer.Option("--yes", help="do not ask whether everybody is out of reach")] = False,
     domain: DomainOption = None,
 ) -> None:
-    """Arm the arm of the running application: from then on it may move, whenever the application wants it to.
+    """Arm the arm of the running application: from then on it may move, whenever the application requests it.
 
-    It asks a person at a terminal; what runs without one, such as a script in the background, arms nothing.
+    It asks a person at a terminal for confirmation; without a terminal, as in a background script, it arms nothing.
 
-    Exit codes: 0 armed; 1 you said no, or there is no terminal; 3 the safety gate refuses, with every reason; 69 nobody
-    answers; 75 another program arms this arm.
+    Exit codes: 0 armed; 1 you said no, or there is no terminal; 3 the safety gate rejects, with every reason; 69 no
+    answer; 75 another program arms this arm.
     """
     if not TerminalPerson().is_at_terminal:
         raise ended("not armed: only a person at a terminal arms; over ssh, use `ssh -t`", exit_codes.FAILURE)
@@ -42,9 +42,9 @@ def enable(
 
 
 def disable(domain: DomainOption = None) -> None:
-    """Disarm the arm of the running application: it comes to rest, and nothing moves it until somebody arms it again.
+    """Disarm the arm of the running application: it comes to rest, and nothing moves it until a person arms it again.
 
-    Exit codes: 0 disarmed; 3 it is not, with every reason; 69 nobody answers; 75 another program arms this arm.
+    Exit codes: 0 disarmed; 3 it is not, with every reason; 69 no answer; 75 another program arms this arm.
     """
     state = _answer(False, domain)
     if not _is(state, False):
@@ -68,7 +68,7 @@ def _answer(armed: bool, domain: str | None) -> SafetyState:
         raise ended(str(error), exit_codes.UNAVAILABLE) from error
     if state is None:
         raise ended(
-            f"no safety gate is heard within {TIMEOUT_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
+            f"no data from a safety gate within {TIMEOUT_S:g} s: is the arm's driver running?", exit_codes.UNAVAILABLE
         )
     return state
 
@@ -80,7 +80,7 @@ def _is(state: SafetyState, armed: bool) -> bool:
 
 
 def _reasons(state: SafetyState) -> str:
-    return "; ".join(fault.sentence for fault in state.faults) or "no reason is given"
+    return "; ".join(fault.sentence for fault in state.faults) or "without a reason"
 
 
 def _name(state: SafetyState) -> str:

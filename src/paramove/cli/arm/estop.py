@@ -1,4 +1,4 @@
-"""`paramove arm estop`: stops the arm of what is running, from any terminal."""
+"""`paramove arm estop`: stops the arm of the running application, from any terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REAL_ONE = "use the switch of the motors' power: that one is the real emergency 
 
 
 def estop(domain: DomainOption = None) -> None:
-    """Stop the arm of the running application: controlled, and latched until somebody arms it again.
+    """Stop the arm of the running application: controlled, and latched until a person arms it again.
 
     No safety function: the switch of the motors' power is the real emergency stop.
 
@@ -34,5 +34,5 @@ def estop(domain: DomainOption = None) -> None:
     if answer is None:
         raise ended(f"no safety gate has answered within {TIMEOUT_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
     state = SafetyState.State.Name(answer.state).removeprefix("STATE_").lower()
-    sentence = next(fault.sentence for fault in answer.faults if fault.code == PERSON_STOP)
-    typer.echo(f"the safety gate has heard it: {state}, {sentence}")
+    message = next(fault.sentence for fault in answer.faults if fault.code == PERSON_STOP)
+    typer.echo(f"the safety gate has received it: {state}, {message}")

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from paramove.bus import Publisher, Subscriber
 
 PERIOD_S, TIMEOUT_S, STOP_S = 0.02, 3.0, 1.0
-SILENT_S = 2.0
-"""A driver that looks at its servos says nothing meanwhile."""
+NO_DATA_S = 2.0
+"""A driver publishes nothing while it checks its servos."""
 KEYS = "1-9 choose a joint, + and - move it, space stops, a arms, q ends"
 
 
@@ -34,10 +34,10 @@ def jog(
 ) -> None:
     """Move one joint of a running arm by small steps, through its driver and safety gate.
 
-    Keys: 1-9 choose a joint, + and - move it, space stops the arm, a arms it, q ends. Nothing else may say
-    trajectories.
+    Keys: 1-9 choose a joint, + and - move it, space stops the arm, a arms it, q ends. No other program may
+    publish trajectories.
 
-    Exit codes: 0 ended by q; 1 no bus; 69 no arm is heard; 75 another program says trajectories.
+    Exit codes: 0 ended by q; 1 no bus; 69 no data from an arm; 75 another program publishes trajectories.
     """
     from paramove.bus import TopicTakenError
 
@@ -72,8 +72,8 @@ class _Link:
         self.jogging = Jogging(f"jog-{os.getpid()}-{time.monotonic_ns()}", step)
         self._folder, self._topics, self._by_person = folder, topics, by_person
         self._arming = ArmingKey()
-        self._sentence, self._shown, self._told = "", "", ""
-        self._heard_s = time.monotonic()
+        self._arming_message, self._displayed, self._printed_message = "", "", ""
+        self._received_s = time.monotonic()
         self._arms: Publisher | None = None
         self._bus = BusVisitor(folder, "jog")
 
@@ -82,27 +82,29 @@ class _Link:
         with contextlib.ExitStack() as unfinished:
             unfinished.push(self._bus)
             self._trajectories = self._bus.publisher(topics.ARM_TRAJECTORY)
-            heard = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
-            self._subscribers: list[Subscriber] = [self._bus.subscriber(topic) for topic in heard]
+            received = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
+            self._subscribers: list[Subscriber] = [self._bus.subscriber(topic) for topic in received]
             unfinished.pop_all()
         return self
 
     def __exit__(self, *error: Any) -> None:
-        if self._shown and sys.stdout.isatty():
-            typer.echo()  # the shell goes on in a line of its own
+        if self._displayed and sys.stdout.isatty():
+            typer.echo()  # so that the shell's prompt begins a new line
         self._bus.__exit__(*error)
 
     def wait_for_arm(self) -> None:
-        """Ends the command if no driver says where the joints are, or none listens."""
+        """Ends the command if no driver publishes joint angles, or none subscribes to trajectories."""
         end_s = time.monotonic() + TIMEOUT_S
         while not (self.jogging.angles and self._trajectories.subscriptions and self._arming.state):
             if time.monotonic() > end_s:
-                raise ended(f"no arm is heard within {TIMEOUT_S:g} s: is its driver running?", exit_codes.UNAVAILABLE)
+                raise ended(
+                    f"no data from an arm within {TIMEOUT_S:g} s: is its driver running?", exit_codes.UNAVAILABLE
+                )
             self._subscribers[0].socket.poll(int(1e3 * PERIOD_S))
             self.exchange()
 
     def press(self, key: str) -> None:
-        """Does what a key stands for."""
+        """Handles a key."""
         from paramove.bus import publish_now
         from paramove.operator import TERMINAL, stop_arm
 
@@ -114,7 +116,7 @@ class _Link:
                 publish_now(self._trajectories, message)
         elif key == "a":
             self._arming.press(time.monotonic())
-            self._told = ""  # what keeps it from being armed is told again
+            self._printed_message = ""  # the reason why it is not armed is printed again
         elif key == " ":
             self._arming.cancel()
             if answer := stop_arm(self._folder, TERMINAL, STOP_S):
@@ -122,54 +124,54 @@ class _Link:
             self.jogging.sentence = "stopped" if answer else "no answer: use the switch of the motors' power"
 
     def exchange(self) -> None:
-        """Hears what has come in, and says the word to arm when it is time."""
+        """Receives messages, and publishes the arming request when it is due."""
         for publisher in (self._trajectories, self._arms):
             if publisher is not None:
                 publisher.serve()
         states, statuses, safety = self._subscribers
         for subscriber, handle in ((states, self.jogging.handle_states), (statuses, self.jogging.handle_status)):
             subscriber.revive()
-            while (heard := subscriber.receive()) is not None:
-                handle(heard.message)
+            while (received := subscriber.receive()) is not None:
+                handle(received.message)
         safety.revive()
         now_s = time.monotonic()
-        while (heard := safety.receive()) is not None:
-            self._arming.handle(heard.message)
-            self._heard_s = now_s
+        while (received := safety.receive()) is not None:
+            self._arming.handle(received.message)
+            self._received_s = now_s
         self.jogging.tick(time.monotonic_ns())
         if self._arming.tick(now_s):
             self._arm()
-        if self._arming.sentence != self._sentence:
-            self._sentence = self.jogging.sentence = self._arming.sentence
-        if self.is_silent:
-            self.jogging.sentence = f"nothing heard for {SILENT_S:g} s: is the arm's driver running?"
+        if self._arming.sentence != self._arming_message:
+            self._arming_message = self.jogging.sentence = self._arming.sentence
+        if self.has_no_data:
+            self.jogging.sentence = f"no data for {NO_DATA_S:g} s: is the arm's driver running?"
 
     @property
-    def is_silent(self) -> bool:
-        """Whether the arm's driver has said nothing for a while."""
-        return time.monotonic() - self._heard_s > SILENT_S
+    def has_no_data(self) -> bool:
+        """Whether the arm's driver has published nothing for a while."""
+        return time.monotonic() - self._received_s > NO_DATA_S
 
     def show(self) -> None:
-        """The chosen joint in one line, written anew at a terminal, else when it is another.
+        """Prints the chosen joint in one line, rewritten at a terminal, otherwise when it changes.
 
-        At a terminal, a sentence that is too long for that has lines of its own, once.
+        At a terminal, a message that is too long for that is printed in lines of its own, once.
         """
         jogging = self.jogging
         angle = math.degrees(jogging.angles[jogging.joint])
-        state = "not heard" if self.is_silent else self._arming.state
-        status, sentence = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.sentence
-        what = f"{state} {jogging.joint} {sentence}"
+        state = "no data" if self.has_no_data else self._arming.state
+        status, message = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.sentence
+        what = f"{state} {jogging.joint} {message}"
         if sys.stdout.isatty():
             columns = shutil.get_terminal_size().columns
-            is_long = len(status) + len(sentence) + 2 >= columns
-            status = status[: max(columns - 3, 1)]  # one that wraps could not be written anew
-            if is_long and sentence != self._told:
-                typer.echo(f"\r\x1b[2K{printable(sentence)}")
-            self._told = sentence
-            typer.echo(f"\r\x1b[2K{printable(status)}  {'' if is_long else printable(sentence)}", nl=False)
-        elif what != self._shown:
-            typer.echo(printable(f"{status}  {sentence}"))
-        self._shown = what
+            is_long = len(status) + len(message) + 2 >= columns
+            status = status[: max(columns - 3, 1)]  # a wrapped line could not be rewritten
+            if is_long and message != self._printed_message:
+                typer.echo(f"\r\x1b[2K{printable(message)}")
+            self._printed_message = message
+            typer.echo(f"\r\x1b[2K{printable(status)}  {'' if is_long else printable(message)}", nl=False)
+        elif what != self._displayed:
+            typer.echo(printable(f"{status}  {message}"))
+        self._displayed = what
 
     def _arm(self) -> None:
         from paramove.bus import TopicTakenError, publish_now

@@ -1,4 +1,4 @@
-"""Options, the open port and the ends that the commands about a servo arm share."""
+"""Options, the open port and errors of the commands about a servo arm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 DEFAULT_BAUD_RATE = 1_000_000
 LATENCY_S = 0.1
-"""Nobody waits for a motion here, and an adapter or a busy machine may be slow."""
+"""No motion depends on this timeout, and an adapter or a busy machine may be slow."""
 
 ByIdOption = Annotated[
     Path | None,
@@ -90,7 +90,7 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
-    """Ends the command with a sentence where a servo, the port or a file is not as it must be, and at Ctrl-C."""
+    """Ends the command with a message on errors of a servo, the port or a file, and at Ctrl-C."""
     from paramove.robots.dynamixel import PortLostError, ServoError, ServoSilentError
 
     try:
@@ -108,9 +108,9 @@ def explained() -> Iterator[None]:
         raise ended("interrupted", exit_codes.by_signal(signal.SIGINT)) from None
 
 
-def ended(sentence: str, code: int) -> typer.Exit:
-    """Says why the command ends."""
-    typer.echo(printable(sentence), err=True)
+def ended(message: str, code: int) -> typer.Exit:
+    """The exception that ends a command; prints the message to standard error."""
+    typer.echo(printable(message), err=True)
     return typer.Exit(code)
 
 

@@ -13,14 +13,14 @@ from paramove.documents import exit_codes
 def reboot(
     number: Annotated[int, typer.Argument(metavar="ID", min=0, max=252)],
     yes: Annotated[
-        bool, typer.Option("--yes", help="the arm is held: reboot even while the joint carries something")
+        bool, typer.Option("--yes", help="the arm is held: reboot even while the joint carries a load")
     ] = False,
     serial: SerialOption = "",
     baud_rate: BaudOption = 0,
     by_id: ByIdOption = None,
     data: DataOption = None,
 ) -> None:
-    """Reboot one servo: its hardware error is told and cleared, its torque goes off. The others hold as they do.
+    """Reboot one servo: its hardware error is printed and cleared, its torque goes off. The others keep holding.
 
     Exit codes: 0 rebooted and without error; 1 it still has a hardware error; 2 its joint carries something, so hold
     the arm and say --yes; 69 it does not answer.

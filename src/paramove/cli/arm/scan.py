@@ -1,4 +1,4 @@
-"""`paramove arm scan`: who is on the bus of each adapter."""
+"""`paramove arm scan`: lists the servos on the bus of each adapter."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def scan(
         with open_arm(by_id, serial, data):  # says why there is none
             return
     rates = tuple(baud_rates or USUAL_BAUD_RATES)
-    told, count = [], 0
+    reports, count = [], 0
     findings: list[str] = []
     for adapter in adapters:
         with open_arm(by_id, adapter.serial, data) as arm:
@@ -52,11 +52,11 @@ def scan(
         count += len(found.servos)
         findings += sentences
         names = {"serial": adapter.serial, "link": str(adapter.link), "device": adapter.device}
-        told.append({**names, "servos": [_row(servo) for servo in found.servos], "findings": sentences})
+        reports.append({**names, "servos": [_row(servo) for servo in found.servos], "findings": sentences})
         if not as_json:
-            _tell(told[-1], listed(found.asked))
+            _tell(reports[-1], listed(found.asked))
     if as_json:
-        typer.echo(json.dumps(told, indent=2))
+        typer.echo(json.dumps(reports, indent=2))
     if findings:
         raise typer.Exit(FINDING)
     if not count:
@@ -64,11 +64,11 @@ def scan(
 
 
 def _tell(adapter: dict[str, Any], rates: str) -> None:
-    typer.echo(f"adapter {adapter['serial']} ({adapter['device']}), asked at {rates}")
+    typer.echo(f"adapter {adapter['serial']} ({adapter['device']}), scanned at {rates}")
     typer.echo(f"port {adapter['link']}")
     show(adapter["servos"], as_json=False)
-    for sentence in adapter["findings"]:
-        typer.echo(sentence)
+    for line in adapter["findings"]:
+        typer.echo(line)
 
 
 def _row(servo: FoundServo) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def setup(
             except (QuitError, KeyboardInterrupt) as error:
                 left = " ".join(f"--joint {one.joint}" for one in wanted[wanted.index(servo) :])
                 code = exit_codes.FAILURE if isinstance(error, QuitError) else exit_codes.by_signal(signal.SIGINT)
-                raise ended(f"ended before {servo.joint}; go on with {left}", code) from None
+                raise ended(f"ended before {servo.joint}; continue with {left}", code) from None
             done.append(servo)
     typer.echo("connect all servos and run `paramove arm scan`, then `paramove arm calibrate`")
 

@@ -38,8 +38,8 @@ KEYS = "space begins and ends a segment, d drops the last one, q ends"
 def teach(
     folder: Annotated[Path, typer.Argument(metavar="SET", help="folder of the demonstration set")],
     robot: RobotOption,
-    action: Annotated[str, typer.Option("--action", metavar="NAME", help="what is shown, such as reaching")],
-    subject: Annotated[str, typer.Option("--subject", help="who shows it")] = "",
+    action: Annotated[str, typer.Option("--action", metavar="NAME", help="demonstrated action, such as reaching")],
+    subject: Annotated[str, typer.Option("--subject", help="person who demonstrates it")] = "",
     floats: Annotated[
         bool, typer.Option("--float/--limp", help="its servos carry its own weight, or nothing (default)")
     ] = False,
@@ -48,7 +48,7 @@ def teach(
     by_id: ByIdOption = None,
     data: DataOption = None,
 ) -> None:
-    """Record demonstrations: you lead the arm by hand from its rest to a place, again and again.
+    """Record demonstrations: you lead the arm by hand from its rest to a position, again and again.
 
     Torque goes off: hold the arm, at the end too. Keys: space begins and ends a segment, d drops the last one, q ends.
     Each segment is written as soon as it has ended; theta is where the end effector is then, frame of the arm's base.
@@ -87,7 +87,7 @@ def teach(
 
 
 def _check_can_be_written(folder: Path) -> None:
-    """Before somebody leads the arm for nothing. Raises OSError; makes no folder."""
+    """Checks the folder before a person leads the arm. Raises OSError; makes no folder."""
     place = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     number = 0 if place.is_dir() else errno.ENOTDIR
     if number or not os.access(place, os.W_OK | os.X_OK):
@@ -96,7 +96,7 @@ def _check_can_be_written(folder: Path) -> None:
 
 
 def _of_this_arm(description: RobotDescription, arm: OpenArm) -> RobotDescription:
-    """With the units of the calibration; as described where nobody has to calibrate and nobody has."""
+    """With the units of the calibration; as described if the arm needs no calibration and has none."""
     if not arm.path.exists() and not (description.bus is not None and description.bus.calibrate):
         return description
     units = arm.calibration().units(description.joint_names, description.lower, description.upper)
@@ -116,7 +116,7 @@ def _lead(torque_off: TorqueOffArm, teacher: KinestheticTeacher, person: Termina
 
 
 def _press(key: str, teacher: KinestheticTeacher) -> None:
-    """Does what a key stands for, and tells it."""
+    """Handles a key and prints the result."""
     from paramove.demonstrations import DemonstrationError
 
     try:

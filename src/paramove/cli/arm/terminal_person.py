@@ -1,4 +1,4 @@
-"""The person at the terminal: keys where there is one, lines where another program speaks."""
+"""The person at the terminal: keys where there is one, lines where another program writes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import typer
 from paramove.documents import printable
 
 PERIOD_S = 0.02
-"""From look to look: a joint that is moved by hand turns by a few degrees."""
+"""Between two measurements: a joint that is moved by hand turns by a few degrees."""
 UP_AND_CLEAR = "\x1b[1A\x1b[2K"
 DONE, QUIT = ("\n", "\r"), ("q", "\x03", "\x04")
 
@@ -29,8 +29,8 @@ class QuitError(Exception):
 class TerminalPerson:
     """Asks on the standard output and reads the standard input, never the whole keyboard; a closed one has ended.
 
-    At a terminal Enter says that something is done, and q ends. Otherwise lines do: an empty one or "q"; after any
-    other one more look is taken and printed, and the wait goes on.
+    At a terminal Enter confirms and q ends. Otherwise lines do: an empty one or "q"; after any other line one more
+    measurement is printed, and the wait continues.
     """
 
     def __init__(self, source: IO[Any] | None = None) -> None:
@@ -41,17 +41,17 @@ class TerminalPerson:
         """Whether a person can press keys: the input is a terminal, and no file, pipe or closed one."""
         return self._source.isatty()
 
-    def tell(self, sentence: str) -> None:
-        """Say something that needs no answer."""
-        typer.echo(printable(sentence))
+    def tell(self, message: str) -> None:
+        """Prints a message that needs no answer."""
+        typer.echo(printable(message))
 
     def until_done(self, request: str, look: Callable[[], list[str]]) -> None:
-        """Ask, and look again and again until it is done. Raises QuitError."""
-        asked = f"{printable(request)} Enter when it is done, q to end."
+        """Prints a request and calls `look` again and again until it is done. Raises QuitError."""
+        prompt = f"{printable(request)} Enter when it is done, q to end."
         if self.is_at_terminal:
-            self._keys(asked, look)
+            self._keys(prompt, look)
         else:
-            typer.echo(asked)
+            typer.echo(prompt)
             self._lines(look)
 
     @contextlib.contextmanager
@@ -78,15 +78,17 @@ class TerminalPerson:
 
             yield pressed
 
-    def _keys(self, asked: str, look: Callable[[], list[str]]) -> None:
-        shown = 0
+    def _keys(self, prompt: str, look: Callable[[], list[str]]) -> None:
+        n_displayed = 0
         with _unbuffered(self._source.fileno()) as descriptor:  # drops what was typed before, and nothing after
-            typer.echo(asked)
+            typer.echo(prompt)
             while True:
                 lines = look()
                 if sys.stdout.isatty():
-                    typer.echo(UP_AND_CLEAR * shown + "".join(f"  {printable(line)}\n" for line in lines), nl=False)
-                    shown = len(lines)
+                    typer.echo(
+                        UP_AND_CLEAR * n_displayed + "".join(f"  {printable(line)}\n" for line in lines), nl=False
+                    )
+                    n_displayed = len(lines)
                 if select.select([descriptor], [], [], PERIOD_S)[0]:
                     key = os.read(descriptor, 1).decode(errors="replace")
                     if key in DONE:
@@ -96,12 +98,12 @@ class TerminalPerson:
 
     def _lines(self, look: Callable[[], list[str]]) -> None:
         look()
-        while (word := self._line(look)).strip():
-            if word.strip() in QUIT:
+        while (line := self._line(look)).strip():
+            if line.strip() in QUIT:
                 raise QuitError
-            for line in look():
-                typer.echo(f"  {printable(line)}")
-        if not word:
+            for measured in look():
+                typer.echo(f"  {printable(measured)}")
+        if not line:
             raise QuitError
 
     def _line(self, look: Callable[[], list[str]]) -> str:
@@ -124,10 +126,10 @@ class TerminalPerson:
 
 @contextlib.contextmanager
 def _unbuffered(descriptor: int) -> Iterator[int]:
-    """The terminal gives each key at once, and does not show it; as it was afterwards."""
+    """The terminal gives each key at once, and does not echo it; restored afterwards."""
     before = termios.tcgetattr(descriptor)
     tty.setcbreak(descriptor)
     try:
         yield descriptor
     finally:
-        termios.tcsetattr(descriptor, termios.TCSANOW, before)  # without waiting until all is shown
+        termios.tcsetattr(descriptor, termios.TCSANOW, before)  # without waiting for output

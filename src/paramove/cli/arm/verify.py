@@ -31,7 +31,7 @@ CHOICE = (
 
 def verify(
     robot: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="description, which is then compared too")
+        Path | None, typer.Option(metavar="FOLDER", help="description, which is then also compared")
     ] = None,
     write: Annotated[bool, typer.Option("--write", help="write the file's settings to the servos")] = False,
     adopt: Annotated[
@@ -84,8 +84,8 @@ def _check_baud_rate(arm: OpenArm) -> None:
     if any(arm.chain.ping(joint.id) for joint in arm.calibration().joints.values()):
         return
     found = scan_bus(arm.chain, [other for other in USUAL_BAUD_RATES if other != rate])
-    told = "; ".join(found.findings(rate)) or f"no servo answers, neither at {rate} nor at another usual baud rate"
-    raise ended(f"{told}; `paramove arm setup` sets the baud rate", exit_codes.UNAVAILABLE)
+    reason = "; ".join(found.findings(rate)) or f"no servo answers, neither at {rate} nor at another usual baud rate"
+    raise ended(f"{reason}; `paramove arm setup` sets the baud rate", exit_codes.UNAVAILABLE)
 
 
 def _write(arm: OpenArm) -> None:

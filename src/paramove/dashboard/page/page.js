@@ -1,16 +1,16 @@
-// The live page: one socket, and what comes through it put into the page as text, never as markup.
+// The live page: one socket, whose messages are put into the page as text, never as markup.
 import { CameraView } from "./camera.js";
 import { colourOf, css } from "./colours.js";
 import { WorldView } from "./world.js";
 
 const $ = (id) => document.getElementById(id);
 const STAGES = ["calibrate", "learn", "apply", "done"];
-const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, SILENT_S = 3;
+const RETRY_MS = 1000, QUIET_S = 3, CONFIRM_MS = 1000, OLD_IMAGE_MS = 2000, NO_STATUS_S = 3;
 
 const given = document.querySelector("meta[name=paramove-key]").content;
 if (given) localStorage.setItem("paramove-key", given);
 const key = given || localStorage.getItem("paramove-key") || "";
-history.replaceState(null, "", "/"); // the token is spent
+history.replaceState(null, "", "/"); // the token is used up
 
 const state = {};
 const camera = new CameraView($("camera"));
@@ -28,8 +28,8 @@ function cell(row, value, name = "") {
   return made;
 }
 
-const pair = (place) => place.slice(0, 2).map((value) => (100 * value).toFixed(1).replace("-", "−")).join(", ");
-const cm = (place) => `${pair(place)} cm`;
+const pair = (position) => position.slice(0, 2).map((value) => (100 * value).toFixed(1).replace("-", "−")).join(", ");
+const cm = (position) => `${pair(position)} cm`;
 
 const SHOW = {
   world(content) { text($("title"), content.title); document.title = `${content.title} – paramove`; },
@@ -52,9 +52,9 @@ const SHOW = {
   goal(content) {
     const { kind, object, to, from } = content;
     text($("goal"), kind ? [kind, object].filter(Boolean).join(" ") : "nothing yet");
-    const way = from && to ? `${pair(from)} → ${cm(to)}` : to ? `→ ${cm(to)}` : "";
+    const path = from && to ? `${pair(from)} → ${cm(to)}` : to ? `→ ${cm(to)}` : "";
     const progress = content.ended ? content.state : [content.phase || content.state, content.attempt > 1 ? `attempt ${content.attempt}` : ""].filter(Boolean).join(", ");
-    text($("phase"), [progress, way].filter(Boolean).join("  ·  "));
+    text($("phase"), [progress, path].filter(Boolean).join("  ·  "));
   },
   results(content) {
     $("results").replaceChildren(...content.toReversed().map((result) => {
@@ -79,12 +79,12 @@ const SHOW = {
     if (content.progress !== "not asked" && content.progress !== "asked") pressedAt = null;
   },
   nodes(content) {
-    const body = $("nodes"), ok = content.filter((node) => node.state === "ready" && node.silent_s <= SILENT_S).length;
+    const body = $("nodes"), ok = content.filter((node) => node.state === "ready" && node.silent_s <= NO_STATUS_S).length;
     text($("nodes-note"), `${ok} of ${content.length} ready`);
     body.replaceChildren(...content.map((node) => {
-      const row = document.createElement("tr"), silent = node.silent_s > SILENT_S && node.state !== "stopped";
+      const row = document.createElement("tr"), silent = node.silent_s > NO_STATUS_S && node.state !== "stopped";
       cell(row, node.name).title = node.name;
-      cell(row, silent ? `${node.silent_s} s silent` : node.state, "state").classList.add(silent ? "silent" : ["ready", "starting", "degraded", "failed", "stopped"].includes(node.state) ? node.state : "stopped");
+      cell(row, silent ? `no status for ${node.silent_s} s` : node.state, "state").classList.add(silent ? "silent" : ["ready", "starting", "degraded", "failed", "stopped"].includes(node.state) ? node.state : "stopped");
       cell(row, node.ms === null ? "" : node.ms.toFixed(1), "num");
       cell(row, node.lost ? String(node.lost) : "", "num");
       cell(row, node.restarts ? String(node.restarts) : "", "num");
@@ -108,7 +108,7 @@ function showRules(objects) {
     return row;
   }));
   const learned = names.filter((name) => objects[name].rule).length;
-  text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Places are x, y from the right shoulder, as the robot believes them.` : "No object was seen yet.");
+  text($("rules-note"), names.length ? `${learned} of ${names.length} learned. Positions are x, y from the right shoulder, as estimated by the robot.` : "No object detected yet.");
 }
 
 function draw() {
@@ -119,10 +119,10 @@ function draw() {
   camera.draw();
 }
 
-// The server sends the next message once this one is drawn, so that a slow browser shows little but never the past.
+// The server sends the next message once this one is drawn, so that a slow browser shows fewer states but no old ones.
 async function take(data, from) {
   if (typeof data !== "string") { image = data; return; }
-  heard(JSON.parse(data));
+  handle(JSON.parse(data));
   if (!document.hidden) {
     if (image) await camera.image(image);
     image = null;
@@ -132,29 +132,29 @@ async function take(data, from) {
   if (from.readyState === WebSocket.OPEN) from.send("next");
 }
 
-function heard(message) {
+function handle(message) {
   const { beat, ended: farewell, ...sections } = message;
   if (beat) quietS = beat.quiet_s;
   if (farewell) ended = farewell;
   Object.assign(state, sections);
   for (const [name, content] of Object.entries(sections)) SHOW[name]?.(content);
-  judge();
+  updateAlert();
 }
 
-function judge() {
+function updateAlert() {
   const alert = $("alert"), stopped = (state.safety?.faults ?? []).map((fault) => fault.sentence).join("; ");
   const waited = pressedAt !== null && performance.now() - pressedAt > CONFIRM_MS;
-  let words = "", calm = false;
-  if (waited || (pressedAt !== null && !connected)) words = "The stop is NOT confirmed. Use the robot's power switch.";
-  else if (ended) [words, calm] = [`The run has ended${/^The run has ended/.test(ended) ? "" : `: ${ended}`}. The page shows its last state.`, true];
-  else if (!connected && everConnected) words = "Connection lost: what you see is old, and STOP does not reach the robot. Trying again …";
-  else if (!connected) words = "Not connected. Open the link that paramove launch --view printed; it works once.";
-  else if (stopped) words = `The arm is stopped and holds its pose: ${stopped}.`;
-  else if (quietS > QUIET_S) words = `No news from the run for ${Math.round(quietS)} s.`;
+  let warning = "", calm = false;
+  if (waited || (pressedAt !== null && !connected)) warning = "The stop is NOT confirmed. Use the robot's power switch.";
+  else if (ended) [warning, calm] = [`The run has ended${/^The run has ended/.test(ended) ? "" : `: ${ended}`}. The page shows its last state.`, true];
+  else if (!connected && everConnected) warning = "Connection lost: the page shows an old state, and STOP does not reach the robot. Trying again …";
+  else if (!connected) warning = "Not connected. Open the link that paramove launch --view printed; it works once.";
+  else if (stopped) warning = `The arm is stopped and holds its pose: ${stopped}.`;
+  else if (quietS > QUIET_S) warning = `No news from the run for ${Math.round(quietS)} s.`;
   $("stop").disabled = Boolean(ended);
-  text(alert, words);
+  text(alert, warning);
   alert.className = calm ? "calm" : "";
-  alert.hidden = !words;
+  alert.hidden = !warning;
   const age = performance.now() - camera.arrivedAt;
   text($("camera-note"), camera.arrived === 0 ? "no picture yet" : age > OLD_IMAGE_MS && !ended ? `picture is ${Math.round(age / 1000)} s old` : "");
 }
@@ -164,19 +164,19 @@ function stop() {
   if (ended) return;
   pressedAt ??= performance.now();
   if (connected) socket.send("stop");
-  judge();
+  updateAlert();
 }
 
 function connect() {
   const opened = new WebSocket(`ws://${location.host}/live?key=${encodeURIComponent(key)}`);
   socket = opened;
   opened.binaryType = "arraybuffer";
-  opened.onopen = () => { connected = everConnected = true; ended = ""; judge(); };
+  opened.onopen = () => { connected = everConnected = true; ended = ""; updateAlert(); };
   opened.onmessage = ({ data }) => take(data, opened);
   opened.onclose = ({ code }) => {
     connected = false;
     if (code === 1001 && !ended) ended = "The run has ended.";
-    judge();
+    updateAlert();
     if (!ended) setTimeout(connect, RETRY_MS);
   };
 }
@@ -188,5 +188,5 @@ addEventListener("keydown", (event) => {
   if (!event.repeat) stop();
 });
 new ResizeObserver(() => camera.draw()).observe($("camera"));
-setInterval(judge, 250);
+setInterval(updateAlert, 250);
 connect();

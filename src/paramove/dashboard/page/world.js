@@ -1,4 +1,4 @@
-// The robot, the table and the objects where the robot believes them to be, drawn with WebGL. Draws only when asked.
+// The robot, the table and the objects at their estimated positions, drawn with WebGL. Draws only on request.
 import { colourOf } from "./colours.js";
 import { SHAPES, lookAt, moved, multiply, perspective, rigid, scaled } from "./shapes.js";
 
@@ -160,7 +160,7 @@ export class WorldView {
     });
   }
 
-  // Where an object is drawn: middle of its cylinder, world frame; null where the robot has no idea.
+  // Where an object is drawn: middle of its cylinder, world frame; null where there is no estimate.
   placeOf(object) {
     const { world, robot } = this.state, [sx, sy, sz] = world.shoulder, z = sz + world.surface.z + world.object.height / 2;
     if (object.state === "in the robot's hand") return robot.gripper ?? null;
@@ -215,7 +215,7 @@ export class WorldView {
     gl.disable(gl.STENCIL_TEST);
   }
 
-  // The present errand: a row of beads from where it begins to where it ends.
+  // The present goal: a row of beads from its start to its end.
   arc() {
     const { goal, world } = this.state, [sx, sy, sz] = world.shoulder;
     if (!goal.from || !goal.to || goal.ended) return;

@@ -1,4 +1,4 @@
-"""What the robot believes and does, put together from what its nodes say: rules, places, goals, words."""
+"""Estimates and actions of the robot, collected from its nodes' messages: rules, positions, goals, speech."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 from paramove.msgs.tracked_objects_pb2 import TrackedObject, TrackedObjects
 from paramove.objects import HomographyError, PlaneHomography
 
-KEPT_WORDS = 12
-KEPT_RESULTS = 8
-POINTING_SHOWN_S = 3.0
+MAX_SPEECH = 12
+MAX_RESULTS = 8
+POINTING_DISPLAY_S = 3.0
 _ENDED = frozenset({RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED})
 _PUTS_DOWN = frozenset({RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_PLACE_HELD})
 _GESTURES = {
@@ -27,20 +27,20 @@ _GESTURES = {
 IN_HAND = "in the robot's hand"
 
 
-def _word(enum: Any, value: int) -> str:
+def _label(enum: Any, value: int) -> str:
     """`STATE_SUCCEEDED` -> `succeeded`."""
     return str(enum.Name(value)).partition("_")[2].replace("_", " ").lower()
 
 
 @dataclass
 class _Object:
-    state: str = "not seen yet"
-    seen: tuple[float, float] | None = None  # m, plane's frame
+    state: str = "not detected yet"
+    detected: tuple[float, float] | None = None  # m, plane's frame
     put: tuple[float, float] | None = None  # where the robot itself put it down
 
 
-class Beliefs:
-    """Hear messages with the `on_…` methods; `sections` gives JSON values for the page.
+class Estimates:
+    """Handles messages with the `on_…` methods; `sections` gives JSON values for the page.
 
     Lengths in the sections are metres in the frame of the right shoulder.
 
@@ -51,7 +51,7 @@ class Beliefs:
     def __init__(self, surface: tuple[tuple[float, float], tuple[float, float]]) -> None:
         self._surface = surface
         self._stage: dict[str, Any] = {}
-        self._words: deque[dict[str, Any]] = deque(maxlen=KEPT_WORDS)
+        self._speech: deque[dict[str, Any]] = deque(maxlen=MAX_SPEECH)
         self._rules: dict[str, dict[str, Any]] = {}
         self._objects: dict[str, _Object] = {}
         self._pointed = ("", 0.0)
@@ -59,24 +59,24 @@ class Beliefs:
         self._goal: RelocationGoal | None = None
         self._goal_s = 0.0
         self._status: RelocationStatus | None = None
-        self._results: deque[dict[str, Any]] = deque(maxlen=KEPT_RESULTS)
+        self._results: deque[dict[str, Any]] = deque(maxlen=MAX_RESULTS)
         self._tracked: TrackedObjects | None = None
 
     def on_stage(self, stage: ApplicationStage, now_s: float) -> None:
-        """Where the application stands."""
+        """Stage of the application."""
         self._stage = {
-            "stage": _word(ApplicationStage.Stage, stage.stage),
+            "stage": _label(ApplicationStage.Stage, stage.stage),
             "step": stage.step.replace("_", " "),
             "grasps": stage.grasps,
             "retries": stage.retries,
         }
 
     def on_speech(self, speech: Speech, now_s: float) -> None:
-        """What the robot says."""
-        self._words.append({"s": round(now_s, 1), "sentence": speech.sentence})
+        """Speech of the robot."""
+        self._speech.append({"s": round(now_s, 1), "sentence": speech.sentence})
 
     def on_rules(self, rules: Rules, now_s: float) -> None:
-        """What has been learned."""
+        """Learned rules."""
         self._rules = {
             rule.object: {"x": rule.x, "y": rule.y, "observations": rule.observations} for rule in rules.rules
         }
@@ -84,14 +84,14 @@ class Beliefs:
             self._objects.setdefault(rule.object, _Object())
 
     def on_plane(self, message: PlaneCalibration, now_s: float) -> None:
-        """How the camera sees the table; one that cannot be used is passed over."""
+        """Calibration of the table plane; an unusable one is ignored."""
         try:
             self._plane = PlaneHomography.from_message(message)
         except HomographyError:
             self._plane = None
 
     def on_tracked(self, tracked: TrackedObjects, now_s: float) -> None:
-        """What the colour tracker sees now."""
+        """Objects that the colour tracker detects now."""
         self._tracked = tracked
         for item in tracked.objects:
             if item.kind == TrackedObject.KIND_OBJECT:
@@ -104,17 +104,17 @@ class Beliefs:
         elif gesture.object and gesture.kind in _GESTURES:
             known = self._objects.setdefault(gesture.object, _Object())
             known.state = _GESTURES[gesture.kind]
-            known.seen = (gesture.x, gesture.y) if gesture.located else None
+            known.detected = (gesture.x, gesture.y) if gesture.located else None
             if gesture.located and known.state != "gone":
-                known.put = None  # it is seen elsewhere than where the robot put it
+                known.put = None  # it was detected elsewhere than where the robot put it
 
     def on_goal(self, goal: RelocationGoal, now_s: float) -> None:
-        """What the arm shall do; the same goal is said again until somebody acknowledges it."""
+        """Goal of the arm, which is published again until it is acknowledged."""
         if self._goal is None or goal.id != self._goal.id:
             self._goal, self._status, self._goal_s = goal, None, now_s
 
     def on_goal_status(self, status: RelocationStatus, now_s: float) -> None:
-        """How the goal fares."""
+        """Status of the goal."""
         goal = self._goal
         if goal is None or status.goal_id != goal.id:
             return
@@ -128,22 +128,22 @@ class Beliefs:
             self._results.append(
                 {
                     "s": round(now_s, 1),
-                    "kind": _word(RelocationGoal.Kind, goal.kind),
+                    "kind": _label(RelocationGoal.Kind, goal.kind),
                     "object": goal.object,
                     "attempt": goal.attempt,
-                    "result": _word(RelocationStatus.State, status.state),
+                    "result": _label(RelocationStatus.State, status.state),
                     "reason": status.reason,
                     "took_s": round(now_s - self._goal_s, 1),
                 }
             )
 
     def sections(self, now_s: float) -> dict[str, Any]:
-        """The present beliefs, by name of the section."""
+        """The present estimates, by name of the section."""
         return {
             "stage": self._stage,
-            "words": list(self._words),
+            "words": list(self._speech),
             "objects": {name: self._object(name) for name in sorted(self._objects)},
-            "pointed": self._pointed[0] if now_s - self._pointed[1] < POINTING_SHOWN_S else "",
+            "pointed": self._pointed[0] if now_s - self._pointed[1] < POINTING_DISPLAY_S else "",
             "goal": self._goal_section(),
             "results": list(self._results),
             "tracked": self._tracked_section(),
@@ -152,52 +152,52 @@ class Beliefs:
 
     @property
     def held(self) -> str:
-        """Name of the object that the robot feels in its hand; "" for none."""
+        """Name of the object that the robot holds; "" for none."""
         goal, status = self._goal, self._status
         return goal.object if goal is not None and status is not None and status.holding else ""
 
     def _object(self, name: str) -> dict[str, Any]:
         known, rule = self._objects[name], self._rules.get(name)
-        place, state = self._seen_now(name) or known.seen or known.put, known.state
+        position, state = self._detected_now(name) or known.detected or known.put, known.state
         if name == self.held:
-            place, state = None, IN_HAND
-        elif state == "gone" and known.put is not None:  # the hand hid how it went in
-            place, state = known.put, "in an opening"
+            position, state = None, IN_HAND
+        elif state == "gone" and known.put is not None:  # the hand hid how it was put in
+            position, state = known.put, "in an opening"
         elif state == "gone":
-            inside = known.seen is not None and self._on_surface(known.seen)
-            place, state = (known.seen, "in an opening") if inside else (None, "not in view")
+            inside = known.detected is not None and self._on_surface(known.detected)
+            position, state = (known.detected, "in an opening") if inside else (None, "not in view")
         return {
             "state": state,
-            "place": _place(place),
-            "rule": rule and {**rule, "place": _place((rule["x"], rule["y"]))},
+            "place": _position_2d(position),
+            "rule": rule and {**rule, "place": _position_2d((rule["x"], rule["y"]))},
         }
 
-    def _seen_now(self, name: str) -> tuple[float, float] | None:
+    def _detected_now(self, name: str) -> tuple[float, float] | None:
         if self._plane is None or self._tracked is None:
             return None
         for item in self._tracked.objects:
             if item.name == name and item.kind == TrackedObject.KIND_OBJECT:
                 try:
-                    place = self._plane.plane_from_image(item.u_px, item.v_px)
+                    position = self._plane.plane_from_image(item.u_px, item.v_px)
                 except ValueError:  # on the plane's horizon
                     return None
-                return place if max(map(abs, place)) < 1.0 else None
+                return position if max(map(abs, position)) < 1.0 else None
         return None
 
-    def _on_surface(self, place: tuple[float, float]) -> bool:
-        return all(low <= value <= high for value, (low, high) in zip(place, self._surface, strict=True))
+    def _on_surface(self, position: tuple[float, float]) -> bool:
+        return all(low <= value <= high for value, (low, high) in zip(position, self._surface, strict=True))
 
     def _goal_section(self) -> dict[str, Any]:
         goal, status = self._goal, self._status
         if goal is None:
             return {}
         return {
-            "kind": _word(RelocationGoal.Kind, goal.kind),
+            "kind": _label(RelocationGoal.Kind, goal.kind),
             "object": goal.object,
             "attempt": goal.attempt,
             "from": _position(goal, "from"),
             "to": _position(goal, "to"),
-            "state": _word(RelocationStatus.State, status.state) if status is not None else "asked",
+            "state": _label(RelocationStatus.State, status.state) if status is not None else "requested",
             "phase": status.phase if status is not None else "",
             "reason": status.reason if status is not None else "",
             "ended": status is not None and status.state in _ENDED,
@@ -218,7 +218,7 @@ class Beliefs:
         return {"width": self._tracked.width_px, "height": self._tracked.height_px, "items": items}
 
     def _plane_section(self) -> dict[str, Any]:
-        """The calibrated plane: the robot's own corners as it put an object there, and where the image shows them."""
+        """The calibrated plane: its corners as the robot put an object there, and in the image."""
         plane = self._plane
         if plane is None or plane.correspondences is None:
             return {}
@@ -226,8 +226,8 @@ class Beliefs:
         return {"z": plane.plane_z, "corners": corners, "plane_from_image": plane.plane_from_image_matrix.tolist()}
 
 
-def _place(place: tuple[float, float] | None) -> list[float] | None:
-    return None if place is None else [round(place[0], 4), round(place[1], 4)]
+def _position_2d(position: tuple[float, float] | None) -> list[float] | None:
+    return None if position is None else [round(position[0], 4), round(position[1], 4)]
 
 
 def _position(goal: RelocationGoal, field: str) -> list[float] | None:
