@@ -455,7 +455,7 @@ MEASUREMENTS = {
     "imitation": Measurement(
         (
             "python -m studies imitation --report {out}",
-            "python -m studies imitation --repetitions 10 --no-raster --report {out}/10",
+            "python -m studies imitation --repetitions 10 --no-grid --report {out}/10",
         ),
         imitation,
         "a minute",

@@ -58,8 +58,8 @@ def _branching(setting: Setting, minimum: int) -> Callable[[Experiment], Finding
         plain, random = experiment.trained[setting], experiment.branched[setting]
         from_segments, from_random = (branches(one.snapshots[-1], setting.bound) for one in (plain, random))
         text = (
-            f"From equal segments: {_counted(from_segments)} and a log-likelihood of {per_frame(plain, RESULT):.2f} per frame "
-            f"after {len(plain.snapshots) - 1} iterations; {_settled(plain)}. "
+            f"From equal segments: {_counted(from_segments)} and a log-likelihood of {per_frame(plain, RESULT):.2f} "
+            f"per frame after {len(plain.snapshots) - 1} iterations; {_settled(plain)}. "
             f"The likeliest of eight random starts, on the right, has {_counted(from_random)} and "
             f"{per_frame(random, RESULT):.2f} per frame."
         )

@@ -35,8 +35,8 @@ def prototype(p: float, t: Floats) -> Floats:
 def demonstration(p: float, frames: int, rng: np.random.Generator, *, progression: float = PROGRESSION) -> Floats:
     """A sampled version with its own progression rate and noise (figure 2.7). Shape (frames, 2).
 
-    T_1 of the frames, drawn from [T/2 (1 - alpha), T/2 (1 + alpha)], show the movement out, the others the movement back; noise
-    is uniform in [-0.005, 0.005] per component.
+    T_1 of the frames, drawn from [T/2 (1 - alpha), T/2 (1 + alpha)], show the movement out, the others
+    the movement back; noise is uniform in [-0.005, 0.005] per component.
     """
     lowest, highest = frames / 2 * (1.0 - progression), frames / 2 * (1.0 + progression)
     out = int(rng.integers(int(np.ceil(lowest)), int(np.floor(highest)) + 1))

@@ -11,8 +11,8 @@ import numpy as np
 from paramove.documents import image, report_page
 from studies.chapter2.drawing import (
     draw_convergence,
-    draw_model,
     draw_demonstrations,
+    draw_model,
     draw_prototypes,
     draw_synthesis,
     png_of,

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from paramove.source_code import code_digest
+from studies.chapter4.grid import REPETITIONS
 from studies.chapter4.kinds import (
     BY_NAME,
     IPHMM_2,
@@ -21,7 +22,6 @@ from studies.chapter4.kinds import (
 from studies.chapter4.learning import LEARNERS, TRAININGS, able, measured_learning
 from studies.chapter4.line_movement import measured_line
 from studies.chapter4.measurement import measured_kind, measured_noise
-from studies.chapter4.grid import REPETITIONS
 from studies.chapter4.redirect import FEWEST, redirects
 from studies.chapter4.variation import (
     fit_to_references,

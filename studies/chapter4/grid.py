@@ -11,7 +11,7 @@ import numpy as np
 from paramove.demonstrations import SAMPLE_RATE_HZ, Action, demonstrations_at, redirect_demonstrations, table_targets
 from paramove.documents import Floats, Ints
 from paramove.hmm import LeftRightHMM, resample
-from studies.movements.tasks import raster_tasks
+from studies.movements.tasks import grid_tasks
 
 ACTIONS: tuple[Action, ...] = ("pointing", "reaching")
 COLUMNS, ROWS, REPETITIONS = 7, 5, 4
@@ -57,7 +57,7 @@ class Grid:
 @lru_cache(maxsize=2)
 def grid(seed: int) -> Grid:
     """The movements of one seed: the same that `python -m studies peers` gives to every method."""
-    tasks = raster_tasks((seed,))
+    tasks = grid_tasks((seed,))
     folds = {action: tasks[f"raster/{action}"][0] for action in ACTIONS}
     train: dict[str, MovementSet] = {
         action: MovementSet(tuple(fold.train.sequences), fold.train.theta) for action, fold in folds.items()

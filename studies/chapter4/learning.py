@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from studies.chapter4.grid import REPETITIONS, MovementSet, denser_training, grid, references
 from studies.chapter4.kinds import BY_NAME, CPHMM_3, IPHMM_3, LPHMM_3, OURS, QPHMM_3
 from studies.chapter4.measurement import synthesis_errors
-from studies.chapter4.grid import REPETITIONS, MovementSet, denser_training, grid, references
 from studies.movements.measures import theta_error
 
 LEARNERS = (IPHMM_3, LPHMM_3 + OURS, QPHMM_3 + OURS, CPHMM_3 + OURS)

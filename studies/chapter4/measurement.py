@@ -12,7 +12,6 @@ from paramove.alignment import movement_distance
 from paramove.documents import Floats
 from paramove.hmm import Path
 from paramove.phmm import InterpolativePHMM, MovementClassifier, NeuralPHMM, ParametricHMM, PolynomialPHMM
-from studies.chapter4.kinds import BY_NAME, Kind
 from studies.chapter4.grid import (
     ACTIONS,
     COMPARED_SAMPLES,
@@ -23,6 +22,7 @@ from studies.chapter4.grid import (
     redirects,
     references,
 )
+from studies.chapter4.kinds import BY_NAME, Kind
 from studies.chapter4.unfinished import aborted, stopped
 from studies.movements.measures import covered, theta_error
 from studies.movements.method import Estimate

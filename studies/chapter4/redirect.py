@@ -86,7 +86,7 @@ def _summary(values: Sequence[float] | Floats) -> dict[str, float]:
 
 
 def target_misses(movement: Floats, pair: Floats) -> tuple[float, float]:
-    """Minimum distance of the fingertip from the first target in the first half, from the second one in the other, m."""
+    """Minimum distance of the fingertip from the first target in the first half, and from the second, m."""
     index = POINT_NAMES.index("index")
     tip = movement.reshape(len(movement), len(POINT_NAMES), 3)[:, index]
     start, end = table_place(np.reshape(pair, (2, 2)))

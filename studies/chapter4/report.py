@@ -34,7 +34,7 @@ NOT_SHOWN = (
 )
 DATA = (
     "The movements are those of the synthetic demonstrator, not of the thesis's person: 7 body points, 60 Hz, a region "
-    "of 80 × 30 cm; trained on 3 × 3 places 10 times, tested on 7 × 5 places 4 times, both actions. In brackets the "
+    "of 80 × 30 cm; trained on 3 × 3 targets 10 times, tested on 7 × 5 targets 4 times, both actions. In brackets the "
     "interval that holds the mean of all seeds with 95 % (Student's t)."
 )
 RESIDUALS = (
@@ -140,7 +140,8 @@ def _questions(results: Results, summary: dict[str, Any], likeliest: dict[str, A
         section(
             "Unknown movements, and regions of θ",
             "AUROC: probability that a genuine movement fits the model better than another one. Aborted: half of the "
-            "fingertip's path out, back along the same path, then at rest. Stopped: held there. Redirect: to two targets.",
+            "fingertip's path out, back along the same path, then at rest. Stopped: held there. "
+            "Redirect: to two targets.",
             rejection_table(summary),
         ),
         section(

@@ -19,7 +19,7 @@ def half_way(x: Floats) -> int:
     tip = x.reshape(len(x), -1, 3)[:, TIP]
     farthest = int(np.linalg.norm(tip - tip[0], axis=1).argmax())
     length = np.cumsum(np.linalg.norm(np.diff(tip[: farthest + 1], axis=0), axis=1))
-    return 1 + int(np.searchsorted(way, 0.5 * length[-1])) if len(length) else 0
+    return 1 + int(np.searchsorted(length, 0.5 * length[-1])) if len(length) else 0
 
 
 def aborted(x: Floats, rng: np.random.Generator) -> Floats:

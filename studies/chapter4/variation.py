@@ -11,8 +11,6 @@ from paramove.alignment import movement_distance
 from paramove.demonstrations import POINT_NAMES, Demonstrator, Variation, table_place, table_targets
 from paramove.hmm import LeftRightHMM, resample
 from studies.chapter4.class_likeness import hmmlearn_class_accuracy
-from studies.chapter4.kinds import BY_NAME, IPHMM_3, LINEAR_FIT, LPHMM_3, QUADRATIC_FIT, RESTRICTIONS
-from studies.chapter4.measurement import synthesis_errors, trained
 from studies.chapter4.grid import (
     ACTIONS,
     COLUMNS,
@@ -23,6 +21,8 @@ from studies.chapter4.grid import (
     grid,
     references,
 )
+from studies.chapter4.kinds import BY_NAME, IPHMM_3, LINEAR_FIT, LPHMM_3, QUADRATIC_FIT, RESTRICTIONS
+from studies.chapter4.measurement import synthesis_errors, trained
 
 AT_TARGET = 45
 """Frame of 100 in which the finger is at the target."""
@@ -30,7 +30,7 @@ CORNERS = ((0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0))
 
 
 def natural_variation(seed: int, maximum: int = 14) -> dict[str, Any]:
-    """Distances (4.3) of all pairs of at most `maximum` pointing movements to the centre and each corner, and the misses, cm.
+    """Distances (4.3) of pairs of up to `maximum` pointing movements to the centre and each corner, and the misses, cm.
 
     "prototype": distance of the demonstrator's own movement without any variation from the average of the four tests at
     each of the 35 targets: the part of a synthesis error that is that of the averages.
