@@ -94,7 +94,7 @@ def video_tracker(
 
 
 def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) -> Iterator[tuple[int, CompressedImage]]:
-    """Number and message of each picture, as the camera node publishes them. Raises InputError for unusable pictures."""
+    """Number and message of each picture, as the camera node publishes them. Raises InputError."""
     source = open_source(f"folder:{pictures}@{rate_hz:g}", camera.width_px, camera.height_px)
     checks = FrameChecks(camera.width_px, camera.height_px)
     tick = 0

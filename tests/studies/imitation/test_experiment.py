@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def test_the_global_model_trained_again_gives_the_local_models() -> None:
     np.testing.assert_allclose(first.means, model.means_[0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("place", [target.name for target in THESIS_TARGETS])
+@pytest.mark.parametrize("target", [target.name for target in THESIS_TARGETS])
 def test_the_gripper_keeps_the_goals_of_the_thesis(target: str) -> None:
     errors = numbers()[target, "own"]
     assert errors["gripper"] < 8.0
@@ -139,6 +140,20 @@ def test_the_command_prints_the_thesis_beside_ours(tmp_path: Path, monkeypatch: 
     assert str(tmp_path) in done.output.replace("\n", "")
 
 
-def test_the_command_refuses_seeds_that_are_none() -> None:
+def test_the_old_option_works_with_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_grid = []
+
+    def run(setup: Setup, progress: Callable[[str], None]) -> Experiment:
+        with_grid.append(setup.with_grid)
+        return experiment()
+
+    monkeypatch.setattr("studies.imitation.experiment.run_experiment", run)
+    for option in ("--no-raster", "--no-grid"):
+        done = CliRunner().invoke(app, ["imitation", "--seeds", "0", option, "--report", str(tmp_path)])
+        assert ("--no-raster" in done.stderr and "--no-grid" in done.stderr) == (option == "--no-raster")
+    assert with_grid == [False, False]
+
+
+def test_the_command_rejects_seeds_that_are_none() -> None:
     done = CliRunner().invoke(app, ["imitation", "--seeds", "many"])
     assert done.exit_code == 2
