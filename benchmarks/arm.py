@@ -5,9 +5,9 @@
 The driver's own loop moves an arm of emulated servos behind a pseudo-terminal whose answers take as long as their bytes
 do. Times are of the wall clock, so other programs lengthen them; the processes share this machine's processors.
 
-    command loss    the driver has nothing more to say; until the first row of the stop ramp is played
+    command loss    the driver proposes nothing more; until the first row of the stop ramp is played
     driver killed   SIGKILL; until the servos rest by their bus watchdog
-    stop            a person's word reaches the driver; until the first row of the stop ramp is played
+    stop            a person's stop request reaches the driver; until the first row of the stop ramp is played
     unplugged       until the gate lets nothing pass any more
     loop            periods of the loop, measured at the servos' end
     replies         of servos that move the arm in its scene, to 4800 reads, next to N programs that never rest
@@ -28,6 +28,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -57,12 +58,12 @@ ROOT = Path(__file__).resolve().parent.parent
 GOALS_MS = {"command loss": 100.0, "driver killed": 120.0, "stop": 20.0, "unplugged": 50.0}
 MOVEMENT_S = 4.0
 UNDER_WAY_S = 1.0
-PATIENT_S = 10.0
+TIMEOUT_S = 10.0
 LOOP_S = 10.0
 READS, SDK_TIMEOUT_MS = 4800, 34.0
 """ROBOTIS's SDK waits so long for an answer: twice 16 ms and 2."""
 BUSY = Timeouts(silent_s=0.25, read_s=0.1)
-"""For what does not measure silence: other programs may take the processors for a while."""
+"""For measurements other than of missing replies: other programs may take the processors for a while."""
 
 
 class Emulation:
@@ -74,11 +75,11 @@ class Emulation:
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.does("ready")
 
-    def does(self, word: str) -> None:
-        """Says a word and waits until it is done."""
+    def does(self, command: str) -> None:
+        """Sends a command and waits until it is done."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(word + "\n")
+        self._process.stdin.write(command + "\n")
         self._process.stdin.flush()
         self._process.stdout.readline()
 
@@ -88,7 +89,8 @@ class Emulation:
 
 
 def emulate(description: RobotDescription, link: Path, baud_rate: int, world: bool) -> None:
-    """What that process does: one answer for each word."""
+    """What that process does: one answer for each command."""
+    assert description.bus is not None
     bus = description.bus.model_copy(update={"baud_rate": baud_rate})
     description = replace(description, bus=bus)
     with contextlib.ExitStack() as opened:
@@ -97,12 +99,12 @@ def emulate(description: RobotDescription, link: Path, baud_rate: int, world: bo
         else:
             emulator = opened.enter_context(DynamixelEmulator(emulated_servos(description), link))
         for line in sys.stdin:
-            word = line.strip()
-            if word == "end":
+            command = line.strip()
+            if command == "end":
                 return
-            if word in ("unplug", "plug_in"):
-                getattr(emulator, word)()
-            say("done")
+            if command in ("unplug", "plug_in"):
+                getattr(emulator, command)()
+            print_line("done")
 
 
 class Rig:
@@ -115,7 +117,7 @@ class Rig:
 
     @property
     def loop(self) -> Any:
-        """Of the arm; what is measured cannot be seen from outside."""
+        """Of the arm; the measured values are not public."""
         return self.arm._loop
 
     def arms(self) -> None:
@@ -138,7 +140,7 @@ class Rig:
         time.sleep(UNDER_WAY_S)
 
     def ramp_begins_ms(self, begun_s: float) -> float:
-        """From then until a row of the stop ramp is the newest one played."""
+        """From then until a row of the stop ramp is the latest one played."""
         reader = self.loop._reader
         wait(lambda: reader.playing != Hoap3State.PLAYING_FRAMES)
         index = reader.next_index
@@ -149,8 +151,9 @@ class Rig:
 @contextmanager
 def rig(description: RobotDescription, folder: Path, timeouts: Timeouts = BUSY) -> Any:
     """A rig at the description's baud rate; ends with the arm at rest."""
-    with tempfile.TemporaryDirectory() as place:
-        link = Path(place) / "usb-emulated_0001-if00-port0"
+    assert description.bus is not None
+    with tempfile.TemporaryDirectory() as name:
+        link = Path(name) / "usb-emulated_0001-if00-port0"
         emulation = Emulation(folder, description.bus.baud_rate, link)
         port = servo_port(description, str(link))
         with DrivenArm(description, joint_servos(description), port, LoopSettings(timeouts=timeouts)) as arm:
@@ -160,30 +163,30 @@ def rig(description: RobotDescription, folder: Path, timeouts: Timeouts = BUSY) 
 
 def wait(what: Callable[[], bool]) -> None:
     """Looks every half millisecond."""
-    until_s = time.monotonic() + PATIENT_S
+    until_s = time.monotonic() + TIMEOUT_S
     while not what():
         if time.monotonic() > until_s:
-            raise SystemExit("waited in vain: is the machine too busy?")
+            raise SystemExit(f"nothing happened for {TIMEOUT_S:g} s: is the machine too busy?")
         time.sleep(0.0005)
 
 
 def stop_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """A person's stop, again and again."""
-    found = []
+    times_ms = []
     with rig(description, folder) as here:
         for _ in range(trials):
             here.arms()
             here.moves()
             begun_s = time.monotonic()
             here.arm.on_stop(StopRequest(source="benchmark"), time.monotonic_ns())
-            found.append(here.ramp_begins_ms(begun_s))
+            times_ms.append(here.ramp_begins_ms(begun_s))
             wait(lambda: here.loop.driver.state is State.HOLD)
-    return found
+    return times_ms
 
 
 def command_loss_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
-    """The driver's logic says nothing any more, as if it hung; the loop plays what it has."""
-    found = []
+    """The driver's logic stops, as if it hung; the loop plays what it has."""
+    times_ms = []
     with rig(description, folder) as here:
         for _ in range(trials):
             here.arms()
@@ -192,16 +195,16 @@ def command_loss_ms(description: RobotDescription, folder: Path, trials: int) ->
             with here.loop.lock:
                 begun_s = time.monotonic()
                 here.loop._tick = lambda now_ns: None
-            found.append(here.ramp_begins_ms(begun_s))
+            times_ms.append(here.ramp_begins_ms(begun_s))
             with here.loop.lock:
                 here.loop._tick = ticks
             wait(lambda: here.loop.driver.state is State.HOLD)
-    return found
+    return times_ms
 
 
 def unplugged_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """The plug is pulled; until the gate lets nothing pass any more."""
-    found = []
+    times_ms = []
     with rig(description, folder, Timeouts()) as here:
         for _ in range(trials):
             here.arms()
@@ -209,16 +212,16 @@ def unplugged_ms(description: RobotDescription, folder: Path, trials: int) -> li
             begun_s = time.monotonic()
             threading.Thread(target=here.emulation.does, args=("unplug",)).start()
             wait(lambda: here.loop.driver.state is not State.ARMED)
-            found.append(1e3 * (time.monotonic() - begun_s))
+            times_ms.append(1e3 * (time.monotonic() - begun_s))
             here.emulation.does("plug_in")
             wait(lambda: here.loop.lost == "")
             wait(lambda: here.loop.driver.state in (State.DISARMED, State.HOLD))
-    return found
+    return times_ms
 
 
 def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[float]:
     """A process that drives the arm is killed; until all servos rest."""
-    found = []
+    times_ms = []
     for _ in range(trials):
         with DynamixelEmulator(emulated_servos(description)) as emulator:
             command = [sys.executable, __file__, "--robot", str(folder), "--drive", emulator.port]
@@ -227,13 +230,17 @@ def killed_ms(description: RobotDescription, folder: Path, trials: int) -> list[
                 driver.stdout.readline()
                 driver.send_signal(signal.SIGKILL)
                 begun_s = time.monotonic()
-                wait(lambda emulator=emulator: all(servo.velocity == 0.0 for servo in emulator.bus.servos))
-                found.append(1e3 * (time.monotonic() - begun_s))
-    return found
+                wait(partial(_at_rest, emulator))
+                times_ms.append(1e3 * (time.monotonic() - begun_s))
+    return times_ms
+
+
+def _at_rest(emulator: DynamixelEmulator) -> bool:
+    return all(servo.velocity == 0.0 for servo in emulator.bus.servos)
 
 
 def drive(description: RobotDescription, port: str) -> None:
-    """What is killed: moves the arm, and says so."""
+    """What is killed: moves the arm, and reports it."""
     settings = LoopSettings(timeouts=BUSY)
     with DrivenArm(description, joint_servos(description), servo_port(description, port), settings) as arm:
         wait(lambda: arm._loop.driver.state is State.DISARMED)
@@ -248,18 +255,24 @@ def drive(description: RobotDescription, port: str) -> None:
         time.sleep(UNDER_WAY_S)
         sys.stdout.write("moving\n")
         sys.stdout.flush()
-        time.sleep(PATIENT_S)
+        time.sleep(TIMEOUT_S)
 
 
 def periods_ms(description: RobotDescription, folder: Path, baud_rate: int, rate_hz: int) -> np.ndarray:
     """Between goals as they arrive, while the arm moves."""
+    assert description.bus is not None
     bus = description.bus.model_copy(update={"baud_rate": baud_rate})
     stream = description.stream.model_copy(update={"period_us": 1_000_000 // rate_hz})
     arrivals: list[float] = []
     with rig(replace(description, bus=bus, stream=stream), folder) as here:
         here.arms()
         command = here.loop.arm.command
-        here.loop.arm.command = lambda counts: (command(counts), arrivals.append(time.monotonic()))
+
+        def timed_command(counts: Any) -> None:
+            command(counts)
+            arrivals.append(time.monotonic())
+
+        here.loop.arm.command = timed_command
         until_s = time.monotonic() + LOOP_S
         while time.monotonic() < until_s:
             here.moves()
@@ -270,13 +283,13 @@ def periods_ms(description: RobotDescription, folder: Path, baud_rate: int, rate
 def replies_ms(description: RobotDescription, folder: Path, busy: int) -> list[float]:
     """From a question until its answer is whole; each servo in turn, 6 ms after the last one's."""
     times = []
-    with tempfile.TemporaryDirectory() as place:
-        link = Path(place) / "port"
+    with tempfile.TemporaryDirectory() as name:
+        link = Path(name) / "port"
         emulation = Emulation(folder, 1_000_000, link, "--world")
         loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(busy)]
         with contextlib.suppress(PermissionError):  # what is measured is not how late this program is itself
             os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
-        with serial.Serial(str(link), 1_000_000, timeout=PATIENT_S) as port:
+        with serial.Serial(str(link), 1_000_000, timeout=TIMEOUT_S) as port:
             for i in range(READS):
                 servo = description.servo_ids[i % len(description.servo_ids)]
                 begun_s = time.monotonic()
@@ -296,7 +309,7 @@ def replies(description: RobotDescription, folder: Path, busy: int) -> dict[str,
     times = replies_ms(description, folder, busy)
     median, p99 = np.percentile(times, [50, 99])
     late = READS - sum(one <= SDK_TIMEOUT_MS for one in times)
-    say(
+    print_line(
         f"replies next to {busy} busy programs: median {median:.1f} ms, 99 % {p99:.1f}, worst {max(times):.1f}, "
         f"{late} of {READS} after {SDK_TIMEOUT_MS:.0f} ms"
     )
@@ -305,7 +318,7 @@ def replies(description: RobotDescription, folder: Path, busy: int) -> dict[str,
 
 def stops_and_loops(description: RobotDescription, folder: Path, trials: int) -> dict[str, Any]:
     """Measured, printed and as numbers."""
-    found: dict[str, Any] = {}
+    numbers: dict[str, Any] = {}
     for name, measured in (
         ("stop", stop_ms(description, folder, trials)),
         ("command loss", command_loss_ms(description, folder, trials)),
@@ -313,24 +326,24 @@ def stops_and_loops(description: RobotDescription, folder: Path, trials: int) ->
         ("driver killed", killed_ms(description, folder, max(3, trials // 4))),
     ):
         median, p99 = np.percentile(measured, [50, 99])
-        found[name] = {"median_ms": median, "p99_ms": p99, "worst_ms": max(measured), "trials": len(measured)}
+        numbers[name] = {"median_ms": median, "p99_ms": p99, "worst_ms": max(measured), "trials": len(measured)}
         goal = GOALS_MS[name]
-        say(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
+        print_line(f"{name:14} median {median:6.1f} ms, 99 % {p99:6.1f}, worst {max(measured):6.1f} (goal {goal:.0f})")
     for baud_rate, rate_hz in ((1_000_000, 100), (4_000_000, 200)):
         periods = periods_ms(description, folder, baud_rate, rate_hz)
         median, p99 = np.percentile(periods, [50, 99])
         late = float((periods > 1.5e3 / rate_hz).mean())
         held = 1e3 / periods.mean()
-        found[f"loop {rate_hz} Hz"] = {"rate_hz": held, "median_ms": median, "p99_ms": p99, "late_share": late}
-        say(
+        numbers[f"loop {rate_hz} Hz"] = {"rate_hz": held, "median_ms": median, "p99_ms": p99, "late_share": late}
+        print_line(
             f"loop {rate_hz} Hz at {baud_rate // 1_000_000} Mbit/s: {held:.1f} Hz, period median {median:.2f} ms, "
             f"99 % {p99:.2f}, half a period late {late:.1%}"
         )
-    return found
+    return numbers
 
 
 def main() -> None:
-    """Measures, prints a table and writes the numbers if asked for."""
+    """Measures, prints a table and writes the numbers if requested."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--trials", type=int, default=20)
@@ -350,15 +363,15 @@ def main() -> None:
         emulate(description, arguments.emulate, arguments.baud, arguments.world)
         return
     load, trials = os.getloadavg()[0], arguments.trials
-    say(f"{description.name}, {len(os.sched_getaffinity(0))} processors, load {load:.1f} before")
-    found: dict[str, Any] = {"replies": replies(description, arguments.robot, arguments.busy)}
+    print_line(f"{description.name}, {len(os.sched_getaffinity(0))} processors, load {load:.1f} before")
+    numbers: dict[str, Any] = {"replies": replies(description, arguments.robot, arguments.busy)}
     if not arguments.only_replies:
-        found |= stops_and_loops(description, arguments.robot, trials)
+        numbers |= stops_and_loops(description, arguments.robot, trials)
     if arguments.json:
-        arguments.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+        arguments.json.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
 
 
-def say(line: str) -> None:
+def print_line(line: str) -> None:
     """To the terminal at once."""
     sys.stdout.write(line + "\n")
     sys.stdout.flush()

@@ -1,19 +1,19 @@
 """Other buses under the load of `benchmarks/bus.py`, each where it is installed; paramove itself never imports them.
 
-A peer is a pair of functions: `speak(messages)` says the time and filler once a millisecond after a line on its
-standard input; `hear(messages, go)` calls `go()` once it listens and returns the latencies in ns. A message has 216
-bytes.
+A peer is a pair of functions: `publish(messages)` publishes the time and filler once a millisecond after a line on
+its standard input; `subscribe(messages, go)` calls `go()` once it has subscribed and returns the latencies in ns. A
+message has 216 bytes.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import struct
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 PAYLOAD_BYTES = 216
 PERIOD_NS = 1_000_000
@@ -44,30 +44,30 @@ class Arrivals:
     def __init__(self, messages: int) -> None:
         self.latencies: list[int] = []
         self._messages = messages
-        self._newest_s = time.monotonic()
+        self._latest_s = time.monotonic()
         self._done = threading.Event()
 
     def take(self, payload: bytes) -> None:
         (sent_ns,) = struct.unpack("<q", payload[:8])
         self.latencies.append(time.monotonic_ns() - sent_ns)
-        self._newest_s = time.monotonic()
+        self._latest_s = time.monotonic()
         if len(self.latencies) >= self._messages:
             self._done.set()
 
     @property
     def complete(self) -> bool:
         """Whether all have come, or none for five seconds."""
-        return self._done.is_set() or time.monotonic() - self._newest_s > TIMEOUT_S
+        return self._done.is_set() or time.monotonic() - self._latest_s > TIMEOUT_S
 
     def wait(self) -> list[int]:
-        self._newest_s = time.monotonic()
+        self._latest_s = time.monotonic()
         while not self.complete:
             self._done.wait(0.1)
         return self.latencies
 
 
-def speak_zenoh(messages: int) -> None:
-    import zenoh
+def publish_zenoh(messages: int) -> None:
+    zenoh = importlib.import_module("zenoh")
 
     with zenoh.open(zenoh.Config()) as session:
         publisher = session.declare_publisher(NAME)
@@ -77,8 +77,8 @@ def speak_zenoh(messages: int) -> None:
         sys.stdin.readline()
 
 
-def hear_zenoh(messages: int, go: Go) -> list[int]:
-    import zenoh
+def subscribe_zenoh(messages: int, go: Go) -> list[int]:
+    zenoh = importlib.import_module("zenoh")
 
     arrivals = Arrivals(messages)
     with zenoh.open(zenoh.Config()) as session:
@@ -88,8 +88,8 @@ def hear_zenoh(messages: int, go: Go) -> list[int]:
         return arrivals.wait()
 
 
-def speak_lcm(messages: int) -> None:
-    import lcm
+def publish_lcm(messages: int) -> None:
+    lcm = importlib.import_module("lcm")
 
     bus = lcm.LCM("udpm://239.255.76.67:7667?ttl=0")
     sys.stdin.readline()
@@ -98,8 +98,8 @@ def speak_lcm(messages: int) -> None:
     sys.stdin.readline()
 
 
-def hear_lcm(messages: int, go: Go) -> list[int]:
-    import lcm
+def subscribe_lcm(messages: int, go: Go) -> list[int]:
+    lcm = importlib.import_module("lcm")
 
     arrivals = Arrivals(messages)
     bus = lcm.LCM("udpm://239.255.76.67:7667?ttl=0")
@@ -110,43 +110,42 @@ def hear_lcm(messages: int, go: Go) -> list[int]:
     return arrivals.latencies
 
 
-def speak_rospy(messages: int) -> None:
-    import rospy
-    from std_msgs.msg import String
+def publish_rospy(messages: int) -> None:
+    rospy = importlib.import_module("rospy")
+    string = importlib.import_module("std_msgs.msg").String
 
     rospy.init_node(NAME + "_speaker", disable_signals=True)
-    publisher = rospy.Publisher(NAME, String, queue_size=1000)
+    publisher = rospy.Publisher(NAME, string, queue_size=1000)
     sys.stdin.readline()
     for _ in paced(messages):
-        publisher.publish(String(data=stamped().decode("latin-1")))
+        publisher.publish(string(data=stamped().decode("latin-1")))
     sys.stdin.readline()
 
 
-def hear_rospy(messages: int, go: Go) -> list[int]:
-    import rospy
-    from std_msgs.msg import String
+def subscribe_rospy(messages: int, go: Go) -> list[int]:
+    rospy = importlib.import_module("rospy")
+    string = importlib.import_module("std_msgs.msg").String
 
     rospy.init_node(NAME + "_listener", disable_signals=True)
     arrivals = Arrivals(messages)
-    rospy.Subscriber(NAME, String, lambda heard: arrivals.take(heard.data.encode("latin-1")), tcp_nodelay=True)
+    rospy.Subscriber(NAME, string, lambda received: arrivals.take(received.data.encode("latin-1")), tcp_nodelay=True)
     time.sleep(2)  # until roscore has introduced the two
     go()
     return arrivals.wait()
 
 
 PEERS: dict[str, tuple[Callable[[int], None], Callable[[int, Go], list[int]]]] = {
-    "rospy": (speak_rospy, hear_rospy),
-    "zenoh": (speak_zenoh, hear_zenoh),
-    "lcm": (speak_lcm, hear_lcm),
+    "rospy": (publish_rospy, subscribe_rospy),
+    "zenoh": (publish_zenoh, subscribe_zenoh),
+    "lcm": (publish_lcm, subscribe_lcm),
 }
 
 
 def installed(peer: str) -> bool:
-    """Whether the peer's Python module is there."""
+    """Whether the peer's Python module is installed."""
     return importlib.util.find_spec(peer) is not None
 
 
 def describe(error: BaseException) -> str:
-    """First line of what a peer complains about."""
-    words: list[Any] = str(error).splitlines() or [type(error).__name__]
-    return str(words[0])
+    """First line of an error."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,11 +1,11 @@
-"""Throws damaged and random bytes at the envelope, at every decoder and at a subscriber; anything but a refusal fails.
+"""Feeds damaged and random bytes to the envelope, every decoder and a subscriber; anything but a rejection fails.
 
     python benchmarks/fuzz_bus.py [--seconds 60] [--seed 0]
 
 Inputs are mutations (bits, bytes, cuts, repetitions, splices, lengths, nesting) of good messages of every type of the
-topic table. Two ways in: damaged header and payload together, and a damaged payload behind a header that fits, as a
-speaker with a defect would say it. What decodes is encoded, decoded again and printed. Prints executions per second and
-memory; the exit code is 1 and the seed is named if something was raised that is not a refusal.
+topic table. Two kinds: damaged header and payload together, and a damaged payload behind a header that fits, as a
+defective publisher would send it. What decodes is encoded, decoded again and printed. Prints executions per second and
+memory; the exit code is 1 and the seed is named if something was raised that is not a rejection.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from google.protobuf.message import DecodeError
+from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus import (
     SIZE,
@@ -74,24 +74,24 @@ def _value(field: Any, generator: random.Random) -> Any:
 
 def mutate(content: bytes, other: bytes, generator: random.Random, max_bytes: int = MAX_BYTES) -> bytes:
     """One to four mutations."""
-    found = bytearray(content)
+    mutated = bytearray(content)
     for _ in range(generator.choice([1, 1, 1, 2, 4])):
-        at = generator.randrange(len(found) + 1)
-        way = generator.randrange(8)
-        if way == 0 and at < len(found):
-            found[at] ^= 1 << generator.randrange(8)
-        elif way == 1 and at < len(found):
-            found[at] = generator.choice([0, 1, 0x7F, 0x80, 0xFF])
-        elif way == 2:
-            del found[at:]
-        elif way == 3:
-            del found[at : at + generator.randrange(1, 9)]
-        elif way == 4:
-            found[at:at] = generator.randbytes(generator.randrange(1, 9))
-        elif way == 5:
-            found[at:at] = found[at : at + generator.randrange(64)] * generator.randrange(1, 50)
-        elif way == 6:
-            found[at:] = other[generator.randrange(len(other) + 1) :]
+        at = generator.randrange(len(mutated) + 1)
+        mutation = generator.randrange(8)
+        if mutation == 0 and at < len(mutated):
+            mutated[at] ^= 1 << generator.randrange(8)
+        elif mutation == 1 and at < len(mutated):
+            mutated[at] = generator.choice([0, 1, 0x7F, 0x80, 0xFF])
+        elif mutation == 2:
+            del mutated[at:]
+        elif mutation == 3:
+            del mutated[at : at + generator.randrange(1, 9)]
+        elif mutation == 4:
+            mutated[at:at] = generator.randbytes(generator.randrange(1, 9))
+        elif mutation == 5:
+            mutated[at:at] = mutated[at : at + generator.randrange(64)] * generator.randrange(1, 50)
+        elif mutation == 6:
+            mutated[at:] = other[generator.randrange(len(other) + 1) :]
         else:
             bomb = [
                 b"\xff\xff\xff\xff\x07",
@@ -100,8 +100,8 @@ def mutate(content: bytes, other: bytes, generator: random.Random, max_bytes: in
                 b"\x0a\x7f" * 100,
                 b"\x1a\x00" * 2000,
             ]
-            found[at:at] = generator.choice(bomb)
-    return bytes(found[:max_bytes])
+            mutated[at:at] = generator.choice(bomb)
+    return bytes(mutated[:max_bytes])
 
 
 class Fuzzer:
@@ -109,7 +109,7 @@ class Fuzzer:
 
     Attributes:
         executions: Inputs tried.
-        outcomes: How they ended: a reason of refusal, "decoded", "not decoded".
+        outcomes: How they ended: a reason of rejection, "decoded", "not decoded".
     """
 
     def __init__(self, seed: int) -> None:
@@ -121,7 +121,7 @@ class Fuzzer:
         self._corpus = [(kind, example(kind, self._generator).SerializeToString()) for kind in KINDS for _ in range(8)]
 
     def step(self) -> None:
-        """Tries one input; whatever is raised but a refusal comes out."""
+        """Tries one input; any exception but a rejection propagates."""
         kind, content = self._generator.choice(self._corpus)
         other = self._generator.choice(self._corpus)[1]
         self.executions += 1
@@ -130,14 +130,14 @@ class Fuzzer:
                 self._envelope(kind, content, other)
             else:
                 self._decoder(kind, mutate(content, other, self._generator))
-        except RefusedError as refused:
-            self.outcomes[refused.reason.value] += 1
+        except RefusedError as error:
+            self.outcomes[error.reason.value] += 1
 
     def _envelope(self, kind: Any, content: bytes, other: bytes) -> None:
         envelope = Envelope(schema_hash(kind), 1, 2, self.executions, 3, 4, self._generator.randrange(4))
         whole = mutate(pack(envelope, content) + content, other, self._generator)
         split = SIZE if self._generator.random() < 0.8 else self._generator.randrange(len(whole) + 1)
-        self._hear(kind, whole[:split], whole[split:])
+        self._receive(kind, whole[:split], whole[split:])
 
     def _decoder(self, kind: Any, content: bytes) -> None:
         edges = [0, 1, self.executions, 2**63, 2**64 - 1]
@@ -146,9 +146,9 @@ class Fuzzer:
         envelope = Envelope(
             schema_hash(kind), 1, epoch, self._generator.choice(edges), time_ns, time_ns, self._generator.randrange(256)
         )
-        self._hear(kind, pack(envelope, content), content)
+        self._receive(kind, pack(envelope, content), content)
 
-    def _hear(self, kind: Any, header: bytes, payload: bytes) -> None:
+    def _receive(self, kind: Any, header: bytes, payload: bytes) -> None:
         """What a subscriber does, and a reader of the message after it."""
         envelope = unpack(header, payload, schema_hash(kind), MAX_BYTES)
         self._counter.accept(envelope)
@@ -172,7 +172,7 @@ def memory_mib() -> float:
 
 
 def fuzz(seconds: float, seed: int, write: Callable[[str], object]) -> int:
-    """Fuzzes and tells; returns the exit code."""
+    """Fuzzes and prints the counts; returns the exit code."""
     fuzzer = Fuzzer(seed)
     started_s = time.monotonic()
     before = memory_mib()

@@ -6,7 +6,7 @@ Files of each kind are made by the project's own writers, by libraries, and take
 changed, and what is in them: arrays of archives, messages of recordings, words of texts, sizes of pictures. The real
 readers read them in a process of its own; its largest memory and processor time, with its children's, are measured for
 each file. A file on which 30 s of it are spent counts as rejected, but slow. Prints a table; the exit code is 1, and
-the files are kept, if something else than a refusal was raised, or 5 s or 1 GB were not enough.
+the files are kept, if anything but a rejection was raised, or 5 s or 1 GB were not enough.
 """
 
 from __future__ import annotations
@@ -256,7 +256,7 @@ def _messages(content: bytes, generator: random.Random) -> bytes:
             data = mutate(data, data, generator)
         at = generator.choice([message.log_time, 0, 2**64 - 1]) if generator.random() < 0.05 else message.log_time
         writer.add_message(channels[channel.id], at, data, message.publish_time, message.sequence % 2**32)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     return new.getvalue()
 
 
@@ -552,7 +552,7 @@ def damaged(kind: Kind, generator: random.Random) -> bytes:
 
 
 def fuzz(seconds: float, seed: int, write: Callable[[str], object]) -> int:
-    """Fuzzes and tells; returns the exit code."""
+    """Fuzzes and prints the counts; returns the exit code."""
     generator = random.Random(seed)
     counts: dict[str, Counter[str]] = {}
     wrong = Path(tempfile.mkdtemp(prefix="paramove-fuzz-files-"))

@@ -2,7 +2,8 @@
 
     python benchmarks/lockstep.py [--members 9] [--ticks 300] [--json FILE]
 
-Starts as many processes. Each hears a topic of the simulator and one of its neighbour, and says one message a tick.
+Starts as many processes. Each subscribes to a topic of the simulator and one of its neighbour, and publishes once a
+tick.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ CHAIN = (
 
 def member(number: int, members: int, folder: str) -> None:
     """One trivial node."""
-    said, heard = CHAIN[number], CHAIN[(number - 1) % members]
+    own, neighbour = CHAIN[number], CHAIN[(number - 1) % members]
     settings = BusSettings(folder=Path(folder), clock="simulated", lockstep=True)
-    with Bus(f"member_{number}", settings, (topics.WIRE_HOAP3_STATE, heard), (said,)) as bus:
+    with Bus(f"member_{number}", settings, (topics.WIRE_HOAP3_STATE, neighbour), (own,)) as bus:
         signal.signal(signal.SIGTERM, lambda *_: bus.stop())
         bus.ready("trivial")
         for event in bus.events(tick=True):
             if isinstance(event, Tick):
-                bus.publish(said, said.type())
+                bus.publish(own, own.type())
 
 
 def measure(members: int, ticks: int) -> dict[str, float]:
@@ -50,8 +51,8 @@ def measure(members: int, ticks: int) -> dict[str, float]:
     with tempfile.TemporaryDirectory(prefix="bus-") as folder:
         names = tuple(f"member_{number}" for number in range(members))
         settings = BusSettings(folder=Path(folder), clock="simulated", lockstep=True, members=names)
-        heard = CHAIN[:members]
-        with Bus("simulator", settings, heard, (topics.CLOCK, topics.WIRE_HOAP3_STATE)) as bus:
+        neighbour = CHAIN[:members]
+        with Bus("simulator", settings, neighbour, (topics.CLOCK, topics.WIRE_HOAP3_STATE)) as bus:
             barrier = LockstepBarrier(bus)
             command = [sys.executable, __file__, "--folder", folder, "--members", str(members), "--member"]
             processes = [subprocess.Popen([*command, str(number)]) for number in range(members)]
@@ -61,7 +62,7 @@ def measure(members: int, ticks: int) -> dict[str, float]:
                 started = time.perf_counter()
                 bus.publish(topics.WIRE_HOAP3_STATE, topics.WIRE_HOAP3_STATE.type())
                 if len(barrier.advance(tick * TICK_PERIOD_NS)) != members:
-                    raise RuntimeError(f"tick {tick}: not every member was heard")
+                    raise RuntimeError(f"tick {tick}: not every member was neighbour")
                 durations_ms.append(1e3 * (time.perf_counter() - started))
             for process in processes:
                 process.terminate()

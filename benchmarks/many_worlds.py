@@ -2,7 +2,7 @@
 
     python -m benchmarks.many_worlds [--seeds 0-99] [--placing-error-mm 1.5] [--measures nominal|drawn] [--json FILE]
 
-For each seed: a cylinder at the four corners gives the homography, its places off by the placing error. A hand puts
+For each seed: a cylinder at the four corners gives the homography, its positions off by the placing error. A hand puts
 each cylinder into its opening: tracker and recognizer watch, and the rule that they give must be so near to the opening
 that a cylinder put there slides in. Then three cylinders stand as the seed's instructor would stand them, are seen and
 located, and the robot plans to put each away, the others standing, in an order drawn at random. One that others stand
@@ -48,14 +48,14 @@ from sim.world import OPENINGS_UP, World
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 GRASP_Z = -0.098
 RESTS = 10
-"""Images after which the recognizer has seen something rest."""
+"""Images after which the recognizer has detected that something rests."""
 
 
 class View:
     """The camera of one world, and the tracker and the recognizer behind it.
 
     Attributes:
-        calibration: Once set, the recognizer says where on the plane.
+        calibration: Once set, the recognizer reports positions on the plane.
         gestures: All so far.
     """
 
@@ -79,20 +79,20 @@ class View:
             frame = Frame(np.ascontiguousarray(image[:, :, ::-1]), 0, 0)
             tracked = self._tracker.update(decode(encode(frame)), self._images * 1_000_000_000 // CAMERA_HZ)
             self.gestures += self._recognizer.update(tracked, self.calibration)
-        return {found.name: found for found in tracked.objects}
+        return {tracked_object.name: tracked_object for tracked_object in tracked.objects}
 
     def calibrate(self, error: Callable[[], Floats]) -> list[str]:
-        """A cylinder at the corners gives the calibration, its places off by `error`, [2], m; what was seen wrongly."""
+        """A cylinder at the corners gives the calibration, its positions off by `error`, [2], m. Returns faults."""
         faults, image = [], []
         for corner in CORNERS:
             self.park()
             self.stand("blue", corner + error())
-            seen = self.see(RESTS)
-            if sorted(seen) != ["blue"]:
-                faults.append(f"corner {corner}: saw {sorted(seen)}")
-            if "blue" not in seen:
+            detected = self.see(RESTS)
+            if sorted(detected) != ["blue"]:
+                faults.append(f"corner {corner}: saw {sorted(detected)}")
+            if "blue" not in detected:
                 return faults
-            image.append((seen["blue"].u_px, seen["blue"].v_px))
+            image.append((detected["blue"].u_px, detected["blue"].v_px))
         self.calibration = PlaneHomography.fit(image, CORNERS, GRASP_Z).to_message()
         return faults
 
@@ -100,7 +100,7 @@ class View:
         """A hand takes a cylinder from `start`, [2], and lets it fall into its opening.
 
         Returns:
-            Place [2], m, where the recognizer has seen it vanish; None if it has seen it vanish nowhere.
+            Position [2], m, where the recognizer saw it vanish; None if it did not.
         """
         opening = next(item for item in tool_box.OPENINGS if item.name == self.looks.rules[name])
         self.stand(name, start)
@@ -131,9 +131,9 @@ class View:
         ]
         return np.array((vanished[-1].x, vanished[-1].y)) if vanished else None
 
-    def stand(self, name: str, place: np.ndarray[Any, Any] | tuple[float, float]) -> None:
-        """Stand a cylinder at a place of the working plane."""
-        self.world.place(name, tool_box.standing_centre(*place))
+    def stand(self, name: str, position: np.ndarray[Any, Any] | tuple[float, float]) -> None:
+        """Stand a cylinder at a position of the working plane."""
+        self.world.place(name, tool_box.standing_centre(*position))
 
     def park(self) -> None:
         """All cylinders out of sight."""
@@ -151,7 +151,7 @@ def _line(start: Floats, end: Floats, images: int) -> Iterator[Floats]:
 
 
 def tolerance(measures: Measures) -> float:
-    """How far beside an opening's middle a cylinder still slides over the chamfer into it, m."""
+    """How far from an opening's middle a cylinder still slides over the chamfer into it, m."""
     return measures.opening_radius + measures.chamfer - tool_box.CYLINDER_RADIUS
 
 
@@ -210,11 +210,12 @@ def _examine(seed: int, view: View, plans: ClearPlans, placing_error: float) -> 
 def _plan_all(
     world: Looks, located: dict[str, Any], plans: ClearPlans, draw: np.random.Generator
 ) -> tuple[int, list[str]]:
-    """How often an object had to wait for another one, and why there is no way on, if there is none."""
+    """How often an object had to wait for another one, and why no plan is left, if there is none."""
     openings = {item.name: item for item in tool_box.OPENINGS}
     targets = {name: openings[world.rules[name]].centre[:2] + draw.normal(0.0, 0.001, 2) for name in sorted(located)}
     waiting = [str(name) for name in draw.permutation(sorted(located))]
-    later, stuck = 0, []
+    later = 0
+    stuck: list[str] = []
     while waiting and len(stuck) < len(waiting):
         name = waiting.pop(0)
         others = np.array([located[other] for other in waiting]).reshape(-1, 2)

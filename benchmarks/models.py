@@ -1,4 +1,4 @@
-"""Speed of the movement models beside hmmlearn and dynamax, as one table from one run.
+"""Speed of the movement models compared with hmmlearn and dynamax, as one table from one run.
 
     python benchmarks/models.py [--json FILE] [--rounds N] [--only TEXT]
 
@@ -20,14 +20,21 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # run as a program, only this folder is known
 
 import numpy as np
-from models_parametric import UNSEEN, estimate_rows
-from models_peers import NotInstalledError, dynamax_training, hmmlearn_model, hmmlearn_training
 
+from benchmarks.models_parametric import UNTRAINED, estimate_rows
+from benchmarks.models_peers import (
+    NotInstalledError,
+    dynamax_training,
+    hmmlearn_model,
+    hmmlearn_training,
+)
 from paramove.demonstrations import demonstrations_at, reaching_cuboid, reaching_grid_demonstrations
 from paramove.hmm import GaussianHMM, LeftRightHMM, TrainingOptions, resample
 from paramove.phmm import InterpolativePHMM, LinearPHMM, QuadraticPHMM
@@ -69,9 +76,9 @@ class Result:
 def movements(n_frames: int, count: int) -> list[np.ndarray]:
     """Synthetic reaching movements over the table, 21 coordinates each."""
     rng = np.random.default_rng(0)
-    places = [[u, v, 0.0] for u in (0.0, 0.5, 1.0) for v in (0.0, 0.5, 1.0)]
-    shown = [demonstrations_at(reaching_cuboid().theta(np.array(place)), rng).sequences for place in places]
-    return [resample(one, n_frames) for repetition in zip(*shown, strict=True) for one in repetition][:count]
+    corners = [[u, v, 0.0] for u in (0.0, 0.5, 1.0) for v in (0.0, 0.5, 1.0)]
+    demonstrations = [demonstrations_at(reaching_cuboid().theta(np.array(one)), rng).sequences for one in corners]
+    return [resample(one, n_frames) for repetition in zip(*demonstrations, strict=True) for one in repetition][:count]
 
 
 def peer(name: str, task: Callable[[], object], divisor: int = ITERATIONS, note: str = "") -> Row:
@@ -123,11 +130,11 @@ def thesis_training() -> list[Row]:
     sequences = movements(100, 10)
     options = TrainingOptions(max_iterations=10, tolerance=0.0)
     theta = np.linspace(0.0, 1.0, 10)[:, None]
-    counts = {"n_states": 21, "d_min": 3, "d_max": 6, "options": options}
+    model = partial(LinearPHMM, 21, 3, 6)
     # The thesis has a prior that fades and no lasting floor (2.2.2).
-    unfloored = counts | {"options": TrainingOptions(max_iterations=10, tolerance=0.0, floor_fraction=0.0)}
-    thesis = LinearPHMM(**unfloored, residuals="independent", smoothness=None)
-    prior, correlated = LinearPHMM(**counts, residuals="independent"), LinearPHMM(**counts)
+    unfloored = TrainingOptions(max_iterations=10, tolerance=0.0, floor_fraction=0.0)
+    thesis = model(options=unfloored, residuals="independent", smoothness=None)
+    prior, correlated = model(options=options, residuals="independent"), model(options=options)
     return [
         Row("paramove, linear PHMM, EM alone", lambda: thesis.fit(sequences, theta), note="as in the thesis"),
         Row("paramove, linear PHMM with prior", lambda: prior.fit(sequences, theta)),
@@ -152,27 +159,29 @@ def likelihood() -> list[Row]:
         except NotInstalledError as error:
             rows.append(Row(f"hmmlearn, {name}, log", None, note=str(error)))
         else:
-            rows.append(Row(f"hmmlearn, {name}, log", lambda theirs=theirs: theirs.score(sequences[0])))
+            rows.append(Row(f"hmmlearn, {name}, log", partial(theirs.score, sequences[0])))
     return rows
 
 
 def parametric() -> list[Row]:
-    """Parametric models of reaching, 80 states of 2 to 3 frames, a cuboid of 2 x 2 x 2 places."""
-    shown = reaching_grid_demonstrations(np.random.default_rng(0))
-    local = InterpolativePHMM(80, 2, 3, resampled_frames=200).fit(shown.sequences, shown.theta)
-    quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6, resampled_frames=100).fit(shown.sequences, shown.theta)
-    theta, tau = np.repeat(shown.theta[:1], 400, axis=0), np.linspace(0.0, 1.0, 400)
+    """Parametric models of reaching, 80 states of 2 to 3 frames, a cuboid of 2 x 2 x 2 targets."""
+    training = reaching_grid_demonstrations(np.random.default_rng(0))
+    local = InterpolativePHMM(80, 2, 3, resampled_frames=200).fit(training.sequences, training.theta)
+    quadratic = QuadraticPHMM(n_states=20, d_min=4, d_max=6, resampled_frames=100).fit(
+        training.sequences, training.theta
+    )
+    theta, tau = np.repeat(training.theta[:1], 400, axis=0), np.linspace(0.0, 1.0, 400)
     return [
-        Row("train interpolative PHMM, 80 states", lambda: local.fit(shown.sequences, shown.theta)),
-        Row("estimate theta, interpolative, 80 states", lambda: local.estimate(shown.sequences[0])),
-        Row("estimate theta, quadratic, 20 states", lambda: quadratic.estimate(shown.sequences[0])),
+        Row("train interpolative PHMM, 80 states", lambda: local.fit(training.sequences, training.theta)),
+        Row("estimate theta, interpolative, 80 states", lambda: local.estimate(training.sequences[0])),
+        Row("estimate theta, quadratic, 20 states", lambda: quadratic.estimate(training.sequences[0])),
         Row("mean at a progress, 400 particles", lambda: local.progress_mean(theta, tau)),
     ]
 
 
 def estimates(kind: str) -> list[Row]:
     """Theta of one movement over the table: 20 states of 4 to 6 frames, T = 100, D = 21."""
-    return [Row(name, task, UNSEEN, note) for name, task, note in estimate_rows(kind)]
+    return [Row(name, task, UNTRAINED, note) for name, task, note in estimate_rows(kind)]
 
 
 FIRST_CALL = """
@@ -216,22 +225,22 @@ def timed(group: str, rows: list[Row], rounds: int) -> list[Result]:
     """Runs the rows in turn, a quick one once more before it is timed; a slow one only as often as it fits."""
     times: list[list[float]] = [[] for _ in rows]
     for round_ in range(rounds + 1):
-        for row, found in zip(rows, times, strict=True):
+        for row, own_times in zip(rows, times, strict=True):
             # What takes seconds has been run once by `peer` already, so its first time counts.
-            if row.task is None or (round_ > 0 and found[0] * row.divisor > SLOW_S):
+            if row.task is None or (round_ > 0 and own_times[0] * row.divisor > SLOW_S):
                 continue
-            if found and found[0] * row.divisor < QUICK_S:
+            if own_times and own_times[0] * row.divisor < QUICK_S:
                 row.task()  # what others left in caches and memory is not its own
             clock = time.process_time if row.processor_time else time.perf_counter
             began = clock()
             row.task()
-            found.append((clock() - began) / row.divisor)
-    medians = [statistics.median(found[1:] or found) if found else None for found in times]
+            own_times.append((clock() - began) / row.divisor)
+    medians = [statistics.median(own_times[1:] or own_times) if own_times else None for own_times in times]
     reference = medians[0]
     return [
         Result(group, row.name, median, None if median is None or reference is None else median / reference,
-               max(1, len(found) - 1) if found else 0, row.note)
-        for row, median, found in zip(rows, medians, times, strict=True)
+               max(1, len(own_times) - 1) if own_times else 0, row.note)
+        for row, median, own_times in zip(rows, medians, times, strict=True)
     ]  # fmt: skip
 
 
@@ -248,7 +257,7 @@ def show(results: list[Result]) -> None:
 
 
 def main() -> None:
-    """Measure, show, and write JSON where asked to."""
+    """Measure, print, and write JSON if requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the results to this file")
     parser.add_argument("--rounds", type=int, default=5, help="runs that count, of each row")

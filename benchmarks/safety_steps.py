@@ -3,9 +3,9 @@
     python benchmarks/safety_steps.py [--steps 1000000] [--seed 0]
 
 Each episode is an arm of three joints with a robot that plays what it is given, and a driver, operator and emergency
-stop that mostly do what they should and otherwise say nonsense: NaN, huge and misshapen rows, old, replayed and foreign
-proposals, movements too fast by a little, reports that cannot be true, time that jumps. Prints how often what was
-given; the exit code is 1 and the seed is named if anything was given that the checker does not allow.
+stop that mostly do what they should and otherwise send invalid data: NaN, huge and misshapen rows, old, replayed and
+foreign proposals, movements too fast by a little, reports that cannot be true, time that jumps. Prints how often what
+was given; the exit code is 1 and the seed is named if anything was given that the checker does not allow.
 """
 
 from __future__ import annotations
@@ -75,16 +75,16 @@ class Checker:
         """Take `targets` in and judge all differences that they are part of."""
         if not np.isfinite(targets.rows).all() or targets.first_index < 0:
             raise NotAllowedError("not finite, or a negative index")
-        place = self.reach + targets.first_index
-        if place > len(self.rows):
+        index = self.reach + targets.first_index
+        if index > len(self.rows):
             raise NotAllowedError(f"a gap before index {targets.first_index}")
         kind = np.zeros(len(targets.rows), dtype=bool)
         kind[len(kind) - targets.ramp_rows :] = True
-        self.rows = np.concatenate([self.rows[:place], targets.rows])
-        self.stops = np.concatenate([self.stops[:place], kind])
+        self.rows = np.concatenate([self.rows[:index], targets.rows])
+        self.stops = np.concatenate([self.stops[:index], kind])
         tail = np.repeat(self.rows[-1:], self.reach, axis=0)
-        rows = np.concatenate([self.rows[place - self.reach :], tail])
-        stops = np.concatenate([self.stops[place - self.reach :], np.ones(self.reach, dtype=bool)])
+        rows = np.concatenate([self.rows[index - self.reach :], tail])
+        stops = np.concatenate([self.stops[index - self.reach :], np.ones(self.reach, dtype=bool)])
         self._judge(rows, stops, bool(targets.ramp_rows))
 
     def _judge(self, rows: Floats, stops: NDArray[np.bool_], ramped: bool) -> None:
@@ -103,20 +103,20 @@ class Checker:
             n = len(rows) - order * span
             total = sum(weight * rows[k * span : k * span + n] for k, weight in enumerate(weights))
             # A difference that touches a stop may be as large as a stop's.
-            touched = np.array([stops[k * span : k * span + n] for k in range(order + 1)]).any(axis=0)
+            touched = np.asarray(np.array([stops[k * span : k * span + n] for k in range(order + 1)]).any(axis=0))
             touched = touched if ramped else np.zeros(n, dtype=bool)
             allowed = np.where(touched[:, None], stopping, usual) * 1.002 + 8e-6 / (span * dt) ** order
             self._within(what, np.abs(np.asarray(total)) / (span * dt) ** order, allowed)
 
-    def _within(self, what: str, found: Floats, allowed: Floats) -> None:
-        if not (found <= allowed).all():
-            row, joint = (int(i) for i in np.argwhere(~(found <= allowed))[0])
-            limit = np.broadcast_to(allowed, found.shape)[row, joint]
-            raise NotAllowedError(f"{what} {found[row, joint]:.6g} of {NAMES[joint]}, allowed {limit:.6g}")
+    def _within(self, what: str, values: Floats, allowed: Floats) -> None:
+        if not (values <= allowed).all():
+            row, joint = (int(i) for i in np.argwhere(~(values <= allowed))[0])
+            limit = np.broadcast_to(allowed, values.shape)[row, joint]
+            raise NotAllowedError(f"{what} {values[row, joint]:.6g} of {NAMES[joint]}, allowed {limit:.6g}")
 
 
 class Episode:
-    """One gate, one robot and those who talk to them."""
+    """One gate, one robot and their inputs."""
 
     def __init__(self, seed: int) -> None:
         self.random = np.random.default_rng(seed)
@@ -136,11 +136,11 @@ class Episode:
         self.core = SafetyCore(self.limits, mechanical, EPOCH, self.now, settings)
         self.played_s = 0.0
         self.plan: tuple[int, Floats] | None = None
-        self.said: list[Proposal] = []
+        self.proposals: list[Proposal] = []
         self.pushed_until = 0
-        self.forbidden_until = self.now  # arm words up to here must not arm
-        self.newest = self.now
-        self.seen: Counter[str] = Counter()
+        self.forbidden_until = self.now  # arming requests up to here must not arm
+        self.latest = self.now
+        self.counts: Counter[str] = Counter()
 
     @property
     def end(self) -> int:
@@ -155,7 +155,7 @@ class Episode:
             self.step()
 
     def step(self) -> None:
-        """One period: the robot plays, everybody talks, the gate answers, the checker judges."""
+        """One period: the robot plays, the gate gets its inputs and answers, the checker judges."""
         passed = int(self.random.choice([10, 10, 10, 10, 30, 67]))
         self.played_s = self.played * self.limits.dt_s + passed * 1e-3 * (self.played < self.end)
         self.now += passed * MS
@@ -164,25 +164,30 @@ class Episode:
         before = self.core.state
         inputs = self.inputs()
         targets, state, faults = self.core.step(self.now, inputs)
-        self.seen[state.value] += 1
-        self.seen.update({f"fault {fault.code}" for fault in faults} if state is not before else ())
+        self.counts[state.value] += 1
+        self.counts.update({f"fault {fault.code}" for fault in faults} if state is not before else ())
         self.judge(before, inputs, targets, state)
-        self.newest = self.now
+        self.latest = self.now
 
     def judge(self, before: State, inputs: Inputs, targets: Targets | None, state: State) -> None:
         if state is State.ARMED and before is not State.ARMED:
-            word = inputs.word
+            request = inputs.word
             if before not in (State.DISARMED, State.HOLD, State.DISCONNECTED, State.ESTOP, State.STOPPING):
                 raise NotAllowedError(f"armed out of {before}")
-            if word is None or not word.armed or word.captured_ns <= self.forbidden_until or inputs.arming_faults:
-                raise NotAllowedError("armed without a word of its own")
+            if (
+                request is None
+                or not request.armed
+                or request.captured_ns <= self.forbidden_until
+                or inputs.arming_faults
+            ):
+                raise NotAllowedError("armed without an arming request of its own")
         if inputs.emergency and state is not State.ESTOP:
             raise NotAllowedError("pressed and not stopped")
         if state in (State.ESTOP, State.HOLD):
             self.forbidden_until = max(self.forbidden_until, self.now if state is State.ESTOP else 0)
         if targets is None:
             return
-        self.seen["given"] += 1
+        self.counts["given"] += 1
         if State.ARMED not in (before, state):
             raise NotAllowedError(f"rows given while {before.value}")
         if state is not State.ARMED and targets.ramp_rows != len(targets.rows):
@@ -190,11 +195,11 @@ class Episode:
         assert inputs.measured is not None
         if targets.first_index < inputs.measured.next_index:
             raise NotAllowedError("rows given that are played")
-        told = inputs.proposal
+        proposal = inputs.proposal
         if state is State.ARMED:
-            if told is None or told.epoch != EPOCH or not 0 <= self.now - told.captured_ns <= 250 * MS:
+            if proposal is None or proposal.epoch != EPOCH or not 0 <= self.now - proposal.captured_ns <= 250 * MS:
                 raise NotAllowedError("rows given of another life or too old")
-            if self.now < self.newest:
+            if self.now < self.latest:
                 raise NotAllowedError("rows given while the time goes back")
         self.checker.given(targets)
 
@@ -203,15 +208,15 @@ class Episode:
         emergency = None if random() < 0.3 else random() < 0.01
         if self.core.state is State.ESTOP:
             emergency = [None, True, False, False][self.random.integers(4)]
-        word = None
+        request = None
         if random() < (0.02 if self.core.state is State.ARMED else 0.4):
             armed = self.core.state is not State.ARMED or random() < 0.5
             age = int(self.random.choice([0, 0, 0, 100, 2000, -5000])) * MS
-            word = ArmingRequest(self.now - age, "a person" if random() < 0.95 else "", armed, by_person=True)
+            request = ArmingRequest(self.now - age, "a person" if random() < 0.95 else "", armed, by_person=True)
         stop = Fault("test", "", "stop") if random() < 0.005 else None
         checks = (Fault("voltage", "", "low"),) if random() < 0.05 else ()
         measured = self.measured()
-        return Inputs(measured, word, self.proposal(), stop, checks, emergency)
+        return Inputs(measured, request, self.proposal(), stop, checks, emergency)
 
     def measured(self) -> Measured | None:
         played = self.played
@@ -253,7 +258,7 @@ class Episode:
         good = Proposal(self.now, EPOCH, NAMES, first, rows, path[first - start + len(rows) :][:ahead])
         if not len(rows):
             return None
-        self.said = [*self.said[-20:], good]
+        self.proposals = [*self.proposals[-20:], good]
         return good if random() < 0.9 else self.odd(good)
 
     def planned(self) -> Floats:
@@ -291,7 +296,7 @@ class Episode:
         elif kind == 13:
             return replace(good, captured_ns=self.now + int(r.choice([-10_000, -300, 1, 10**6])) * MS)
         elif kind == 14:
-            return self.said[r.integers(len(self.said))]
+            return self.proposals[r.integers(len(self.proposals))]
         else:
             return replace(good, first_index=int(good.first_index + r.choice([-(10**6), -40, -3, 3, 40, 10**9])))
         return replace(good, rows=rows)
@@ -302,7 +307,7 @@ def main() -> int:
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     begun = time.monotonic()
     episodes = -(-arguments.steps // STEPS_PER_EPISODE)
     for number in range(episodes):
@@ -312,11 +317,11 @@ def main() -> int:
         except (NotAllowedError, ArithmeticError, ValueError, IndexError, TypeError) as error:
             sys.stdout.write(f"seed {arguments.seed + number}: {type(error).__name__}: {error}\n")
             return 1
-        seen += episode.seen
+        counts += episode.counts
         if number % max(1, episodes // 100) == 0:
             steps = (number + 1) * STEPS_PER_EPISODE
             sys.stderr.write(f"{steps} steps, {time.monotonic() - begun:.0f} s\n")
-    for what, count in sorted(seen.items()):
+    for what, count in sorted(counts.items()):
         sys.stdout.write(f"{count:9d}  {what}\n")
     sys.stdout.write(f"{episodes * STEPS_PER_EPISODE} steps, nothing given outside the limits\n")
     return 0

@@ -2,9 +2,9 @@
 
 python benchmarks/stop_button.py [--presses 20]
 
-A robot that only plays its stream (tests/robots/streaming/fake_robot.py) is moved by the real driver; at some moment of
-the movement the stop is sent through the page's socket. Measured on the wall clock, each time with new processes: until
-the gate says "stopping", and until the robot has the batch with the stop ramp.
+A robot that only plays its stream is moved by the real driver; at some time of the movement the stop is sent through
+the page's socket. Measured on the wall clock, each time with new processes: until the gate reports "stopping", and
+until the robot has the batch with the stop ramp.
 """
 
 from __future__ import annotations
@@ -17,20 +17,26 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import urlopen
 
 import numpy as np
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from paramove.bus import Bus, BusSettings, Tick, topics  # noqa: E402
-from paramove.dashboard import NAME, link_in  # noqa: E402
+from paramove.dashboard import link_in  # noqa: E402
+from paramove.msgs.joint_trajectory_pb2 import JointTrajectory  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
-from tests.dashboard.conftest import Visitor  # noqa: E402
-from tests.robots.hoap3.movements import HOAP3  # noqa: E402
-from tests.robots.streaming.fake_robot import FakeRobot, trajectory  # noqa: E402
+from paramove.robots import RobotDescription  # noqa: E402
+from paramove.robots.streaming import StreamReader  # noqa: E402
 
-GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0}
+HOAP3 = RobotDescription.load(ROOT / "robot_description" / "hoap3")
+SWING_DEG = {"right_shoulder_pitch": -50.0, "right_elbow": -40.0}
+"""From the base pose, in 3 s."""
 SUBSCRIBES = (topics.ARM_SAFETY, topics.WIRE_HOAP3_STREAM)
 PUBLISHES = (topics.WIRE_HOAP3_STATE, topics.OPERATOR_ARM, topics.ARM_TRAJECTORY)
 
@@ -41,8 +47,7 @@ class World:
     def __init__(self, folder: Path, press_at_s: float) -> None:
         self.bus = Bus("world", BusSettings(folder=folder / "bus"), SUBSCRIBES, PUBLISHES)
         self.folder = folder
-        self.robot = FakeRobot()
-        self.robot.reader.target[:] = HOAP3.units.to_counts(HOAP3.base_pose)
+        self.reader = StreamReader(HOAP3, HOAP3.units.to_counts(HOAP3.base_pose))
         self.press_at_s = press_at_s
         self.moving_s = self.pressed_s = self.stopping_s = self.batch_s = 0.0
 
@@ -53,21 +58,22 @@ class World:
             for event in self.bus.events(*SUBSCRIBES, tick=True):
                 now_s = time.monotonic()
                 if isinstance(event, Tick):
-                    self.robot.play(round(1e3 * (now_s - played_s)))
+                    for _ in range(round(1e3 * (now_s - played_s))):
+                        self.reader.play()
                     played_s = now_s
-                    self.bus.publish(topics.WIRE_HOAP3_STATE, self.robot.state(event.now_ns))
+                    self.bus.publish(topics.WIRE_HOAP3_STATE, self.reader.state(self.reader.target, event.now_ns))
                     if self.moving_s and not self.pressed_s and now_s - self.moving_s > self.press_at_s:
                         self.pressed_s = float("inf")
                         threading.Thread(target=self._press, daemon=True).start()
                 elif event.topic is topics.WIRE_HOAP3_STREAM:
-                    self.robot.reader.offer(event.message)
+                    self.reader.offer(event.message)
                     if self.stopping_s and not self.batch_s:
                         self.batch_s = now_s
                 elif event.message.state == SafetyState.STATE_DISARMED:
                     self.bus.publish(topics.OPERATOR_ARM, ArmRequest(source="benchmark", armed=True, by_person=True))
                 elif event.message.state == SafetyState.STATE_ARMED and not self.moving_s and link_in(self.folder):
                     self.moving_s = now_s
-                    self.bus.publish(topics.ARM_TRAJECTORY, trajectory("one", GOAL, 3.0))
+                    self.bus.publish(topics.ARM_TRAJECTORY, swing())
                 elif event.message.state == SafetyState.STATE_STOPPING and not self.stopping_s:
                     self.stopping_s = now_s
                 elif event.message.state == SafetyState.STATE_HOLD:
@@ -75,13 +81,29 @@ class World:
         return self.stopping_s - self.pressed_s, (self.batch_s or self.stopping_s) - self.pressed_s
 
     def _press(self) -> None:
-        visitor = Visitor(json.loads((self.folder / NAME).read_text())["port"])
-        visitor.open_link(link_in(self.folder))
-        with visitor.socket() as live:
+        link = link_in(self.folder)
+        assert link is not None
+        host = urlsplit(link).netloc
+        with urlopen(link) as page:
+            cookie = page.headers["Set-Cookie"].partition(";")[0]
+            key = page.read().decode().partition('name="paramove-key" content="')[2].partition('"')[0]
+        headers = {"Cookie": cookie}
+        url = f"ws://{host}/live?key={key}"
+        with connect(url, origin=Origin(f"http://{host}"), additional_headers=headers, compression=None) as live:
             live.recv()
             self.pressed_s = time.monotonic()
             live.send("stop")
             live.recv(60)
+
+
+def swing() -> JointTrajectory:
+    """From the base pose along a minimum-jerk path, points 10 ms apart."""
+    message = JointTrajectory(id="one", joints=list(SWING_DEG))
+    start = HOAP3.base_pose[HOAP3.indices(message.joints)]
+    for u in np.linspace(0.0, 1.0, 301):
+        position = start + (10 * u**3 - 15 * u**4 + 6 * u**5) * np.deg2rad(list(SWING_DEG.values()))
+        message.points.add(time_s=3.0 * u, position_rad=position)
+    return message
 
 
 def measure(press_at_s: float) -> tuple[float, float]:
@@ -108,9 +130,9 @@ def main() -> None:
     """Prints median and largest."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--presses", type=int, default=20)
-    moments = np.linspace(0.4, 1.8, parser.parse_args().presses)
-    found = 1e3 * np.array([measure(float(moment)) for moment in moments])
-    for what, times in zip(("gate says stopping", "robot has the stop ramp"), found.T, strict=True):
+    times_s = np.linspace(0.4, 1.8, parser.parse_args().presses)
+    delays_ms = 1e3 * np.array([measure(float(time_s)) for time_s in times_s])
+    for what, times in zip(("gate reports stopping", "robot has the stop ramp"), delays_ms.T, strict=True):
         sys.stdout.write(f"{what:<24} median {np.median(times):6.1f} ms   largest {times.max():6.1f} ms\n")
 
 

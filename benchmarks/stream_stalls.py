@@ -51,16 +51,16 @@ class Swing:
         self.robot = RobotDescription.load(Path(__file__).parent.parent / "robot_description" / "hoap3")
         self.limits = self.robot.motion_limits
         u = np.linspace(0.0, 1.0, DURATION + 1)[1:, None]
-        way = np.zeros(self.robot.n_joints)
+        swing_rad = np.zeros(self.robot.n_joints)
         for joint, degrees in SWING_DEG.items():
-            way[self.robot.index(joint)] = np.deg2rad(degrees)
-        self.path = self.robot.base_pose + (10 * u**3 - 15 * u**4 + 6 * u**5) * way
+            swing_rad[self.robot.index(joint)] = np.deg2rad(degrees)
+        self.path = self.robot.base_pose + (10 * u**3 - 15 * u**4 + 6 * u**5) * swing_rad
         self.batch = lru_cache(maxsize=4096)(self._batch)
         self.begun: list[StreamReader] = []
         reader = StreamReader(self.robot, self.robot.units.to_counts(self.robot.base_pose))
         for first in range(0, DURATION - TICK, TICK):
             if not reader.offer(self.batch(first, COVER)):
-                raise NotSmoothError(f"the undisturbed stream is refused: {reader.refusal}")
+                raise NotSmoothError(f"the undisturbed stream is rejected: {reader.refusal}")
             self.begun.append(copy.copy(reader))
             for _ in range(TICK):
                 reader.play()
@@ -80,7 +80,7 @@ def swing() -> Swing:
 
 def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
     """One pattern: what the robot played until it rests, [N, J] counts, its past included, and what happened."""
-    stage, seen = swing(), Counter[str]()
+    stage, counts = swing(), Counter[str]()
     reader = copy.copy(stage.begun[random.integers(len(stage.begun))])
     reader.refused_batches = 0
     frames = list(reader._played)
@@ -91,7 +91,7 @@ def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
         first = min(known + int(random.choice([0, 60, 100, 170, 240])), DURATION - 1)
         waiting.append(stage.batch(first, int(random.choice([100, COVER]))))
         kind = random.choice(["sent", "sent", "sent", "lost", "repeated", "overtaken"])
-        seen[kind] += 1
+        counts[kind] += 1
         if kind == "lost":
             waiting.pop()
         elif kind == "repeated":
@@ -102,11 +102,11 @@ def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
             reader.offer(batch)
         waiting.clear()
     frames += [reader.play() for _ in range(reader.depth)]
-    seen["refused"] += reader.refused_batches
-    seen["under-run" if reader.next_index < DURATION else "played to its end"] += 1
+    counts["refused"] += reader.refused_batches
+    counts["under-run" if reader.next_index < DURATION else "played to its end"] += 1
     if not reader.at_rest:
         raise NotSmoothError("the robot is not at rest")
-    return np.array(frames, dtype=np.float64), seen
+    return np.array(frames, dtype=np.float64), counts
 
 
 def judge(frames: Floats) -> None:
@@ -127,14 +127,14 @@ def judge(frames: Floats) -> None:
         (*stopping, 16),
         ("jerk", 3, 2 * robot.jerk, 12),
     ):
-        found = whole
+        difference = whole
         for _ in range(order):
-            found = found[span:] - found[:-span]
+            difference = difference[span:] - difference[:-span]
         # Rounding adds half a count to each of the 2 ** order terms.
         allowed = 1.002 * per_rad * limit * (span * 1e-3) ** order + 2 ** (order - 1)
-        if not (np.abs(found) <= allowed).all():
-            row, joint = (int(i) for i in np.argwhere(~(np.abs(found) <= allowed))[0])
-            size = f"{abs(found[row, joint]):.0f} counts, allowed {allowed[joint]:.1f}"
+        if not (np.abs(difference) <= allowed).all():
+            row, joint = (int(i) for i in np.argwhere(~(np.abs(difference) <= allowed))[0])
+            size = f"{abs(difference[row, joint]):.0f} counts, allowed {allowed[joint]:.1f}"
             raise NotSmoothError(f"{what} of {robot.joint_names[joint]} over {span} frames at frame {row}: {size}")
 
 
@@ -143,7 +143,7 @@ def main() -> int:
     parser.add_argument("--patterns", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    seen: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     begun = time.monotonic()
     for number in range(arguments.patterns):
         seed = arguments.seed + number
@@ -153,10 +153,10 @@ def main() -> int:
         except NotSmoothError as error:
             sys.stdout.write(f"seed {seed}: {error}\n")
             return 1
-        seen += happened
+        counts += happened
         if number % max(1, arguments.patterns // 100) == 0:
             sys.stderr.write(f"{number + 1} patterns, {time.monotonic() - begun:.0f} s\n")
-    for what, count in sorted(seen.items()):
+    for what, count in sorted(counts.items()):
         sys.stdout.write(f"{count:9d}  {what}\n")
     sys.stdout.write(f"{arguments.patterns} patterns, every one a smooth movement to rest\n")
     return 0

@@ -1,10 +1,10 @@
-"""Speed of tracking an arm in images: observation, and camera image to estimate, beside the thesis's figures.
+"""Speed of tracking an arm in images: observation, and camera image to estimate, compared with the thesis's figures.
 
     python benchmarks/tracking.py [--json FILE] [--seconds S] [--only TEXT]
 
 The images are those of a rendered person who points, 320 x 240 px with clutter and noise, drawn before the clock
 starts; the hypotheses are those of the running tracker. Rows with one thread are bound to one processor and show
-processor time, which other programs disturb less; rows with two show time by the clock. Shown are medians and the
+processor time, which other programs disturb less; rows with two show time by the clock. Printed are medians and the
 shortest times.
 
 The thesis's figures (6.5, 6.6.4): 1.24 ms for contour and matching of a hypothesis on one 2.4 GHz Core 2; 8 frames per
@@ -18,8 +18,9 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
@@ -29,7 +30,7 @@ import cv2
 import numpy as np
 
 from paramove.action_space import ActionTracker, FilterOptions, Grammar, TrackerOptions, Vocabulary, table_action
-from paramove.observation import ArmObserver, ObservationOptions
+from paramove.observation import ArmObserver, Likelihood, ObservationOptions
 from sim.performances import Studio
 from sim.persons.performances import kind_named, perform
 
@@ -69,10 +70,10 @@ def filmed() -> Footage:
     rng = np.random.default_rng(0)
     times = np.arange(FRAMES) / RATE_HZ
     frames = []
-    for moment in times:
-        noisy = [np.clip(image + rng.normal(0.0, 4.0, image.shape), 0, 255) for image in studio.film_all(moment)]
+    for time_s in times:
+        noisy = [np.clip(image + rng.normal(0.0, 4.0, image.shape), 0, 255) for image in studio.film_all(time_s)]
         frames.append([image.astype(np.uint8) for image in noisy])
-    poses = np.array([studio.at(moment).pose for moment in times])
+    poses = np.array([studio.at(time_s).pose for time_s in times])
     studio.close()
     return Footage(frames, studio, poses)
 
@@ -91,7 +92,7 @@ def timed(work: Callable[[], object], threads: int, seconds: float, minimum: int
 
 
 class Bench:
-    """Runs the rows and shows them."""
+    """Runs the rows and prints them."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
@@ -99,13 +100,13 @@ class Bench:
         self.footage = filmed()
         self.vocabulary = Vocabulary([table_action("pointing")])
 
-    def observer(self, views: int, threads: int, **options: object) -> ArmObserver:
+    def observer(self, views: int, threads: int, likelihood: Likelihood = "matched") -> ArmObserver:
         """An observer of the first views, on as many processors as it has threads."""
         os.sched_setaffinity(0, set(CORES if threads > 1 else CORES[-1:]))
         cv2.setNumThreads(1)
         person = self.footage.studio.performance.person
         cameras = self.footage.studio.calibrated[:views]
-        return ArmObserver(person.measured, cameras, ObservationOptions(**options), threads=threads)
+        return ArmObserver(person.measured, cameras, ObservationOptions(likelihood=likelihood), threads=threads)
 
     def tracker(self, particles: int) -> ActionTracker:
         """A tracker of the one action."""
@@ -124,9 +125,9 @@ class Bench:
     def row(
         self, group: str, name: str, threads: int, work: Callable[[], object], note: Callable[[float], str]
     ) -> None:
-        """Time and show one row; `note` says what the median means."""
-        found = timed(work, threads, self.seconds)
-        result = Result(group, name, threads, *found, note(found[0]))
+        """Time and print one row; `note` explains the median."""
+        times = timed(work, threads, self.seconds)
+        result = Result(group, name, threads, *times, note(times[0]))
         if not self.results or self.results[-1].group != group:
             sys.stdout.write(f"\n{group}\n")
         self.results.append(result)
@@ -145,8 +146,8 @@ def preprocessing(bench: Bench) -> None:
             observer = bench.observer(views, threads)
             bench.row(
                 "preprocessing of 320 x 240 px", f"{views} view{'s' if views > 1 else ''}", threads,
-                lambda observer=observer, views=views: observer.look(images[:views]),
-                lambda ms, views=views: f"{ms / views:.2f} ms a view",
+                partial(observer.look, images[:views]),
+                partial(per_view, views=views),
             )  # fmt: skip
     large = [cv2.resize(images[0], (640, 480))]
     observer = ArmObserver(
@@ -168,9 +169,25 @@ def hypotheses(bench: Bench) -> None:
                 bench.row(
                     f"likelihood of 400 hypotheses (contour of {points:.0f} px in the first view)",
                     f"{likelihood}, {views} view{'s' if views > 1 else ''}", threads,
-                    lambda observer=observer: observer.log_likelihoods(poses),
-                    lambda ms, views=views, threads=threads: per_hypothesis(ms, 400 * views, threads),
+                    partial(observer.log_likelihoods, poses),
+                    partial(per_hypothesis, count=400 * views, threads=threads),
                 )  # fmt: skip
+
+
+def per_view(median_ms: float, views: int) -> str:
+    """Cost of one view."""
+    return f"{median_ms / views:.2f} ms a view"
+
+
+def per_pair(median_ms: float, count: int) -> str:
+    """Cost of one hypothesis in one view."""
+    return f"{1e3 * median_ms / count:6.2f} us a hypothesis and view"
+
+
+def frames_per_second(median_ms: float, views: int) -> str:
+    """The rate, and how many times the thesis's it is."""
+    compared = f"; {1e3 / median_ms / THESIS_FPS:.0f} x the thesis's 8 fps on 8 cores" if views == 1 else ""
+    return f"{1e3 / median_ms:5.0f} fps{compared}"
 
 
 def per_hypothesis(median_ms: float, count: int, threads: int) -> str:
@@ -190,8 +207,8 @@ def growth(bench: Bench) -> None:
             poses = cloud[rng.integers(0, len(cloud), count)] + rng.normal(0.0, 0.003, (count, 9))
             bench.row(
                 "growth with hypotheses and views", f"{count} hypotheses, {views} view{'s' if views > 1 else ''}", 2,
-                lambda observer=observer, poses=poses: observer.log_likelihoods(poses),
-                lambda ms, count=count, views=views: f"{1e3 * ms / (count * views):6.2f} us a hypothesis and view",
+                partial(observer.log_likelihoods, poses),
+                partial(per_pair, count=count * views),
             )  # fmt: skip
 
 
@@ -200,19 +217,23 @@ def end_to_end(bench: Bench) -> None:
     for threads in (1, 2):
         for views in VIEWS:
             observer, tracker = bench.observer(views, threads), bench.tracker(400)
-            moment = iter(range(10**9))
+            numbers = iter(range(10**9))
 
-            def frame(observer=observer, tracker=tracker, views=views, moment=moment) -> None:
-                number = next(moment)
-                place = number % (2 * FRAMES - 2)  # there and back, so that the arm never jumps
-                place = place if place < FRAMES else 2 * FRAMES - 2 - place
-                observer.look(bench.footage.frames[place][:views])
+            def frame(
+                observer: ArmObserver = observer,
+                tracker: ActionTracker = tracker,
+                views: int = views,
+                numbers: Iterator[int] = numbers,
+            ) -> None:
+                number = next(numbers)
+                index = number % (2 * FRAMES - 2)  # there and back, so that the arm never jumps
+                index = index if index < FRAMES else 2 * FRAMES - 2 - index
+                observer.look(bench.footage.frames[index][:views])
                 tracker.update(number / RATE_HZ, observer.log_likelihoods)
 
             bench.row(
                 "camera image to estimate, 400 hypotheses", f"{views} view{'s' if views > 1 else ''}", threads, frame,
-                lambda ms, views=views: f"{1e3 / ms:5.0f} fps"
-                + (f"; {1e3 / ms / THESIS_FPS:.0f} x the thesis's 8 fps on 8 cores" if views == 1 else ""),
+                partial(frames_per_second, views=views),
             )  # fmt: skip
 
 
@@ -225,7 +246,7 @@ GROUPS: dict[str, Callable[[Bench], None]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure, show, and write JSON where asked to."""
+    """Measure, print, and write JSON if requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the results to this file")
     parser.add_argument("--seconds", type=float, default=1.0, help="time for each row")
@@ -238,8 +259,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             group(bench)
     if chosen.json is not None:
         machine = {"machine": platform.machine(), "python": platform.python_version(), "cores": os.cpu_count()}
-        machine["load"] = os.getloadavg()[0]
-        content = {"benchmark": "tracking", **machine, "results": [asdict(result) for result in bench.results]}
+        load = os.getloadavg()[0]
+        content = {
+            "benchmark": "tracking",
+            **machine,
+            "load": load,
+            "results": [asdict(result) for result in bench.results],
+        }
         chosen.json.write_text(json.dumps(content, indent=2) + "\n")
 
 

@@ -3,9 +3,9 @@
     python benchmarks/tracking_latency.py [--json FILE] [--targets N] [--particles N] [--keep FOLDER]
 
 A simulated person points (in lockstep, one camera of 320 x 240 px); the recorded images are then replayed at the pace
-at which they were taken, through camera, tracker, recognizer and recorder. Measured is what the replay's own recording
-says: from the publication of an image to that of the estimate made from it. Decoding, both ways through the bus and
-everything that the other processes take of the processors meanwhile are in it. Images that were replaced by newer ones
+at which they were taken, through camera, tracker, recognizer and recorder. Measured in the replay's own recording:
+from the publication of an image to that of the estimate made from it. Decoding, both transfers by the bus and
+everything that the other processes take of the processors meanwhile are in it. Images that were replaced by later ones
 before the tracker came to them have no estimate and are counted.
 """
 
@@ -30,7 +30,7 @@ DOMAIN = "tracking_latency"
 
 
 def launched(runs: Path, *arguments: str) -> Path:
-    """The folder of a run of `pointing`. What it found of the person's targets does not matter here."""
+    """The folder of a run of `pointing`. Its detected targets do not matter here."""
     command = [sys.executable, "-m", "paramove.cli.launch", "pointing", "--runs", str(runs), *arguments]
     environment = {**os.environ, "PARAMOVE_DOMAIN": DOMAIN}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
@@ -44,17 +44,17 @@ def launched(runs: Path, *arguments: str) -> Path:
 
 def latencies_ms(folder: Path) -> tuple[list[float], int]:
     """Of every estimate after the first ones; and how many images have none."""
-    seen: dict[int, int] = {}
-    found: list[float] = []
+    published_ns: dict[int, int] = {}
+    latencies: list[float] = []
     image, estimate = topics.CAMERA_IMAGES[0].name, topics.ACTION_ESTIMATE.name
     for recorded in read(folder / "recording.mcap", (image, estimate)):
         if recorded.topic == image:
-            seen[recorded.message.timestamp.ToNanoseconds()] = recorded.publish_ns
+            published_ns[recorded.message.timestamp.ToNanoseconds()] = recorded.publish_ns
             continue
-        published = seen.get(recorded.message.captured.ToNanoseconds())
+        published = published_ns.get(recorded.message.captured.ToNanoseconds())
         if published is not None:
-            found.append(1e-6 * (recorded.publish_ns - published))
-    return found[SETTLED:], len(seen) - len(found)
+            latencies.append(1e-6 * (recorded.publish_ns - published))
+    return latencies[SETTLED:], len(published_ns) - len(latencies)
 
 
 def measured(folder: Path, targets: int, particles: int) -> dict[str, float]:
@@ -86,7 +86,7 @@ def measured(folder: Path, targets: int, particles: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure, show, and write JSON where asked to."""
+    """Measure, print, and write JSON if requested."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="write the results to this file")
     parser.add_argument("--targets", type=int, default=5, help="how often the person points: about 5 s each")

@@ -51,14 +51,14 @@ def api_page() -> str:
         parts.append(f"\n## {name}\n\n{first_sentence(package)}\n\n| name | what it is |\n|---|---|\n")
         for public in public_names(package):
             thing = getattr(package, public)
-            shown = f"`{public}`"
+            link = f"`{public}`"
             ours = getattr(thing, "__module__", "").startswith("paramove")
             if ours:
                 file = Path(inspect.getfile(importlib.import_module(thing.__module__))).relative_to(ROOT)
-                shown = f"[{shown}](../../{file})"
+                link = f"[{link}](../../{file})"
             described = ours or inspect.ismodule(thing)
             sentence = first_sentence(thing) if described else f"`{inspect.formatannotation(thing):.120}`"
-            parts.append(f"| {shown} | {sentence.replace('|', '&#124;')} |\n")
+            parts.append(f"| {link} | {sentence.replace('|', '&#124;')} |\n")
     return "".join(parts)
 
 

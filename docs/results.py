@@ -1,7 +1,7 @@
-"""The measured numbers of the pages: commands make them, docs/results/ keeps them, a test compares both.
+"""The measured numbers of the pages: commands make them, docs/results/ stores them, a test compares both.
 
 Usage:
-    python docs/results.py                        compares; exit code 1 if a page says something else
+    python docs/results.py                        compares; exit code 1 if a page differs
     python docs/results.py --write                brings the pages up to date with the files
     python docs/results.py --run imitation demo   runs the commands of these results (`all`: of every one), writes the
                                                   files and brings the pages up to date
@@ -52,7 +52,7 @@ class Row(string.Formatter):
     """Formats one row of a table: what is not known is a dash, a per cent sign stands apart."""
 
     def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
-        """Of a name in braces; a list is asked by its index: {0}."""
+        """Of a name in braces; a list by its index: {0}."""
         return args[key] if isinstance(key, int) else kwargs[key]
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -120,7 +120,7 @@ def results() -> dict[str, Any]:
 
 
 def stale_pages(files: Mapping[str, Any], *, write: bool = False) -> list[Path]:
-    """Pages that say something else than the files; with `write` they are brought up to date. Raises PathError."""
+    """Pages that differ from the files; with `write` they are brought up to date. Raises PathError."""
     stale = []
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
@@ -162,7 +162,7 @@ def chapter4(out: Path) -> dict[str, Any]:
 
 
 def chapter6(out: Path) -> dict[str, Any]:
-    """Cases by kind and views, goals of all clips beside those of the held-out third, what the models know."""
+    """Cases by kind and views, goals of all clips and of the held-out third, errors of the models."""
     found = load(out / "numbers.json")
     nothing = dict.fromkeys(("target_median", "target_p90", "lost", "performances")) | {"hand_rms": [None] * 3}
     cases: dict[str, Any] = {}
@@ -234,7 +234,7 @@ def real_images(out: Path) -> dict[str, Any]:
 
 
 def movements(out: Path) -> dict[str, Any]:
-    """Errors of synthesis and theta by task; what the quadratic model knows of its errors, beside the best peer's."""
+    """Errors of synthesis and theta by task; coverage of the quadratic model and of the best peer."""
     methods = {
         "quadratic": "paramove, quadratic PHMM",
         "linear": "paramove, linear PHMM",
@@ -303,13 +303,13 @@ def demo(out: Path) -> dict[str, Any]:
     assert summary is not None
     types = [summary.schemas[channel.schema_id].name for channel in summary.channels.values()]
     table = printed(out / "0.txt", "SUCCESS", "messages lost")
-    said = re.findall(r"^ *[\d.]+ s +(robot: .*)$", (out / "0.txt").read_text(encoding="utf-8"), re.M)
-    away = next(number for number, line in enumerate(said) if "is put away" in line)
-    rule = next(line for line in said if "seen going in" in line)
+    messages = re.findall(r"^ *[\d.]+ s +(robot: .*)$", (out / "0.txt").read_text(encoding="utf-8"), re.M)
+    away = next(number for number, line in enumerate(messages) if "is put away" in line)
+    rule = next(line for line in messages if "seen going in" in line)
     return {
-        "story": [*said[: away + 1], "...", said[-1]],
+        "story": [*messages[: away + 1], "...", messages[-1]],
         "table": table,
-        "screen": [rule, "...", *said[away - 1 : away + 1], "...", *table[:6], "..."],
+        "screen": [rule, "...", *messages[away - 1 : away + 1], "...", *table[:6], "..."],
         "channels": len(types),
         "foxglove_channels": sum(name.startswith("foxglove.") for name in types),
     }
@@ -455,7 +455,7 @@ MEASUREMENTS = {
     "imitation": Measurement(
         (
             "python -m studies imitation --report {out}",
-            "python -m studies imitation --repetitions 10 --no-raster --report {out}/10",
+            "python -m studies imitation --repetitions 10 --no-grid --report {out}/10",
         ),
         imitation,
         "a minute",

@@ -1,4 +1,4 @@
-"""The experiments of the thesis and ours, beside those of peers; `python -m studies` lists them."""
+"""The experiments of the thesis and ours, and methods of others; `python -m studies` lists them."""
 
 from paramove.linear_algebra_threads import use_one_thread
 

@@ -5,9 +5,9 @@
     python studies/payload_hashes.py compare before.json after.json
 
 Applications run in simulated time, so one seed gives the same messages each time. Of each recorded topic all payloads
-are hashed, without sentences for people, and truth too. Status and images are left out: a status follows the wall
-clock, and an image is as large as everything else. Of an evaluation all numbers are kept but times. The hashes hold on
-one machine: rendering and linear algebra differ between processors in the last bits.
+are hashed, without messages for people, and truth too. Status and images are left out: a status follows the wall
+clock, and an image is as large as everything else. Of an evaluation all numbers but times are compared. The hashes
+hold on one machine: rendering and linear algebra differ between processors in the last bits.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SEEDS = range(3)
 EVALUATIONS = {
     "chapter2": "python -m studies chapter2 --seed 0 --out {out} --json {out}/numbers.json",
     "chapter4": "python -m studies chapter4 --quick --out {out} --json {out}/numbers.json",
-    "imitation": "python -m studies imitation --repetitions 10 --no-raster --report {out}",
+    "imitation": "python -m studies imitation --repetitions 10 --no-grid --report {out}",
     "real": "python -m studies real --task pointing --method quadratic --out {out} --json {out}/numbers.json",
     "real_images": "python -m studies real-images --out {out} --json {out}/numbers.json",
 }

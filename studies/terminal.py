@@ -1,4 +1,4 @@
-"""What the commands of the studies show alike: verdicts, errors, and the progress of work whose results are kept."""
+"""What the commands of the studies share: verdicts, errors, and the progress of work whose results are stored."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def marked(verdict: str) -> str:
     return f"[{_COLOURS[verdict]}]{verdict}[/]"
 
 
-def say_error(text: str) -> None:
+def print_error(text: str) -> None:
     """To standard error, unbroken."""
     Console(stderr=True, highlight=False, markup=False).print(text, soft_wrap=True)
 
@@ -36,23 +36,23 @@ def stored_results(
     jobs: int,
     scheduler: str | None = None,
 ) -> list[dict[str, Any]]:
-    """Results of all pieces of work, with a progress bar; what is finished is kept in `cache` by its key.
+    """Results of all pieces of work, with a progress bar; finished ones are stored in `cache` by their keys.
 
     The command ends with exit code 66 without the cluster of `scheduler`, 130 on Ctrl-C.
     """
     from studies.movements.sweep import ClusterMissingError, run_stored
 
     with Progress(*PROGRESS, console=console) as progress:
-        shown = progress.add_task(title, total=None)
+        task = progress.add_task(title, total=None)
 
         def finished(done: int, total: int, last: str) -> None:
-            progress.update(shown, completed=done, total=total, description=last[:60] or title)
+            progress.update(task, completed=done, total=total, description=last[:60] or title)
 
         try:
             return run_stored(work, keys, cache, workers=jobs, scheduler=scheduler, finished=finished)
         except ClusterMissingError as error:
-            say_error(str(error))
+            print_error(str(error))
             raise typer.Exit(exit_codes.INPUT_MISSING) from error
         except KeyboardInterrupt:
-            console.print(f"interrupted; what is finished is kept in {cache}", soft_wrap=True)
+            console.print(f"interrupted; finished results are stored in {cache}", soft_wrap=True)
             raise typer.Exit(130) from None

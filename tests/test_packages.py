@@ -47,6 +47,7 @@ def test_packages_import_as_the_table_says():
     found = {row[0]: set() for row in table(PAGE, "packages")}
     for path, module in sources():
         for source, names in imports(path):
+            assert source.split(".")[0] != "tests", path
             if source.split(".")[0] in ("paramove", *WORKSPACE) and module != "paramove":
                 for name in [name for name in names if name != "__version__"] if source == "paramove" else [""]:
                     found[part(module)] |= {name or part(source)} - {part(module)}

@@ -1,9 +1,9 @@
-"""Programs that others wrote, unchanged, at the emulated servos: do they find what they would find on a real bus?
+"""Programs that others wrote, unchanged, at the emulated servos: do they work as on a real bus?
 
     python benchmarks/foreign_clients [--link /tmp/paramove_servos]
 
 Installs them into build/foreign_clients (once), starts three emulated servos in a process of their own for each, and
-prints what each has done, and what of it the servos reject. They wait 34 ms or so for an answer and do not ask again,
+prints what each has done, and which packets the servos reject. They wait about 34 ms for an answer and do not repeat,
 which on a busy machine is too little, so each has three tries. The exit code is 1 if one was never satisfied.
 """
 
@@ -22,9 +22,9 @@ from rich.table import Table
 HERE = Path(__file__).parent
 ENVIRONMENT = HERE.parents[1] / "build" / "foreign_clients"
 PYTHON = ENVIRONMENT / "bin" / "python"
-# Of dynamixel-sdk the release that LeRobot asks for; 4.1.0 empties its input before each question, and dynamixel_api
+# Of dynamixel-sdk the release that LeRobot needs; 4.1.0 empties its input before each question, and dynamixel_api
 # reads late on purpose.
-ALONE = ("lerobot==0.4.4",)  # installed without what it asks for: a deep learning framework
+ALONE = ("lerobot==0.4.4",)  # installed without its dependency, a deep learning framework
 PACKAGES = (
     "rustypot==1.13.1",
     "pypot==5.0.2",
@@ -59,11 +59,11 @@ def main() -> int:
     satisfied = True
     for name, script in CLIENTS.items():
         with console.status(name):
-            done, said, rejected, n_tries = False, "", "", 0
+            done, output, rejected, n_tries = False, "", "", 0
             while not done and n_tries < TRIES:
-                done, said, rejected = tried(script, link)
+                done, output, rejected = tried(script, link)
                 n_tries += 1
-        table.add_row(name, said, "yes" if done else "[red]no[/]", str(n_tries), rejected)
+        table.add_row(name, output, "yes" if done else "[red]no[/]", str(n_tries), rejected)
         satisfied &= done
     console.print(table)
     return 0 if satisfied else 1
@@ -71,14 +71,14 @@ def main() -> int:
 
 def install(console: Console) -> None:
     stamp = ENVIRONMENT / "installed"
-    wanted = " ".join((*PACKAGES, *ALONE))
-    if stamp.exists() and stamp.read_text() == wanted:
+    requirements = " ".join((*PACKAGES, *ALONE))
+    if stamp.exists() and stamp.read_text() == requirements:
         return
-    with console.status("installs other people's programs into build/foreign_clients"):
+    with console.status("installing third-party programs into build/foreign_clients"):
         venv.create(ENVIRONMENT, clear=True, with_pip=True)
         for packages in (PACKAGES, ("--no-deps", *ALONE)):
             subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", *packages], check=True)
-    stamp.write_text(wanted)
+    stamp.write_text(requirements)
 
 
 def tried(script: str, link: Path) -> tuple[bool, str, str]:
@@ -95,8 +95,8 @@ def tried(script: str, link: Path) -> tuple[bool, str, str]:
     finally:
         servos.send_signal(signal.SIGTERM)
         rejected, _ = servos.communicate()
-    said = ran.stdout if ran.returncode == 0 else ran.stderr
-    return ran.returncode == 0, (said.strip() or "nothing").splitlines()[-1], rejected.strip()
+    output = ran.stdout if ran.returncode == 0 else ran.stderr
+    return ran.returncode == 0, (output.strip() or "nothing").splitlines()[-1], rejected.strip()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Three emulated servos at 1 Mbit/s behind a pseudo-terminal, until told to end; prints what they have rejected."""
+"""Three emulated servos at 1 Mbit/s behind a pseudo-terminal, until a signal ends it; prints what they rejected."""
 
 import signal
 import sys

@@ -11,8 +11,8 @@ n_equal = 0
 for name, register in servo.fields.items():
     # Baud Rate is set by this program; Startup Configuration (60) is 0 in the e-Manual, 3 in its tables.
     if register.initial_value is not None and name not in ("baud_rate", "startup_configuration"):
-        found = servo.read_field(name)
-        assert found == register.initial_value, (name, found, register.initial_value)
+        value = servo.read_field(name)
+        assert value == register.initial_value, (name, value, register.initial_value)
         n_equal += 1
 futures = [servo.read_field_async("present_position") for _ in range(20)]
 assert [future.result() for future in futures] == [2048] * 20

@@ -27,16 +27,16 @@ homing = bus.set_half_turn_homings()
 bus.write_calibration({name: MotorCalibration(motor.id, 0, homing[name], 500, 3500) for name, motor in motors.items()})
 assert bus.is_calibrated
 bus.enable_torque(num_retry=3)
-wanted = {"shoulder": 20.0, "elbow": -30.0, "gripper": 60.0}
-bus.sync_write("Goal_Position", wanted)
+goal = {"shoulder": 20.0, "elbow": -30.0, "gripper": 60.0}
+bus.sync_write("Goal_Position", goal)
 time.sleep(1.5)
-found = bus.sync_read("Present_Position", num_retry=3)
-assert all(abs(found[name] - wanted[name]) < 0.2 for name in wanted), found
-refusal = ""
+position = bus.sync_read("Present_Position", num_retry=3)
+assert all(abs(position[name] - goal[name]) < 0.2 for name in goal), position
+rejection = ""
 try:
     bus.write("ID", "shoulder", 9)
 except RuntimeError as error:
-    refusal = str(error)
-assert "not available" in refusal, refusal
+    rejection = str(error)
+assert "not available" in rejection, rejection
 bus.disconnect()
-sys.stdout.write("ping to all, operating modes, homing, limits, torque, goals; an ID is refused while torque is on")
+sys.stdout.write("ping to all, operating modes, homing, limits, torque, goals; an ID is rejected while torque is on")

@@ -13,8 +13,8 @@ bus.sync_write_torque_enable([2, 3], [True, True])
 bus.sync_write_goal_position([2, 3], [0.5, -0.5])
 time.sleep(1.5)
 bus.set_fast_sync_read(True)
-found = bus.sync_read_present_position([1, 2, 3])
-assert max(abs(one - wanted) for one, wanted in zip(found, (0.0, 0.5, -0.5), strict=True)) < 0.005, found
+positions = bus.sync_read_present_position([1, 2, 3])
+assert max(abs(one - expected) for one, expected in zip(positions, (0.0, 0.5, -0.5), strict=True)) < 0.005, positions
 assert bus.reboot(2)
 time.sleep(0.6)
 assert bus.ping(2)

@@ -25,7 +25,7 @@ from studies.chapter2.figures import (
     Setting,
 )
 from studies.chapter2.movement import PARAMETER_SETS, ParameterSet
-from studies.chapter2.training import Moment, Trained, chain_model, trained
+from studies.chapter2.training import Snapshot, Trained, chain_model, trained
 
 BRANCHING = (ERGODIC_10, ERGODIC_20, SKIPS_20)
 COMPARED = (ERGODIC_10, PLAIN_5, PLAIN_7, PLAIN_7_NARROW, PLAIN_20_NARROW, TIMED_5, TIMED_10, TIMED_20)
@@ -45,7 +45,7 @@ class Experiment:
         transitions_first: the 7-state chain whose transitions were trained before the rest.
         random_plain: the likeliest of several random starts of the 7-state chain.
         starts: the 10-state HMM with time restrictions from a random and from a simple start.
-        drifts: largest |y| of a state mean as a share of the bound, for each set of parameters and setting; (SETS,).
+        drifts: largest |y| of a state mean as a fraction of the bound, for each set of parameters and setting; (SETS,).
         sampled: see `sampled_along_a_branch`.
     """
 
@@ -59,17 +59,17 @@ class Experiment:
     sampled: dict[str, float]
 
 
-def run_experiment(seed: int, tell: Callable[[str], None] = lambda words: None) -> Experiment:
-    """Train everything; one to two minutes. `tell` hears what is being done."""
+def run_experiment(seed: int, report: Callable[[str], None] = lambda step: None) -> Experiment:
+    """Train everything; one to two minutes. `report` gets the name of each step."""
     done: dict[Setting, Trained] = {}
     for figure in FIGURES:
         if figure.setting not in done:
-            tell(f"figure {figure.number}")
+            report(f"figure {figure.number}")
             done[figure.setting] = trained(figure.setting, seed)
-    tell("random starts")
+    report("random starts")
     branched = {setting: likeliest_random(setting, seed) for setting in BRANCHING}
     starts = {start: trained(replace(TIMED_10, start=start), seed) for start in ("random", "simple")}
-    tell("other sets of parameters")
+    report("other sets of parameters")
     drifts: dict[ParameterSet, dict[Setting, Floats]] = {
         name: {setting: _drifts(setting, seed, name) for setting in COMPARED} for name in PARAMETER_SETS
     }
@@ -96,33 +96,33 @@ def likeliest_random(setting: Setting, seed: int) -> Trained:
 
 def _drifts(setting: Setting, seed: int, parameters: ParameterSet) -> Floats:
     iterations = min(SET_ITERATIONS, LAST[setting.kind])
-    found = [trained(setting, number, iterations, parameters=parameters) for number in range(seed, seed + SETS)]
-    return np.array([drift(one.moments[-1], setting) for one in found])
+    trainings = [trained(setting, number, iterations, parameters=parameters) for number in range(seed, seed + SETS)]
+    return np.array([drift(one.snapshots[-1], setting) for one in trainings])
 
 
-def drift(moment: Moment, setting: Setting) -> float:
-    """Largest distance of a state mean from the x-axis, as a share of the bound."""
-    return float(np.abs(moment.means[:, 1]).max() / setting.bound)
+def drift(snapshot: Snapshot, setting: Setting) -> float:
+    """Largest distance of a state mean from the x-axis, as a fraction of the bound."""
+    return float(np.abs(snapshot.means[:, 1]).max() / setting.bound)
 
 
-def in_the_middle(moment: Moment) -> float:
+def in_the_middle(snapshot: Snapshot) -> float:
     """Share of the state means with x in [0.8, 1.2]; a fifth if they are uniform."""
-    x = moment.means[:, 0]
+    x = snapshot.means[:, 0]
     return float(((x >= 0.8) & (x <= 1.2)).mean())
 
 
-def unevenness(moment: Moment) -> float:
+def unevenness(snapshot: Snapshot) -> float:
     """Longest step in x from a state mean to the next as a multiple of the mean step; 1 if they are uniform."""
-    steps = np.diff(np.sort(moment.means[:, 0]))
+    steps = np.diff(np.sort(snapshot.means[:, 0]))
     return float(steps.max() / steps.mean())
 
 
-def branches(moment: Moment, bound: float) -> int:
+def branches(snapshot: Snapshot, bound: float) -> int:
     """Groups of state means with x in [0.4, 1.6], by the parameter of the movement on which each lies.
 
     Two groups are at least a third of the bound apart.
     """
-    x, y = moment.means.T
+    x, y = snapshot.means.T
     away = np.abs(x - 1.0) <= 0.6
     parameters = np.sort(y[away] / np.minimum(x[away], 2.0 - x[away]))
     return 1 + int((np.diff(parameters) > bound / 3.0).sum())
@@ -139,7 +139,7 @@ def sampled_along_a_branch(training: Trained, seed: int, count: int = 50) -> dic
     Medians: log-likelihood per frame of drawn and of training sequences, and their roughness, the mean length of the
     second difference.
     """
-    model = training.moments[-1].model
+    model = training.snapshots[-1].model
     if not isinstance(model, ChainParameters):
         raise ValueError("branches are those of a chain without time restrictions")
     hmm = chain_model(training.setting).with_parameters(model)
@@ -167,7 +167,7 @@ def sampled_along_a_branch(training: Trained, seed: int, count: int = 50) -> dic
 
 def synthesised(experiment: Experiment) -> dict[str, Floats]:
     """One movement by each method of 2.2.4, from the 10-state HMM with time restrictions."""
-    parameters = experiment.trained[TIMED_10].moments[-1].model
+    parameters = experiment.trained[TIMED_10].snapshots[-1].model
     if not isinstance(parameters, Parameters):
         raise ValueError("synthesis is shown for the HMM with time restrictions")
     model, rng = LeftRightHMM.from_parameters(parameters), np.random.default_rng(experiment.seed)
@@ -214,15 +214,15 @@ def numbers_of(experiment: Experiment) -> dict[str, Any]:
 
 
 def _row(training: Trained, iteration: int) -> dict[str, Any]:
-    moment, setting = training.moments[iteration], training.setting
+    snapshot, setting = training.snapshots[iteration], training.setting
     return {
-        "drift": drift(moment, setting),
-        "in_the_middle": in_the_middle(moment),
-        "unevenness": unevenness(moment),
-        "branches": branches(moment, setting.bound),
+        "drift": drift(snapshot, setting),
+        "in_the_middle": in_the_middle(snapshot),
+        "unevenness": unevenness(snapshot),
+        "branches": branches(snapshot, setting.bound),
         "log_likelihood_per_frame": per_frame(training, iteration),
         "settled_after": training.settled(),
         "distance_from_result": float(training.distances()[iteration]),
-        "means": moment.means.tolist(),
-        "covariances": moment.covariances.tolist(),
+        "means": snapshot.means.tolist(),
+        "covariances": snapshot.covariances.tolist(),
     }

@@ -1,4 +1,4 @@
-"""Figures 2.8 to 2.24 of the thesis: what is trained in each, and what the thesis says of it."""
+"""Figures 2.8 to 2.24 of the thesis: what is trained in each, and what the thesis reports."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -36,7 +36,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class ThesisFigure:
-    """A figure: its number, title, iterations at which it is taken (RESULT: the last), what the thesis says of it."""
+    """A figure: its number, title, iterations at which it is taken (RESULT: the last), what the thesis reports."""
 
     number: str
     title: str

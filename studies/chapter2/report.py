@@ -11,8 +11,8 @@ import numpy as np
 from paramove.documents import image, report_page
 from studies.chapter2.drawing import (
     draw_convergence,
+    draw_demonstrations,
     draw_model,
-    draw_performances,
     draw_prototypes,
     draw_synthesis,
     png_of,
@@ -36,8 +36,8 @@ OWN_STYLE = (
     "img{width:100%} .row{display:grid;grid-template-columns:1fr 1fr;gap:14px} h3{font-size:15px;margin:22px 0 2px}"
 )
 SETS_TEXT = (
-    "Section 2.3 does not say which ten parameters the sequences have, and much depends on it. Largest distance of a "
-    "state mean from the x-axis as a share of the bound, median of three training sets whose mean parameter is 0, "
+    "Section 2.3 does not state which ten parameters the sequences have, and much depends on it. Largest distance of a "
+    "state mean from the x-axis as a fraction of the bound, median of three training sets whose mean parameter is 0, "
     "after at most 250 iterations. Where the outer movements prevail the means leave the axis as in the thesis, and "
     "for that the first set was chosen for the figures; with the five parameters of figure 2.7 or uniformly drawn ones "
     "they hardly do. With time restrictions they stay on it with every set: the thesis's conclusion holds."
@@ -51,8 +51,8 @@ def write_results(experiment: Experiment, folder: Path) -> dict[str, Any]:
     findings = {figure.number: finding(figure.number, experiment) for figure in FIGURES}
     numbers = numbers_of(experiment)
     for row in numbers["figures"]:
-        told = findings[row["figure"]]
-        row["as_in_the_thesis"], row["seen"] = told.verdict, told.words
+        observed = findings[row["figure"]]
+        row["as_in_the_thesis"], row["seen"] = observed.verdict, observed.text
     pictures = pictures_of(experiment)
     for name, picture in pictures.items():
         (folder / f"{name}.png").write_bytes(picture)
@@ -66,7 +66,7 @@ def pictures_of(experiment: Experiment) -> dict[str, bytes]:
     """All plots by the name of their file."""
     pictures = {
         "figure_2.6": png_of(draw_prototypes),
-        "figure_2.7": png_of(partial(draw_performances, seed=experiment.seed)),
+        "figure_2.7": png_of(partial(draw_demonstrations, seed=experiment.seed)),
         "convergence": png_of(partial(draw_convergence, distances=_distances(experiment)), WIDE_PLOT),
         "synthesis": png_of(partial(draw_synthesis, made=synthesised(experiment)), WIDE_PLOT),
     }
@@ -80,7 +80,7 @@ def pictures_of(experiment: Experiment) -> dict[str, bytes]:
 
 def _model_picture(training: Any, iterations: int) -> bytes:
     draw = partial(
-        draw_model, moment=training.moments[iterations], sequences=training.sequences, bound=training.setting.bound
+        draw_model, snapshot=training.snapshots[iterations], sequences=training.sequences, bound=training.setting.bound
     )
     return png_of(draw)
 
@@ -108,8 +108,8 @@ def _page(experiment: Experiment, findings: dict[str, Finding], pictures: dict[s
         *(_figure(experiment, figure, findings[figure.number], pictures) for figure in FIGURES),
         _picture(
             "How fast the trainings settle",
-            "Greatest distance of a state mean from its last place. With time restrictions the means "
-            "are near their places after 5 iterations.",
+            "Maximum distance of a state mean from its last position. With time restrictions the means "
+            "are near their final positions after 5 iterations.",
             "convergence",
             pictures,
         ),
@@ -142,13 +142,13 @@ def _movement(pictures: dict[str, bytes]) -> str:
     )
 
 
-def _figure(experiment: Experiment, figure: ThesisFigure, told: Finding, pictures: dict[str, bytes]) -> str:
-    colour = {"yes": "yes", "in part": "soft", "no": "no"}[told.verdict]
-    mark = f"<span class={colour}>{MARKS[told.verdict]}</span>"
+def _figure(experiment: Experiment, figure: ThesisFigure, observed: Finding, pictures: dict[str, bytes]) -> str:
+    colour = {"yes": "yes", "in part": "soft", "no": "no"}[observed.verdict]
+    mark = f"<span class={colour}>{MARKS[observed.verdict]}</span>"
     images = _image(f"figure_{figure.number}", pictures)
     if _branched(experiment, figure):
         images += _image(f"figure_{figure.number}_random", pictures)
-    words = f"<div><p><b>The thesis:</b> {escape(figure.thesis)}</p><p><b>Here:</b> {escape(told.words)}</p></div>"
+    words = f"<div><p><b>The thesis:</b> {escape(figure.thesis)}</p><p><b>Here:</b> {escape(observed.text)}</p></div>"
     body = f"<div class=row>{images}</div>{words}" if _branched(experiment, figure) else (
         f"<div class=row>{images}{words}</div>"
     )  # fmt: skip
@@ -164,7 +164,7 @@ def _described(setting: Setting, iterations: int) -> str:
     restrictions = f", {setting.d_min} to {setting.d_max} frames per state" if setting.d_max else ""
     return (
         f"{setting.states} states{restrictions}, ten sequences of {setting.frames} frames, p in [-{setting.bound:g}, "
-        f"{setting.bound:g}], {when}. Red: 1σ ellipses and means; blue: transitions above 1 % of the greatest."
+        f"{setting.bound:g}], {when}. Red: 1σ ellipses and means; blue: transitions above 1 % of the maximum."
     )
 
 
@@ -187,8 +187,8 @@ def _sets(experiment: Experiment) -> str:
     )
 
 
-def _picture(heading: str, words: str, name: str, pictures: dict[str, bytes]) -> str:
-    return f"<section><h2>{escape(heading)}</h2><p class=why>{escape(words)}</p>{_image(name, pictures)}</section>"
+def _picture(heading: str, text: str, name: str, pictures: dict[str, bytes]) -> str:
+    return f"<section><h2>{escape(heading)}</h2><p class=why>{escape(text)}</p>{_image(name, pictures)}</section>"
 
 
 def _image(name: str, pictures: dict[str, bytes]) -> str:

@@ -20,14 +20,14 @@ from studies.chapter2.figures import LAST, Setting
 from studies.chapter2.movement import ParameterSet, training_set
 
 FLOOR = 0.002
-"""Least standard deviation of an output distribution: below that of the movement's noise, 0.005/√3."""
+"""Minimum standard deviation of an output distribution: below that of the movement's noise, 0.005/√3."""
 ONE_ITERATION = replace(TrainingOptions.maximum_likelihood(1), floor_deviation=FLOOR)
 TRANSITION_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
-class Moment:
-    """A model at one moment of its training.
+class Snapshot:
+    """A model after some iterations of its training.
 
     Attributes:
         means: shape (N, 2). covariances: shape (N, 2, 2).
@@ -43,21 +43,21 @@ class Moment:
 
 @dataclass(frozen=True)
 class Trained:
-    """A training from its start: `moments[k]` and `log_likelihoods[k]` after k iterations."""
+    """A training from its start: `snapshots[k]` and `log_likelihoods[k]` after k iterations."""
 
     setting: Setting
     sequences: list[Floats]
-    moments: list[Moment]
+    snapshots: list[Snapshot]
     log_likelihoods: list[float]
 
     def distances(self) -> Floats:
-        """Greatest distance of a state mean from its place after the last iteration, per iteration."""
-        means = np.stack([moment.means for moment in self.moments])
+        """Maximum distance of a state mean from its position after the last iteration, per iteration."""
+        means = np.stack([snapshot.means for snapshot in self.snapshots])
         result: Floats = np.linalg.norm(means - means[-1], axis=2).max(axis=1)
         return result
 
     def settled(self, within: float = 0.01) -> int:
-        """First iteration from which on no mean is further than this from its last place."""
+        """First iteration from which on no mean is further than this from its last position."""
         return int(np.flatnonzero(np.append(np.inf, self.distances()) > within)[-1])
 
 
@@ -70,7 +70,7 @@ def trained(
     start_seed: int = 0,
     transitions_first: bool = False,
 ) -> Trained:
-    """Train one HMM; the same seed shows the same sequences to all settings of equal bound and length.
+    """Train one HMM; the same seed gives the same sequences to all settings of equal bound and length.
 
     `start_seed` counts random starts. With `transitions_first`, 50 iterations before the first one change the
     transitions alone (thesis 2.3.2, trial 1).
@@ -104,8 +104,8 @@ def _trained_durations(setting: Setting, sequences: list[Floats], start: Paramet
         model, summary = train(models[-1], sequences, ONE_ITERATION)
         models.append(model)
         log_likelihoods.append(_log_likelihood(summary))
-    moments = [Moment(model.means, model.covariances, chain, model) for model in models[: iterations + 1]]
-    return Trained(setting, sequences, moments, log_likelihoods)
+    snapshots = [Snapshot(model.means, model.covariances, chain, model) for model in models[: iterations + 1]]
+    return Trained(setting, sequences, snapshots, log_likelihoods)
 
 
 def _trained_chain(
@@ -117,12 +117,12 @@ def _trained_chain(
         for _ in range(TRANSITION_ITERATIONS):
             fitted = model.fit(sequences, parameters).parameters
             parameters = replace(fitted, means=parameters.means, covariances=parameters.covariances)
-    moments, log_likelihoods = [], []
+    snapshots, log_likelihoods = [], []
     for _ in range(iterations + 1):
-        moments.append(Moment(parameters.means, parameters.covariances, parameters.transitions, parameters))
+        snapshots.append(Snapshot(parameters.means, parameters.covariances, parameters.transitions, parameters))
         parameters = model.fit(sequences, parameters).parameters
         log_likelihoods.append(_log_likelihood(model.training_))
-    return Trained(setting, sequences, moments, log_likelihoods)
+    return Trained(setting, sequences, snapshots, log_likelihoods)
 
 
 def chain_model(setting: Setting) -> GaussianHMM:

@@ -1,4 +1,4 @@
-"""How alike the synthetic demonstrator's pointing and reaching are: what a plain HMM per class tells apart.
+"""How alike the synthetic demonstrator's pointing and reaching are: how well a plain HMM per class separates them.
 
 The data set is that of thesis 4.2.1. The HMM of hmmlearn knows neither the target nor durations, so its rate measures
 the difficulty of the data, not our models: the thesis speaks of two actions that are "not easy to distinguish".
@@ -18,32 +18,32 @@ STATES, FRAMES = 20, 100
 
 
 def hmmlearn_class_accuracy(seed: int, *, demonstrator: Demonstrator | None = None) -> float:
-    """Share of 280 movements that the likelier of two plain left-right HMMs names rightly.
+    """Fraction of 280 movements that the likelier of two plain left-right HMMs classifies correctly.
 
-    Trained on the 3 x 3 raster with 10 repetitions, tested on the 7 x 5 raster with 4 (thesis 4.2.1); 20 states,
+    Trained on the 3 x 3 grid with 10 repetitions, tested on the 7 x 5 grid with 4 (thesis 4.2.1); 20 states,
     diagonal covariances, 100 frames of 21 coordinates in m. Raises ImportError without hmmlearn, a development tool.
     """
     rng = np.random.default_rng(seed)
-    shown = {action: raster_movements(action, (3, 3), 10, rng, demonstrator) for action in ACTIONS}
-    models = [_trained(shown[action]) for action in ACTIONS]
+    training = {action: grid_movements(action, (3, 3), 10, rng, demonstrator) for action in ACTIONS}
+    models = [_trained(training[action]) for action in ACTIONS]
     right = 0
     for number, action in enumerate(ACTIONS):
-        for movement in raster_movements(action, (7, 5), 4, rng, demonstrator):
+        for movement in grid_movements(action, (7, 5), 4, rng, demonstrator):
             right += int(np.argmax([model.score(movement) for model in models])) == number
     return right / 280.0
 
 
-def raster_movements(
+def grid_movements(
     action: Action,
-    raster: tuple[int, int],
+    shape: tuple[int, int],
     repetitions: int,
     rng: np.random.Generator,
     demonstrator: Demonstrator | None = None,
 ) -> list[Floats]:
-    """Movements to each point of a raster over the table, 100 frames each, shape (100, 21), m."""
-    targets = table_targets(*raster)[0]
-    shown = demonstrations_at(targets, rng, action=action, repetitions=repetitions, demonstrator=demonstrator)
-    return [resample(one, FRAMES) for one in shown.sequences]
+    """Movements to each point of a grid over the table, 100 frames each, shape (100, 21), m."""
+    targets = table_targets(*shape)[0]
+    demonstrations = demonstrations_at(targets, rng, action=action, repetitions=repetitions, demonstrator=demonstrator)
+    return [resample(one, FRAMES) for one in demonstrations.sequences]
 
 
 def _trained(movements: Sequence[Floats]) -> Any:

@@ -40,19 +40,27 @@ def chapter4(
     from studies.chapter4.report import plain, write_results
 
     console = Console(highlight=False, emoji=False)
-    wanted = seeds_in(seeds)[:1] if quick else seeds_in(seeds)
+    chosen_seeds = seeds_in(seeds)[:1] if quick else seeds_in(seeds)
     with_hmmlearn = find_spec("hmmlearn") is not None and not quick
     if not with_hmmlearn and not quick:
-        console.print("hmmlearn is not installed: its plain HMM is left out (pip install hmmlearn brings it)")
-    work = experiments(wanted, QUICK if quick else Scale(), with_hmmlearn=with_hmmlearn)
+        console.print("hmmlearn is not installed: its plain HMM is left out (install it with: pip install hmmlearn)")
+    work = experiments(chosen_seeds, QUICK if quick else Scale(), with_hmmlearn=with_hmmlearn)
     cache = user_cache_path("paramove") / "chapter4"
     keys = [one.key() for one in work]
     results = stored_results(work, keys, cache, "experiments", console, jobs=jobs, scheduler=scheduler)
     folder = out.resolve()
     numbers, targets = write_results(results, folder)
     for title, heads, rows in (
-        ("beside the thesis", ("where", "here", "the same"), [(f[0], f[2], f[3]) for f in _rows(numbers["findings"])]),
-        ("goals", ("target", "wanted", "measured", "of", "met"), [(*t[:4], "yes" if t.met else "no") for t in targets]),
+        (
+            "compared with the thesis",
+            ("where", "here", "the same"),
+            [(f[0], f[2], f[3]) for f in _rows(numbers["findings"])],
+        ),
+        (
+            "goals",
+            ("target", "required", "measured", "of", "met"),
+            [(*t[:4], "yes" if t.met else "no") for t in targets],
+        ),
     ):
         table = Table(title=title, show_edge=False, pad_edge=False, show_lines=title != "goals")
         for head in heads:

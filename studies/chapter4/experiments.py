@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 from paramove.source_code import code_digest
+from studies.chapter4.grid import REPETITIONS
 from studies.chapter4.kinds import (
     BY_NAME,
     IPHMM_2,
@@ -21,7 +22,6 @@ from studies.chapter4.kinds import (
 from studies.chapter4.learning import LEARNERS, TRAININGS, able, measured_learning
 from studies.chapter4.line_movement import measured_line
 from studies.chapter4.measurement import measured_kind, measured_noise
-from studies.chapter4.raster import REPETITIONS
 from studies.chapter4.redirect import FEWEST, redirects
 from studies.chapter4.variation import (
     fit_to_references,
@@ -44,10 +44,10 @@ class Scale:
     """How much is computed.
 
     Attributes:
-        states: numbers of states, the first for all models. kinds: names of models. noisy: those shown noise.
-        every: each so many-th test movement is asked. compared: movements per place whose pairs are compared.
+        states: numbers of states, the first for all models. kinds: names of models. noisy: those tested with noise.
+        every: each so many-th test movement is classified. compared: movements per target whose pairs are compared.
         learners, trainings: of the learning curves.
-        redirect_seeds: least number of seeds. redirect_tests: pairs of places. redirect_only: part of the names of
+        redirect_seeds: minimum number of seeds. redirect_tests: pairs of targets. redirect_only: part of the names of
             the training sets.
         surface_points: per axis of figure 4.15.
     """
@@ -85,8 +85,8 @@ class Experiment:
     """One piece of work.
 
     Attributes:
-        group: to which part of the report it belongs. seed: of its movements.
-        labels: what distinguishes it from others of its group and seed; they stand in the result too.
+        group: part of the report. seed: of its movements.
+        labels: what distinguishes it from others of its group and seed; the result contains them too.
         measure: computes it, from `arguments`.
     """
 
@@ -98,7 +98,7 @@ class Experiment:
 
     @property
     def label(self) -> str:
-        """As the progress shows it."""
+        """Shown by the progress bar."""
         return ", ".join([self.group, *map(str, self.labels.values()), f"seed {self.seed}"])
 
     def key(self) -> str:
@@ -112,19 +112,19 @@ class Experiment:
 
     def run(self) -> dict[str, Any]:
         """The result as plain JSON."""
-        found = self.measure(*self.arguments)
-        return {"group": self.group, "fold": str(self.seed), "seed": self.seed, **self.labels, **found}
+        result = self.measure(*self.arguments)
+        return {"group": self.group, "fold": str(self.seed), "seed": self.seed, **self.labels, **result}
 
 
 def experiments(seeds: Sequence[int], scale: Scale, *, with_hmmlearn: bool = True) -> list[Experiment]:
     """All work for these seeds, the slow models last."""
-    found = [one for seed in seeds for one in _of_data(seed, scale, with_hmmlearn)]
+    work = [one for seed in seeds for one in _of_data(seed, scale, with_hmmlearn)]
     more = [seed for seed in range(scale.redirect_seeds) if seed not in seeds]
     for seed in [*seeds, *more][: max(len(seeds), scale.redirect_seeds)]:
         arguments = (seed, scale.redirect_tests, scale.redirect_only)
-        found.append(Experiment(REDIRECT, seed, {}, redirects, arguments))
-    found += [one for seed in seeds for one in _of_models(seed, scale)]
-    return sorted(found, key=lambda one: "IPHMM" in one.labels.get("name", ""))
+        work.append(Experiment(REDIRECT, seed, {}, redirects, arguments))
+    work += [one for seed in seeds for one in _of_models(seed, scale)]
+    return sorted(work, key=lambda one: "IPHMM" in one.labels.get("name", ""))
 
 
 def _of_data(seed: int, scale: Scale, with_hmmlearn: bool) -> Iterator[Experiment]:

@@ -1,4 +1,4 @@
-"""What the thesis saw in chapter 4, what is seen here, and whether it is the same."""
+"""What the thesis observed in chapter 4, what is observed here, and whether they agree."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOISE_CM = "15"
 
 
 class Finding(NamedTuple):
-    """Where, what the thesis says, what is seen here, and whether that is the same."""
+    """Where, what the thesis reports, what is observed here, and whether they agree."""
 
     where: str
     thesis: str
@@ -72,9 +72,9 @@ def _verdict(*held: bool) -> Verdict:
     return "yes" if all(held) else "in part" if any(held) else "no"
 
 
-def _line(found: Mapping[str, Any]) -> list[Finding]:
-    off = {number: 100.0 * found[f"distance_{number}"].mean for number in ("4.3", "4.4", "4.5", "4.6")}
-    seconds = found["training, s"].mean
+def _line(line: Mapping[str, Any]) -> list[Finding]:
+    off = {number: 100.0 * line[f"distance_{number}"].mean for number in ("4.3", "4.4", "4.5", "4.6")}
+    seconds = line["training, s"].mean
     return [
         Finding(
             "figures 4.3, 4.4",
@@ -97,8 +97,8 @@ def _line(found: Mapping[str, Any]) -> list[Finding]:
     ]
 
 
-def _fit(found: Mapping[str, Any]) -> Finding:
-    linear, quadratic = found["LPHMM"].mean, found["QPHMM"].mean
+def _fit(errors: Mapping[str, Any]) -> Finding:
+    linear, quadratic = errors["LPHMM"].mean, errors["QPHMM"].mean
     return Finding(
         "figure 4.11",
         "trained on the 35 averages, a QPHMM misses them by about 1 cm everywhere, an LPHMM by more almost everywhere",
@@ -111,7 +111,7 @@ def _synthesis(surfaces: Mapping[str, Floats]) -> list[Finding]:
     inner = {name: float(np.nanmean(values[1:-1, 1:-1])) for name, values in surfaces.items()}
     three = surfaces[IPHMM_3]
     corners = three[[0, 0, -1, -1], [0, -1, 0, -1]]
-    found = [
+    findings = [
         Finding(
             "figure 4.14 b",
             "synthesis of the 3×3 IPHMM: 1.1 cm at the centre, 1.5 to 2.5 cm at the corners",
@@ -121,7 +121,7 @@ def _synthesis(surfaces: Mapping[str, Floats]) -> list[Finding]:
     ]
     if LPHMM_3 in inner and IPHMM_2 in inner:
         order = inner[IPHMM_3] < inner[LPHMM_3] < inner[IPHMM_2]
-        found.append(
+        findings.append(
             Finding(
                 "figure 4.14 a, d",
                 "within the region: 2×2 IPHMM up to 3.5 cm, 3×3 LPHMM about 2.5 cm, 3×3 IPHMM best",
@@ -129,72 +129,72 @@ def _synthesis(surfaces: Mapping[str, Floats]) -> list[Finding]:
                 _verdict(order, abs(inner[LPHMM_3] - 2.5) < 0.7, inner[IPHMM_2] < 3.5),
             )
         )
-    return found
+    return findings
 
 
 def _recognition(rows: Mapping[str, Any]) -> Finding:
     three, linear, two = (rows[name]["theta_pointing"].mean for name in (IPHMM_3, LPHMM_3, IPHMM_2))
-    words = f"means {three:.1f}, {linear:.1f} and {two:.1f} cm"
+    detail = f"means {three:.1f}, {linear:.1f} and {two:.1f} cm"
     if two < 2.0:
-        words += ": even the one that has seen only the corners is no worse than the thesis's best"
+        detail += ": even the one that has seen only the corners is no worse than the thesis's best"
     return Finding(
         "figure 4.14 e–h",
         "error of θ: 3×3 IPHMM and LPHMM not above 2 cm, 2×2 IPHMM 3.5 cm at the centre, up to 4.4 cm",
-        words,
+        detail,
         _verdict(max(three, linear) < 2.0, two > 3.0),
     )
 
 
-def _one_maximum(found: Mapping[str, Any]) -> Finding:
-    off = {name: float(np.linalg.norm((np.array(theta) - 0.5) * (80.0, 30.0))) for name, theta in found.items()}
-    words = ", ".join(f"{name} {value:.1f} cm" for name, value in off.items())
+def _one_maximum(likeliest: Mapping[str, Any]) -> Finding:
+    off = {name: float(np.linalg.norm((np.array(theta) - 0.5) * (80.0, 30.0))) for name, theta in likeliest.items()}
+    detail = ", ".join(f"{name} {value:.1f} cm" for name, value in off.items())
     return Finding(
         "figure 4.15",
         "the likelihood has one maximum, close to the true place",
-        f"its maximum is off by: {words}",
+        f"its maximum is off by: {detail}",
         _verdict(max(off.values()) < 3.0),
     )
 
 
-def _noise(found: Mapping[str, Any]) -> Finding:
-    growth = {name: values[NOISE_CM].mean - values["0"].mean for name, values in found.items()}
-    words = "; ".join(
-        f"{name} {values['0'].mean:.1f} → {values[NOISE_CM].mean:.1f} cm" for name, values in found.items()
+def _noise(errors: Mapping[str, Any]) -> Finding:
+    growth = {name: values[NOISE_CM].mean - values["0"].mean for name, values in errors.items()}
+    detail = "; ".join(
+        f"{name} {values['0'].mean:.1f} → {values[NOISE_CM].mean:.1f} cm" for name, values in errors.items()
     )
     return Finding(
         "noise, 4.2.5",
         "no significant influence on θ of independent noise below σ = 15 cm",
-        f"with σ = {NOISE_CM} cm: {words}",
+        f"with σ = {NOISE_CM} cm: {detail}",
         _verdict(*(value < 1.0 for value in growth.values())),
     )
 
 
 def _classification(summary: Mapping[str, Any]) -> Finding:
     rates = {(row["states"], row["name"]): row["correct"].mean for row in summary["models"]}
-    shared = [key for key in THESIS_CLASSIFICATION if key in rates] or list(rates)
-    spread = max(rates[key] for key in shared) - min(rates[key] for key in shared)
+    common = [key for key in THESIS_CLASSIFICATION if key in rates] or list(rates)
+    difference = max(rates[key] for key in common) - min(rates[key] for key in common)
     plain, peer = summary["classification"]["plain HMM"], summary["classification"]["hmmlearn"]
-    words = f"all between {min(rates.values()):.3f} and {max(rates.values()):.3f}"
-    if spread < 0.02:
-        words += ": the thesis's order of models does not appear"
+    detail = f"all between {min(rates.values()):.3f} and {max(rates.values()):.3f}"
+    if difference < 0.02:
+        detail += ": the thesis's order of models does not appear"
     if plain is not None:
-        words += f". One HMM per action with full covariances and no parameter: {plain.mean:.3f}"
+        detail += f". One HMM per action with full covariances and no parameter: {plain.mean:.3f}"
     if peer is not None:
-        words += f"; hmmlearn's with diagonal ones: {peer.mean:.3f}"
+        detail += f"; hmmlearn's with diagonal ones: {peer.mean:.3f}"
     if plain is not None and plain.mean > max(rates.values()) - 0.02:
-        words += ". The full covariances of the hand's points decide, not the parameter"
+        detail += ". The full covariances of the hand's points decide, not the parameter"
     return Finding(
         "table 4.1",
         "right of 280: IPHMM up to 0.982 (3×3), LPHMM 0.864 to 0.900",
-        words,
-        _verdict(max(rates.values()) >= 0.95, spread > 0.05),
+        detail,
+        _verdict(max(rates.values()) >= 0.95, difference > 0.05),
     )
 
 
-def _variation(found: Mapping[str, Any]) -> Finding:
-    close = [abs(found[name].mean - value) < 0.5 for name, value in THESIS_VARIATION.items()]
-    words = ", ".join(f"{name} {found[name].mean:.1f} cm ({value:g})" for name, value in THESIS_VARIATION.items())
-    return Finding("natural variation", "in brackets, 4.2.4 and 4.2.5", words, _verdict(*close))
+def _variation(variation: Mapping[str, Any]) -> Finding:
+    close = [abs(variation[name].mean - value) < 0.5 for name, value in THESIS_VARIATION.items()]
+    detail = ", ".join(f"{name} {variation[name].mean:.1f} cm ({value:g})" for name, value in THESIS_VARIATION.items())
+    return Finding("natural variation", "in brackets, 4.2.4 and 4.2.5", detail, _verdict(*close))
 
 
 def _redirect(rows: Sequence[Mapping[str, Any]]) -> Finding:

@@ -9,7 +9,7 @@ from paramove.phmm import CubicPHMM, InterpolativePHMM, LinearPHMM, NeuralPHMM, 
 
 FRAMES = 100
 RESTRICTIONS = {20: (4, 6), 40: (2, 3), 10: (8, 12)}
-"""Least and most frames per state for 100 frames (4.2.2)."""
+"""Minimum and maximum frames per state for 100 frames (4.2.2)."""
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,11 @@ class Kind:
     """A kind of model.
 
     Attributes:
-        name: as it is shown.
+        name: in reports.
         make: its class.
         corners: trained on the four corners only: the thesis's "2 x 2".
         residuals: "independent" is the thesis, "correlated" is ours; None for a model that has no choice.
-        thesis: what the thesis calls it, if it has it.
+        thesis: its name in the thesis, if it is there.
     """
 
     name: str

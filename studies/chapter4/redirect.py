@@ -1,6 +1,6 @@
 """Learning a bi-parametric movement: the redirect action (thesis 4.3), beyond the one picture that the thesis shows.
 
-Training movements are blended from pointing movements, of a model or demonstrated; tests are pairs of places drawn
+Training movements are blended from pointing movements, of a model or demonstrated; tests are pairs of targets drawn
 over the whole region, blended without noise from the same pointing model.
 """
 
@@ -25,7 +25,7 @@ from paramove.phmm import LinearPHMM, ParametricHMM, QuadraticPHMM
 
 STATES, D_MIN, D_MAX, FRAMES = 32, 2, 3, 80
 THESIS_PAIR = (0.25, 0.80, 0.80, 0.30)
-"""Places of figure 4.17."""
+"""Targets of figure 4.17."""
 FEWEST = "9 pairs, demonstrated"
 MODELS: dict[str, Callable[[], ParametricHMM]] = {
     "linear": lambda: LinearPHMM(STATES, D_MIN, D_MAX, resampled_frames=FRAMES),
@@ -34,7 +34,7 @@ MODELS: dict[str, Callable[[], ParametricHMM]] = {
 
 
 def redirects(seed: int, tests: int, only: str) -> dict[str, Any]:
-    """The experiment as plain JSON; beside its rows the jerk of each."""
+    """The experiment as plain JSON: its rows, and the jerk of each."""
     rows = redirect_experiment(seed, tests, only)
     return {"values": {"jerk": [row["jerk_ratio"] for row in rows]}, "rows": rows}
 
@@ -42,8 +42,8 @@ def redirects(seed: int, tests: int, only: str) -> dict[str, Any]:
 def redirect_experiment(seed: int, tests: int = 40, only: str = "") -> list[dict[str, Any]]:
     """One row per training set (all whose name has `only`) and model: errors in cm, and jerk as multiple of training's.
 
-    `error`: (4.3) against the blended movement; `start_miss`, `end_miss`: least distance of the fingertip from each
-    place in its half of the movement; each with mean and greatest over the test pairs. The first test pair is that of
+    `error`: (4.3) against the blended movement; `start_miss`, `end_miss`: minimum distance of the fingertip from each
+    target in its half of the movement; each with mean and maximum over the test pairs. The first test pair is that of
     figure 4.17.
     """
     rng = np.random.default_rng(seed)
@@ -57,22 +57,22 @@ def redirect_experiment(seed: int, tests: int = 40, only: str = "") -> list[dict
         "16 corner pairs, demonstrated": lambda: redirect_demonstrations(corner_pairs(), rng, n_samples=FRAMES),
         FEWEST: lambda: redirect_demonstrations(nine_pairs(), rng, n_samples=FRAMES),
     }
-    shown = {name: show() for name, show in training.items() if only in name}
+    demonstrations = {name: demonstrate() for name, demonstrate in training.items() if only in name}
     return [
         {"seed": seed, "training": name, "model": kind, **_errors(make(), movements, pairs, truth)}
-        for name, movements in shown.items()
+        for name, movements in demonstrations.items()
         for kind, make in MODELS.items()
     ]
 
 
 def _errors(
-    model: ParametricHMM, shown: Demonstrations, pairs: Floats, truth: Sequence[Floats]
+    model: ParametricHMM, training: Demonstrations, pairs: Floats, truth: Sequence[Floats]
 ) -> dict[str, dict[str, float] | float]:
-    model.fit(shown.sequences, shown.theta)
+    model.fit(training.sequences, training.theta)
     made = [model.synthesize(pair, FRAMES) for pair in pairs]
     errors = [100.0 * movement_distance(one, true) for one, true in zip(made, truth, strict=True)]
-    misses = 100.0 * np.array([place_misses(one, pair) for one, pair in zip(made, pairs, strict=True)])
-    ratio = np.mean([jerk(one) for one in made]) / np.mean([jerk(one) for one in shown.sequences])
+    misses = 100.0 * np.array([target_misses(one, pair) for one, pair in zip(made, pairs, strict=True)])
+    ratio = np.mean([jerk(one) for one in made]) / np.mean([jerk(one) for one in training.sequences])
     return {
         "error_cm": _summary(errors),
         "start_miss_cm": _summary(misses[:, 0]),
@@ -85,8 +85,8 @@ def _summary(values: Sequence[float] | Floats) -> dict[str, float]:
     return {"mean": float(np.mean(values)), "max": float(np.max(values))}
 
 
-def place_misses(movement: Floats, pair: Floats) -> tuple[float, float]:
-    """Least distance of the fingertip from the start place in the first half, from the end in the second, m."""
+def target_misses(movement: Floats, pair: Floats) -> tuple[float, float]:
+    """Minimum distance of the fingertip from the first target in the first half, and from the second, m."""
     index = POINT_NAMES.index("index")
     tip = movement.reshape(len(movement), len(POINT_NAMES), 3)[:, index]
     start, end = table_place(np.reshape(pair, (2, 2)))

@@ -34,11 +34,11 @@ NOT_SHOWN = (
 )
 DATA = (
     "The movements are those of the synthetic demonstrator, not of the thesis's person: 7 body points, 60 Hz, a region "
-    "of 80 × 30 cm; trained on 3 × 3 places 10 times, tested on 7 × 5 places 4 times, both actions. In brackets the "
+    "of 80 × 30 cm; trained on 3 × 3 targets 10 times, tested on 7 × 5 targets 4 times, both actions. In brackets the "
     "interval that holds the mean of all seeds with 95 % (Student's t)."
 )
 RESIDUALS = (
-    "“Correlated” models learn how whole movements vary and trust a frame only as far as it says something new; the "
+    "“Correlated” models learn how whole movements vary and weight a frame only by the new information in it; the "
     "others take frames for independent, as the thesis does. Rows “2×2” are trained on the four corners only."
 )
 
@@ -49,17 +49,17 @@ def write_results(results: Results, folder: Path) -> tuple[dict[str, Any], list[
     summary = summarised(results)
     targets = targets_of(summary)
     likeliest = of_group(results, SURFACES)[0]
-    found = findings_of(summary, _surfaces(results, "linear_pointing"), likeliest["estimates"])
+    findings = findings_of(summary, _surfaces(results, "linear_pointing"), likeliest["estimates"])
     numbers = plain(summary) | {
         "targets": [target._asdict() for target in targets],
-        "findings": [finding._asdict() for finding in found],
+        "findings": [finding._asdict() for finding in findings],
     }
     text = json.dumps(numbers, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     (folder / "chapter4.json").write_text(text, encoding="utf-8")
     met = sum(target.met for target in targets)
     parts = [
         section("Goals", "The worst model and number of states counts.", targets_table(targets)),
-        section("Beside the thesis", DATA, findings_table(found)),
+        section("Compared with the thesis", DATA, findings_table(findings)),
         *_pictures(results, summary),
         *_questions(results, summary, likeliest),
         section("Natural variation", "Pointing, cm.", variation_table(summary["variation"])),
@@ -78,7 +78,7 @@ def write_results(results: Results, folder: Path) -> tuple[dict[str, Any], list[
 
 
 def plain(value: Any) -> Any:
-    """Intervals as [mean, low, high, number of seeds, least, most of single seeds]; NaN as null."""
+    """Intervals as [mean, low, high, number of seeds, minimum, maximum of single seeds]; NaN as null."""
     if isinstance(value, Interval):
         return [None if np.isnan(one) else one for one in value]
     if isinstance(value, dict):
@@ -105,13 +105,15 @@ def _pictures(results: Results, summary: dict[str, Any]) -> list[str]:
             "Synthesis error over the region (figure 4.14 a–d)",
             "Pointing, (4.3), cm, mean of all seeds; paths smooth. Below: near the person.",
             drawing.drawn(
-                partial(drawing.surfaces, shown=synthesis, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)
+                partial(drawing.surfaces, errors=synthesis, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)
             ),
         ),
         section(
-            "Error of the recognised place (figure 4.14 e–h)",
+            "Error of the recognised target (figure 4.14 e–h)",
             "Pointing, cm, mean of four tests and all seeds.",
-            drawing.drawn(partial(drawing.surfaces, shown=theta, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)),
+            drawing.drawn(
+                partial(drawing.surfaces, errors=theta, columns=4, maximum=maximum), (11.0, 1.9 * rows + 0.4)
+            ),
         ),
     ]
 
@@ -121,35 +123,36 @@ def _questions(results: Results, summary: dict[str, Any], likeliest: dict[str, A
         section(
             "Expected frames per state (figures 4.12, 4.13)",
             "IPHMM 3×3 of reaching: they do not change much.",
-            drawing.drawn(partial(drawing.durations, found=_durations(results)), (11.0, 2.8)),
+            drawing.drawn(partial(drawing.durations, expected=_durations(results)), (11.0, 2.8)),
         ),
         section(
-            "The likelihood of a place (figure 4.15)",
+            "The likelihood of a target (figure 4.15)",
             f"A movement to the cross, {likeliest['states']} states; the ring is the maximum.",
             drawing.drawn(
-                partial(drawing.likelihoods, values=likeliest["values"], found=likeliest["estimates"]), (10.0, 3.0)
+                partial(drawing.likelihoods, values=likeliest["values"], estimates=likeliest["estimates"]), (10.0, 3.0)
             ),
         ),
         section(
             "Noise (4.2.5)",
             "Error of θ of pointing when independent noise is added to every coordinate of every frame.",
-            drawing.drawn(partial(drawing.noise, found=summary["noise"]), (9.0, 3.4)),
+            drawing.drawn(partial(drawing.noise, errors=summary["noise"]), (9.0, 3.4)),
         ),
         section(
-            "What is none of the movements, and how sure a model is",
+            "Unknown movements, and regions of θ",
             "AUROC: probability that a genuine movement fits the model better than another one. Aborted: half of the "
-            "fingertip's way out, back along the same way, then at rest. Stopped: held there. Redirect: to two places.",
+            "fingertip's path out, back along the same path, then at rest. Stopped: held there. "
+            "Redirect: to two targets.",
             rejection_table(summary),
         ),
         section(
             "How many demonstrations",
-            "Pointing; names mean the raster of the axis.",
+            "Pointing; “3×3” in a name stands for the grid of the axis.",
             drawing.drawn(partial(drawing.learning, rows=summary["learning"]), (11.0, 5.6))
             + f"<details><summary>numbers</summary>{learning_table(summary['learning'])}</details>",
         ),
         section(
             "The redirect action (4.3)",
-            "Tests: pairs of places over the whole region. Jerk: of the synthesised movements, as a multiple of "
+            "Tests: pairs of targets over the whole region. Jerk: of the synthesised movements, as a multiple of "
             "that of the training movements.",
             redirect_table(summary["redirect"]),
         ),
@@ -165,12 +168,12 @@ def _surfaces(results: Results, measure: str) -> dict[str, Any]:
 
 
 def _durations(results: Results) -> dict[int, Any]:
-    found = [one for one in of_group(results, MODELS) if one["name"] == IPHMM_3]
-    return {states: next(one["durations"] for one in found if one["states"] == states) for states in _states(found)}
+    models = [one for one in of_group(results, MODELS) if one["name"] == IPHMM_3]
+    return {states: next(one["durations"] for one in models if one["states"] == states) for states in _states(models)}
 
 
-def _states(found: Results) -> list[int]:
-    return sorted({one["states"] for one in found})
+def _states(results: Results) -> list[int]:
+    return sorted({one["states"] for one in results})
 
 
 def _seeds(results: Results) -> str:

@@ -1,4 +1,4 @@
-"""The numbers of chapter 4: means over seeds with their intervals, and what was wanted."""
+"""The numbers of chapter 4: means over seeds with their intervals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from studies.chapter4.experiments import (
     REDIRECT,
     VARIATION,
 )
-from studies.chapter4.raster import ACTIONS
+from studies.chapter4.grid import ACTIONS
 from studies.chapter4.variation import CORNERS
 from studies.movements.measures import auroc
 
@@ -32,7 +32,7 @@ MEASURES = (
     *("theta_pointing", "theta_reaching", "theta", "covered", "correct"),
     *UNTYPICAL,
 )
-SHARES = ("covered", "correct", *UNTYPICAL)
+FRACTIONS = ("covered", "correct", *UNTYPICAL)
 
 
 class Interval(NamedTuple):
@@ -50,15 +50,15 @@ class Interval(NamedTuple):
     maximum: float
 
 
-def over_seeds(values: Iterable[float], *, share: bool = False) -> Interval:
-    """From one value per seed; the interval of shares ends at 0 and 1."""
+def over_seeds(values: Iterable[float], *, fraction: bool = False) -> Interval:
+    """From one value per seed; the interval of fractions ends at 0 and 1."""
     each = np.array(list(values))
     mean, count = float(each.mean()), len(each)
     ends = float(each.min()), float(each.max())
     if count < 2:
         return Interval(mean, float("nan"), float("nan"), count, *ends)
     half = float(student.ppf(0.975, count - 1) * each.std(ddof=1) / np.sqrt(count))
-    low, high = (max(0.0, mean - half), min(1.0, mean + half)) if share else (mean - half, mean + half)
+    low, high = (max(0.0, mean - half), min(1.0, mean + half)) if fraction else (mean - half, mean + half)
     return Interval(mean, low, high, count, *ends)
 
 
@@ -70,7 +70,7 @@ def of_group(results: Results, group: str, **labels: Any) -> list[dict[str, Any]
 
 
 def summarised(results: Results) -> dict[str, Any]:
-    """All numbers as plain JSON; intervals as [mean, low, high, seeds, least, most]."""
+    """All numbers as plain JSON; intervals as [mean, low, high, seeds, minimum, maximum]."""
     return {
         "models": _models(results),
         "classification": {
@@ -87,17 +87,18 @@ def summarised(results: Results) -> dict[str, Any]:
 
 
 def _models(results: Results) -> list[dict[str, Any]]:
-    found = of_group(results, MODELS)
+    models = of_group(results, MODELS)
     rows = []
-    for states, name in dict.fromkeys((one["states"], one["name"]) for one in found):
-        own = of_group(found, MODELS, states=states, name=name)
+    for states, name in dict.fromkeys((one["states"], one["name"]) for one in models):
+        own = of_group(models, MODELS, states=states, name=name)
         each = [measures_of(one["values"]) for one in own]
         rows.append(
             {
                 "name": fitted_name(name, own),
                 "states": states,
                 **{
-                    measure: over_seeds((one[measure] for one in each), share=measure in SHARES) for measure in MEASURES
+                    measure: over_seeds((one[measure] for one in each), fraction=measure in FRACTIONS)
+                    for measure in MEASURES
                 },
                 **{name: over_seeds(one["seconds"][name] for one in own) for name in ("fit", "classify")},
             }
@@ -106,9 +107,9 @@ def _models(results: Results) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: (row["states"], order.index(row["name"])))
 
 
-def fitted_name(name: str, found: Results) -> str:
-    """A model's name with what was fitted: cross validation chooses a network's hidden units, and may choose none."""
-    units = sorted({number for one in found for number in one.get("hidden", ())})
+def fitted_name(name: str, results: Results) -> str:
+    """A model's name with what was fitted: cross-validation chooses a network's hidden units, and may choose none."""
+    units = sorted({number for one in results for number in one.get("hidden", ())})
     if not units:
         return name
     if units == [0]:
@@ -117,12 +118,12 @@ def fitted_name(name: str, found: Results) -> str:
 
 
 def measures_of(values: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """The measures of one model and seed: lengths in cm, shares, AUROC as the mean of both actions."""
-    found = {name: float(np.mean(values[name])) for name in MEASURES if name in values}
-    found["theta"] = float(np.mean([found[f"theta_{action}"] for action in ACTIONS]))
-    found["covered"] = float(np.mean([values[f"covered_{action}"] for action in ACTIONS]))
+    """The measures of one model and seed: lengths in cm, fractions, AUROC as the mean of both actions."""
+    measures = {name: float(np.mean(values[name])) for name in MEASURES if name in values}
+    measures["theta"] = float(np.mean([measures[f"theta_{action}"] for action in ACTIONS]))
+    measures["covered"] = float(np.mean([values[f"covered_{action}"] for action in ACTIONS]))
     for kind in UNTYPICAL:
-        found[kind] = float(
+        measures[kind] = float(
             np.mean(
                 [
                     auroc(np.array(values[f"score_genuine_{action}"]), np.array(values[f"score_{kind}_{action}"]))
@@ -130,19 +131,19 @@ def measures_of(values: Mapping[str, Sequence[float]]) -> dict[str, float]:
                 ]
             )
         )
-    return found
+    return measures
 
 
 def surface(results: Results, name: str, states: int, measure: str) -> Floats:
-    """Mean over seeds (and over the tests to a place) of a measure at each of the 7 x 5 places. Shape (7, 5)."""
+    """Mean over seeds (and over the tests to a target) of a measure at each of the 7 x 5 targets. Shape (7, 5)."""
     own = of_group(results, MODELS, states=states, name=name)
     values = np.mean([np.asarray(one["values"][measure]) for one in own], axis=0)
-    places = values.reshape(35, -1) if len(values) % 35 == 0 else np.full((35, 1), np.nan)
-    return np.asarray(places.mean(axis=1).reshape(7, 5))
+    by_target = values.reshape(35, -1) if len(values) % 35 == 0 else np.full((35, 1), np.nan)
+    return np.asarray(by_target.mean(axis=1).reshape(7, 5))
 
 
-def _learning(found: Results) -> list[dict[str, Any]]:
-    keys = dict.fromkeys((one["name"], one["side"], one["repetitions"]) for one in found)
+def _learning(results: Results) -> list[dict[str, Any]]:
+    keys = dict.fromkeys((one["name"], one["side"], one["repetitions"]) for one in results)
     return [
         {
             "name": name,
@@ -150,7 +151,7 @@ def _learning(found: Results) -> list[dict[str, Any]]:
             "repetitions": repetitions,
             "demonstrations": side**2 * repetitions,
             **{
-                measure: _mean_of(of_group(found, LEARNING, name=name, side=side, repetitions=repetitions), measure)
+                measure: _mean_of(of_group(results, LEARNING, name=name, side=side, repetitions=repetitions), measure)
                 for measure in ("synthesis", "theta")
             },
         }
@@ -158,32 +159,32 @@ def _learning(found: Results) -> list[dict[str, Any]]:
     ]
 
 
-def _variation(found: Results) -> dict[str, Any]:
+def _variation(results: Results) -> dict[str, Any]:
     corners = [f"corner {corner}" for corner in CORNERS]
-    worst = [max((one["values"][name] for name in corners), key=np.mean) for one in found]
+    worst = [max((one["values"][name] for name in corners), key=np.mean) for one in results]
     return {
-        "pairs at the centre": _mean_of(found, "centre"),
-        "their deviation": over_seeds(float(np.std(one["values"]["centre"])) for one in found),
+        "pairs at the centre": _mean_of(results, "centre"),
+        "their deviation": over_seeds(float(np.std(one["values"]["centre"])) for one in results),
         "pairs at the worst corner": over_seeds(float(np.mean(one)) for one in worst),
         "deviation there": over_seeds(float(np.std(one)) for one in worst),
-        "miss at the centre": _mean_of(found, "miss"),
-        "prototype from averages": _mean_of(found, "prototype"),
+        "miss at the centre": _mean_of(results, "miss"),
+        "prototype from averages": _mean_of(results, "prototype"),
     }
 
 
-def _line(found: Results) -> dict[str, Any]:
-    names = found[0]["values"]
-    return {name: over_seeds(float(np.max(one["values"][name])) for one in found) for name in names} | {
-        "training, s": over_seeds(one["seconds"]["fit"] for one in found)
+def _line(results: Results) -> dict[str, Any]:
+    names = results[0]["values"]
+    return {name: over_seeds(float(np.max(one["values"][name])) for one in results) for name in names} | {
+        "training, s": over_seeds(one["seconds"]["fit"] for one in results)
     }
 
 
-def _redirect(found: Results) -> list[dict[str, Any]]:
-    rows = [row for one in found for row in one["rows"]]
-    result = []
+def _redirect(results: Results) -> list[dict[str, Any]]:
+    rows = [row for one in results for row in one["rows"]]
+    summary = []
     for training, model in dict.fromkeys((row["training"], row["model"]) for row in rows):
         own = [row for row in rows if (row["training"], row["model"]) == (training, model)]
-        result.append(
+        summary.append(
             {
                 "training": training,
                 "model": model,
@@ -195,21 +196,21 @@ def _redirect(found: Results) -> list[dict[str, Any]]:
                 },
             }
         )
-    return result
+    return summary
 
 
-def _mean_of(found: Results, measure: str) -> Interval | None:
-    return over_seeds(float(np.mean(one["values"][measure])) for one in found) if found else None
+def _mean_of(results: Results, measure: str) -> Interval | None:
+    return over_seeds(float(np.mean(one["values"][measure])) for one in results) if results else None
 
 
-def _by_name(found: Results, reduced: Callable[[Mapping[str, Any]], dict[str, float]]) -> dict[str, Any]:
-    names = dict.fromkeys(one["name"] for one in found)
-    result = {}
+def _by_name(results: Results, reduced: Callable[[Mapping[str, Any]], dict[str, float]]) -> dict[str, Any]:
+    names = dict.fromkeys(one["name"] for one in results)
+    intervals = {}
     for name in names:
-        each = [reduced(one["values"]) for one in found if one["name"] == name]
-        result[name] = {key: over_seeds(one[key] for one in each) for key in each[0]}
-    return result
+        each = [reduced(one["values"]) for one in results if one["name"] == name]
+        intervals[name] = {key: over_seeds(one[key] for one in each) for key in each[0]}
+    return intervals
 
 
-def _by_name_values(found: Results) -> dict[str, Any]:
-    return {name: _mean_of(found, name) for name in found[0]["values"]}
+def _by_name_values(results: Results) -> dict[str, Any]:
+    return {name: _mean_of(results, name) for name in results[0]["values"]}

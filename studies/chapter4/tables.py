@@ -21,19 +21,19 @@ MARKS = {
 
 
 def targets_table(targets: Sequence[Target]) -> str:
-    """Goals: wanted, measured, met."""
+    """Goals: required, measured, met."""
     rows = [(*map(escape, target[:4]), MARKS["yes" if target.met else "no"]) for target in targets]
-    return table(("goal", "wanted", "measured", "of", "met"), rows)
+    return table(("goal", "required", "measured", "of", "met"), rows)
 
 
 def findings_table(findings: Sequence[Finding]) -> str:
-    """What the thesis saw, and what is seen here."""
+    """What the thesis observed, and what is observed here."""
     rows = [(*map(escape, finding[:3]), MARKS[finding.verdict]) for finding in findings]
     return table(("where", "the thesis", "here", "the same"), rows)
 
 
 def models_table(summary: Mapping[str, Any]) -> str:
-    """Errors and rates of all models, the thesis's rates of table 4.1 beside."""
+    """Errors and rates of all models, the thesis's rates of table 4.1 in a column."""
     rows: list[tuple[str, ...]] = [
         (
             str(row["states"]),
@@ -50,9 +50,9 @@ def models_table(summary: Mapping[str, Any]) -> str:
         )
         for row in summary["models"]
     ]
-    for name, found in summary["classification"].items():
-        if found is not None:
-            rows.append(("20", escape(NAMES[name]), *["–"] * 5, interval(found, 3), "–", "–", "–"))
+    for name, rate in summary["classification"].items():
+        if rate is not None:
+            rows.append(("20", escape(NAMES[name]), *["–"] * 5, interval(rate, 3), "–", "–", "–"))
     heads = (
         *("states", "model", "synthesis, cm", "with straight lines, as the thesis", "synthesis, reaching"),
         *("θ, pointing, cm", "θ, reaching, cm", "right of 280", "thesis, table 4.1", "learn, s", "classify, ms"),
@@ -79,7 +79,7 @@ def rejection_table(summary: Mapping[str, Any]) -> str:
 
 
 def learning_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Errors over the numbers of places and repetitions."""
+    """Errors over the numbers of targets and repetitions."""
     cells = [
         (
             escape(row["name"]),
@@ -92,15 +92,15 @@ def learning_table(rows: Sequence[Mapping[str, Any]]) -> str:
         for row in sorted(rows, key=lambda row: (row["name"], row["side"], row["repetitions"]))
     ]
     return table(
-        ("model", "places", "repetitions", "demonstrations", "synthesis, cm", "θ, cm"), cells, numbers=range(1, 6)
+        ("model", "targets", "repetitions", "demonstrations", "synthesis, cm", "θ, cm"), cells, numbers=range(1, 6)
     )
 
 
-def variation_table(found: Mapping[str, Any]) -> str:
-    """The demonstrator beside the thesis's person."""
+def variation_table(variation: Mapping[str, Any]) -> str:
+    """The demonstrator compared with the thesis's person."""
     rows = [
         (escape(name), interval(one), f"{THESIS_VARIATION[name]:g}" if name in THESIS_VARIATION else "–")
-        for name, one in found.items()
+        for name, one in variation.items()
     ]
     return table(("", "here", "thesis"), rows, numbers=(1, 2))
 
@@ -120,23 +120,23 @@ def redirect_table(rows: Sequence[Mapping[str, Any]]) -> str:
         for row in rows
     ]
     heads = (
-        *("learned from", "model", "error (4.3), cm", "misses the first place, cm", "the second, cm"),
-        *("jerk ratio", "greatest"),
+        *("learned from", "model", "error (4.3), cm", "misses the first target, cm", "the second, cm"),
+        *("jerk ratio", "maximum"),
     )
     return table(heads, cells, numbers=range(2, 7))
 
 
-def interval(found: Interval | None, digits: int = 2) -> str:
+def interval(value: Interval | None, digits: int = 2) -> str:
     """A mean and its interval."""
-    if found is None:
+    if value is None:
         return "–"
-    if np.isnan(found.low):
-        return f"{found.mean:.{digits}f}"
-    return f"{found.mean:.{digits}f} <span class=soft>[{found.low:.{digits}f}, {found.high:.{digits}f}]</span>"
+    if np.isnan(value.low):
+        return f"{value.mean:.{digits}f}"
+    return f"{value.mean:.{digits}f} <span class=soft>[{value.low:.{digits}f}, {value.high:.{digits}f}]</span>"
 
 
-def _percent(found: Interval) -> Interval:
-    return found._replace(mean=100.0 * found.mean, low=100.0 * found.low, high=100.0 * found.high)
+def _percent(value: Interval) -> Interval:
+    return value._replace(mean=100.0 * value.mean, low=100.0 * value.low, high=100.0 * value.high)
 
 
 def _rate(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""What is wanted of the models of chapter 4, and whether it is so."""
+"""The goals for the models of chapter 4, and whether they are met."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def _at_least(what: str, rows: list[dict[str, Any]], measure: str, limit: float)
 
 def _classification(summary: dict[str, Any], rows: list[dict[str, Any]]) -> list[Target]:
     worst, best = min(rows, key=_mean("correct")), max(rows, key=_mean("correct"))
-    found = [
+    targets = [
         Target(
             "right action, best", "≥ 0.960", f"{best['correct'].mean:.3f}", _case(best), best["correct"].mean >= 0.96
         )
     ]
     peer = summary["classification"]["hmmlearn"]
     if peer is None:
-        return found
+        return targets
     above = peer.mean if np.isnan(peer.high) else peer.high
     below = worst["correct"].mean if np.isnan(worst["correct"].low) else worst["correct"].low
     return [
@@ -79,7 +79,7 @@ def _classification(summary: dict[str, Any], rows: list[dict[str, Any]]) -> list
             _case(worst),
             bool(below > above),
         ),
-        *found,
+        *targets,
     ]
 
 
@@ -92,15 +92,15 @@ def _coverage(rows: list[dict[str, Any]]) -> list[Target]:
     ]
 
 
-def _percent(found: Interval) -> str:
-    return f"{100 * found.mean:.1f} %{_of_seeds(found, 1, 100.0)}"
+def _percent(value: Interval) -> str:
+    return f"{100 * value.mean:.1f} %{_of_seeds(value, 1, 100.0)}"
 
 
-def _of_seeds(found: Interval, digits: int, scale: float = 1.0) -> str:
+def _of_seeds(value: Interval, digits: int, scale: float = 1.0) -> str:
     """How single seeds differ: a mean at its bound is met with some of them and missed with others."""
-    if found.seeds < 2:
+    if value.seeds < 2:
         return ""
-    return f" (seeds: {scale * found.minimum:.{digits}f} to {scale * found.maximum:.{digits}f})"
+    return f" (seeds: {scale * value.minimum:.{digits}f} to {scale * value.maximum:.{digits}f})"
 
 
 def _jerk(rows: list[dict[str, Any]]) -> Target:

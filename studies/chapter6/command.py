@@ -1,4 +1,4 @@
-"""`python -m studies chapter6`: tracking in action space on rendered performances."""
+"""`python -m studies chapter6`: tracking in action space on rendered movements."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rich.table import Table
 
 from paramove.cli import JsonFileOption, write_numbers
 from paramove.documents import exit_codes
-from studies.terminal import marked, say_error, stored_results
+from studies.terminal import marked, print_error, stored_results
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +51,10 @@ def chapter6(
     json_file: JsonFileOption = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="where the report goes")] = CHAPTER6_FOLDER,
 ) -> None:
-    """Repeat thesis chapter 6: an arm tracked in action space by one to four cameras, on rendered performances.
+    """Repeat thesis chapter 6: an arm tracked in action space by one to four cameras, on rendered movements.
 
-    Writes report.html and chapter6.json, and prints which goals are met; those that the chosen clips cannot tell
-    anything of are not judged. Ctrl-C and the same command again: goes on where it was. Exit codes: 0 all judged goals
+    Writes report.html and chapter6.json, and prints which goals are met; those for which the chosen clips have no
+    data are not judged. Ctrl-C and the same command again: goes on where it was. Exit codes: 0 all judged goals
     are met; 3 not all; 66 clips or recordings are missing; 130 interrupted.
     """
     from sim.persons.performances import KINDS
@@ -70,20 +70,20 @@ def chapter6(
 
 
 def _prepared(selection: Selection, clips: Path | None, data: Path | None, console: Console) -> list[Piece]:
-    """All tracks, when their clips are there and what the trackers need is learned."""
+    """All tracks, after checking the clips and training the models."""
     from paramove.demonstrations import RecordingsError
     from paramove.documents import InputError
     from studies.chapter6.experiments import pieces, train
 
     try:
         work = pieces(selection, clips, data)
-        with console.status("learning what the trackers need to know"):
+        with console.status("training models"):
             train(selection, data)
     except InputError as error:
-        say_error(str(error))
+        print_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING if error.missing else exit_codes.USAGE) from error
     except RecordingsError as error:
-        say_error(f"{error}; without them, leave kind 'recorded' out: name the others with --kind")
+        print_error(f"{error}; without them, leave kind 'recorded' out: name the others with --kind")
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
     return work
 
@@ -95,8 +95,8 @@ def _report(
     from studies.chapter6.report import write_results
 
     with console.status("drawing"):
-        shown = {piece.folder.name: read_clip(piece.folder) for piece in work}
-        numbers, goals = write_results(results, folder, shown)
+        clips = {piece.folder.name: read_clip(piece.folder) for piece in work}
+        numbers, goals = write_results(results, folder, clips)
     _print_findings(numbers["findings"], console)
     _print_goals(goals, console)
     write_numbers(json_file, numbers, console)
@@ -106,7 +106,7 @@ def _report(
 
 
 def _print_findings(findings: Sequence[dict[str, str]], console: Console) -> None:
-    table = Table(title="beside the thesis", show_edge=False, pad_edge=False, show_lines=True)
+    table = Table(title="compared with the thesis", show_edge=False, pad_edge=False, show_lines=True)
     for head in ("where", "here", "the same"):
         table.add_column(head)
     for one in findings:
@@ -118,7 +118,7 @@ def _print_goals(goals: Sequence[Goal], console: Console) -> None:
     from studies.chapter6.tables import met
 
     table = Table(title="goals", show_edge=False, pad_edge=False)
-    for head in ("goal", "wanted", "measured", "of", "met"):
+    for head in ("goal", "required", "measured", "of", "met"):
         table.add_column(head)
     for goal in goals:
         if goal.met is not None:
@@ -126,4 +126,4 @@ def _print_goals(goals: Sequence[Goal], console: Console) -> None:
     console.print(table)
     unjudged = sum(goal.met is None for goal in goals)
     if unjudged:
-        console.print(f"{unjudged} more goals are not judged: of these, the chosen clips are none or too few")
+        console.print(f"{unjudged} more goals are not judged: the chosen clips have none or too few of these")

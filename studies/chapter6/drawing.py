@@ -16,7 +16,7 @@ HUES = {
 }  # fmt: skip
 AXES, AXIS_HUES = ("x", "y", "z"), ("#c8372d", "#1f7a45", "#2f6fc4")
 ACTION_HUES = ("#2f6fc4", "#c8372d", "#1f7a45")
-MAX_SHOWN_CM = 40.0
+MAX_DRAWN_CM = 40.0
 
 
 def name_of(views: tuple[int, ...]) -> str:
@@ -36,7 +36,7 @@ def over_time(figure: Figure, tracks: Sequence[Track]) -> None:
             axes.plot(track.times_s, values, color=hue, lw=width, label=name_of(track.views))
     for axes, title in zip(panels, ("pose, RMS cm", "target of θ, cm", "deviation of θ"), strict=True):
         axes.set_ylabel(title)
-        axes.set_ylim(0.0, min(MAX_SHOWN_CM, axes.get_ylim()[1]))
+        axes.set_ylim(0.0, min(MAX_DRAWN_CM, axes.get_ylim()[1]))
         mark_acts(axes, tracks[0])
     panels[0].legend(ncols=6, fontsize=7, loc="upper right")
     panels[-1].set_xlabel("s")
@@ -54,8 +54,8 @@ def deviations(figure: Figure, tracks: Sequence[Track]) -> None:
     panels[-1].legend(fontsize=7)
 
 
-def hand_beside_truth(figure: Figure, track: Track) -> None:
-    """Place of the hand: true, best hypothesis, and this median filtered (figure 6.11)."""
+def hand_and_truth(figure: Figure, track: Track) -> None:
+    """Position of the hand: true, best hypothesis, and this median filtered (figure 6.11)."""
     true = track.true_poses[:, -3:]
     for axis, axes in enumerate(figure.subplots(3, 1, sharex=True)):
         axes.plot(track.times_s, 100.0 * track.best_hands[:, axis], color="#39424e", lw=0.6, label="best hypothesis")
@@ -98,17 +98,17 @@ def mark_acts(axes: Axes, track: Track) -> None:
 
 
 def distributions(figure: Figure, kinds: Mapping[str, Mapping[str, Floats]], title: str, maximum: float) -> None:
-    """Share of the values below a length, for each kind and each set of views; infinite ones never are."""
+    """Fraction of the values below a length, for each kind and each set of views; infinite ones are never below."""
     panels = figure.subplots(1, len(kinds), sharey=True, squeeze=False)[0]
     hues = ("#1d2530", "#c8372d", "#7a4fb5", "#a86a00")
-    for axes, (kind, found) in zip(panels, kinds.items(), strict=True):
-        for (name, values), hue in zip(found.items(), hues, strict=False):
+    for axes, (kind, errors) in zip(panels, kinds.items(), strict=True):
+        for (name, values), hue in zip(errors.items(), hues, strict=False):
             ordered = np.sort(values)
-            shares = np.arange(1, len(ordered) + 1) / len(ordered)
-            axes.step(np.concatenate([[0.0], ordered]), np.concatenate([[0.0], shares]), where="post", color=hue,
+            fractions = np.arange(1, len(ordered) + 1) / len(ordered)
+            axes.step(np.concatenate([[0.0], ordered]), np.concatenate([[0.0], fractions]), where="post", color=hue,
                       label=name)  # fmt: skip
         axes.set(title=kind, xlim=(0.0, maximum), ylim=(0.0, 1.02), xlabel=title)
-    panels[0].set_ylabel("share of all")
+    panels[0].set_ylabel("fraction of all")
     panels[-1].legend(fontsize=7, loc="lower right")
 
 

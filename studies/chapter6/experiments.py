@@ -27,7 +27,7 @@ from sim.persons.performances import KINDS, Kind, split_of
 from studies.chapter6.tracking import tracked_clip
 from studies.chapter6.vocabularies import BY_OTHERS, knowledge_of
 
-Wanted = Literal["tuning", "held_out", "all"]
+SplitOrAll = Literal["tuning", "held_out", "all"]
 Views = tuple[int, ...]
 
 ALL_VIEWS: Views = (0, 1, 2, 3)
@@ -42,14 +42,14 @@ LIBRARIES = ("numpy", "scipy", "numba")
 
 
 class ClipsMissingError(InputError):
-    """Clips are not there or rendered by other code.
+    """Clips are missing or rendered by other code.
 
     Attributes:
         command: renders them.
     """
 
-    def __init__(self, sentence: str, command: str) -> None:
-        super().__init__(f"{sentence}; this renders them: {command}", missing=True)
+    def __init__(self, message: str, command: str) -> None:
+        super().__init__(f"{message}; render them with: {command}", missing=True)
         self.command = command
 
 
@@ -62,7 +62,7 @@ class Selection:
         quick: fewer sets of views and no simple likelihood.
     """
 
-    split: Wanted = "all"
+    split: SplitOrAll = "all"
     kinds: tuple[str, ...] = tuple(kind.name for kind in KINDS)
     first: int | None = None
     quick: bool = False
@@ -105,7 +105,7 @@ class Piece:
 
     @property
     def label(self) -> str:
-        """As the progress shows it."""
+        """Shown by the progress bar."""
         cameras = ", ".join(str(view + 1) for view in self.views)
         whose = ", model of others" if self.kind == BY_OTHERS else ""
         return f"{self.folder.name}, camera {cameras}, {self.likelihood}{whose}"
@@ -119,7 +119,7 @@ class Piece:
 
     def run(self) -> dict[str, Any]:
         """The result as plain JSON."""
-        found = tracked_clip(self.folder, self.views, self.likelihood, self.seed, self.data, self.kind)
+        result = tracked_clip(self.folder, self.views, self.likelihood, self.seed, self.data, self.kind)
         return {
             "clip": self.folder.name,
             "kind": self.kind,
@@ -128,7 +128,7 @@ class Piece:
             "views": list(self.views),
             "likelihood": self.likelihood,
             "seed": self.seed,
-            **found,
+            **result,
         }
 
 
@@ -140,12 +140,12 @@ def pieces(selection: Selection, root: Path | None = None, data: Path | None = N
     return [
         Piece(clips / f"{kind.name}_{number:02d}", known, number, views, likelihood, data=data)
         for kind, number in chosen
-        for views, likelihood in tracked_ways(kind, number, quick=selection.quick)
+        for views, likelihood in tracked_cases(kind, number, quick=selection.quick)
         for known in ((kind.name, BY_OTHERS) if kind.name == "recorded" and views != TWO_VIEWS else (kind.name,))
     ]
 
 
-def tracked_ways(kind: Kind, number: int, *, quick: bool = False) -> Iterator[tuple[Views, Likelihood]]:
+def tracked_cases(kind: Kind, number: int, *, quick: bool = False) -> Iterator[tuple[Views, Likelihood]]:
     """With which views and which likelihood a clip is tracked."""
     singles = ((number % 4,),) if kind.one_view else SINGLE_VIEWS
     sets = singles if kind.one_view else (ALL_VIEWS, *singles, TWO_VIEWS)
@@ -158,7 +158,7 @@ def tracked_ways(kind: Kind, number: int, *, quick: bool = False) -> Iterator[tu
 
 
 def train(selection: Selection, data: Path | None = None) -> None:
-    """Trains all models that the selected clips need and that are not kept yet, so that no two workers train one."""
+    """Trains all models that the selected clips need and that are not cached yet, so that no two workers train one."""
     for kind, number in selection.clips():
         knowledge_of(kind.name, number, data)
         if kind.name == "recorded":
@@ -171,14 +171,14 @@ def _check_complete(clips: Path, chosen: Sequence[tuple[Kind, int]], named: Path
         return
     kinds = dict.fromkeys(kind.name for kind, _ in absent)
     maximum = max(number for _, number in absent) + 1
-    words = ["python -m sim.performances", *(f"--kind {name}" for name in kinds)]
+    command = ["python -m sim.performances", *(f"--kind {name}" for name in kinds)]
     if any(number + 1 < kind.clips for kind, number in chosen if number == maximum - 1):
-        words.append(f"--clips {maximum}")
+        command.append(f"--clips {maximum}")
     if named is not None:
-        words.append(f"--out {named}")
+        command.append(f"--out {named}")
     raise ClipsMissingError(
         f"{clips}: {len(absent)} of {len(chosen)} clips are missing or rendered by other code",
-        " ".join(words),
+        " ".join(command),
     )
 
 

@@ -1,4 +1,4 @@
-"""What the thesis saw in chapter 6, what is seen here, and whether it is the same."""
+"""What the thesis observed in chapter 6, what is observed here, and whether they agree."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ DEPTH_AXES = {"camera 1": 1, "camera 2": 0, "camera 3": 0, "camera 4": 1}
 
 
 class Finding(NamedTuple):
-    """Where, what the thesis says, what is seen here, and whether that is the same."""
+    """Where, what the thesis reports, what is observed here, and whether they agree."""
 
     where: str
     thesis: str
@@ -45,9 +45,9 @@ class Finding(NamedTuple):
 
 
 def findings_of(tracks: Sequence[Track], summary: Mapping[str, Any]) -> list[Finding]:
-    """All findings that the tracks tell something of."""
+    """All findings for which there are tracks."""
     pointing, four = chosen(tracks, kinds=["pointing"], case=SINGLE), chosen(tracks, kinds=["pointing"], case=FOUR)
-    found = [
+    findings = [
         _table_6_1(summary["table 6.1"]),
         _depth(summary["cameras"]),
         _detection(pointing, four),
@@ -60,46 +60,46 @@ def findings_of(tracks: Sequence[Track], summary: Mapping[str, Any]) -> list[Fin
         _recognition(tracks),
         _complex(tracks),
     ]
-    return [one for one in found if one is not None]
+    return [one for one in findings if one is not None]
 
 
-def _table_6_1(found: Mapping[str, Any] | None) -> Finding | None:
-    if found is None:
+def _table_6_1(errors: Mapping[str, Any] | None) -> Finding | None:
+    if errors is None:
         return None
-    rms, maximum = found["median: RMS"], found["median: max"]
+    rms, maximum = errors["median: RMS"], errors["median: max"]
     theirs = TABLE_6_1["median: RMS"], TABLE_6_1["median: max"]
-    said = f"median filtered, RMS {_axes(theirs[0])} cm, greatest {max(theirs[1]):.1f} cm, over 3 performances"
-    seen = f"RMS {_axes(rms)} cm, greatest {max(maximum):.1f} cm, over all performances and cameras"
-    return Finding("table 6.1", said, seen, _verdict(max(rms) <= 1.8, max(rms) <= 3.0))
+    thesis = f"median filtered, RMS {_axes(theirs[0])} cm, greatest {max(theirs[1]):.1f} cm, over 3 performances"
+    observed = f"RMS {_axes(rms)} cm, greatest {max(maximum):.1f} cm, over all performances and cameras"
+    return Finding("table 6.1", thesis, observed, _verdict(max(rms) <= 1.8, max(rms) <= 3.0))
 
 
-def _depth(found: Mapping[str, Any]) -> Finding | None:
-    if not found:
+def _depth(cameras: Mapping[str, Any]) -> Finding | None:
+    if not cameras:
         return None
-    right = [int(np.argmax(one["deviations"][:2])) == DEPTH_AXES[name] for name, one in found.items()]
-    shares = ", ".join(f"{name}: {100 * one['depth_share_of_kept']:.0f} %" for name, one in found.items())
-    said = (
+    right = [int(np.argmax(one["deviations"][:2])) == DEPTH_AXES[name] for name, one in cameras.items()]
+    fractions = ", ".join(f"{name}: {100 * one['depth_share_of_kept']:.0f} %" for name, one in cameras.items())
+    thesis = (
         "one camera: hypotheses of the hand scatter most along its line of sight, x for cameras 2 and 3, y for 1 and 4"
     )
-    seen = (
+    observed = (
         f"so for {sum(right)} of {len(right)} cameras; of the squared error of arms that are not lost, along the line "
-        f"of sight lie: {shares}"
+        f"of sight lie: {fractions}"
     )
-    maximum = all(one["depth_share_of_kept"] > 1.0 / 3.0 for one in found.values())
-    return Finding("figure 6.16", said, seen, _verdict(all(right) and maximum, any(right) or maximum))
+    maximum = all(one["depth_share_of_kept"] > 1.0 / 3.0 for one in cameras.values())
+    return Finding("figure 6.16", thesis, observed, _verdict(all(right) and maximum, any(right) or maximum))
 
 
 def _detection(single: Sequence[Track], four: Sequence[Track]) -> Finding | None:
     if not single or not four:
         return None
     one, all_views = accuracy(single), accuracy(four)
-    said = "detected targets: less than 5 cm off with each camera and with all (2 performances)"
-    seen = (
+    thesis = "detected targets: less than 5 cm off with each camera and with all (2 performances)"
+    observed = (
         f"one camera: median {length(one['target_median'])}, 90 % {length(one['target_p90'])}; "
         f"all: {length(all_views['target_median'])}, {length(all_views['target_p90'])}"
     )
     both = one["target_p90"] <= 5.0 and all_views["target_p90"] <= 5.0
-    return Finding("detection, 6.7.1.2", said, seen, _verdict(both, all_views["target_p90"] <= 5.0))
+    return Finding("detection, 6.7.1.2", thesis, observed, _verdict(both, all_views["target_p90"] <= 5.0))
 
 
 def _pose_at_target(single: Sequence[Track]) -> Finding | None:
@@ -108,13 +108,13 @@ def _pose_at_target(single: Sequence[Track]) -> Finding | None:
     errors = [100.0 * track.pose_errors for track in single]
     still = np.concatenate([one[at_targets(track)] for one, track in zip(errors, single, strict=True)])
     moving = np.concatenate([one[~at_targets(track)] for one, track in zip(errors, single, strict=True)])
-    said = "one camera, 8 fps: pose error up to 18 cm in motion; at the target always below 6 cm, usually 2 cm"
-    seen = (
+    thesis = "one camera, 8 fps: pose error up to 18 cm in motion; at the target always below 6 cm, usually 2 cm"
+    observed = (
         f"in motion 90 % below {quantile(moving, 0.9):.1f} cm; at the target median {quantile(still, 0.5):.1f} cm, "
         f"90 % below {quantile(still, 0.9):.1f} cm"
     )
     usual = quantile(still, 0.5) <= 3.0
-    return Finding("figures 6.15, 6.19", said, seen, _verdict(usual and quantile(still, 0.9) <= 6.0, usual))
+    return Finding("figures 6.15, 6.19", thesis, observed, _verdict(usual and quantile(still, 0.9) <= 6.0, usual))
 
 
 def _deviations(four: Sequence[Track]) -> Finding | None:
@@ -122,45 +122,47 @@ def _deviations(four: Sequence[Track]) -> Finding | None:
         return None
     still = np.concatenate([track.theta_deviation[at_targets(track)] for track in four])
     rest = np.concatenate([track.theta_deviation[track.times_s < track.acts[0].start_s] for track in four])
-    said = "the deviation of θ is large in the base pose and smallest when the hand is at the target"
-    seen = f"median {np.median(rest):.2f} in the base pose, {np.median(still):.2f} at the target"
-    return Finding("figure 6.17", said, seen, "yes" if np.median(still) < 0.5 * np.median(rest) else "no")
+    thesis = "the deviation of θ is large in the base pose and smallest when the hand is at the target"
+    observed = f"median {np.median(rest):.2f} in the base pose, {np.median(still):.2f} at the target"
+    return Finding("figure 6.17", thesis, observed, "yes" if np.median(still) < 0.5 * np.median(rest) else "no")
 
 
-def _one_camera(where: str, tracks: Sequence[Track], kind: str, cameras: tuple[int, ...], said: str) -> Finding | None:
+def _one_camera(
+    where: str, tracks: Sequence[Track], kind: str, cameras: tuple[int, ...], thesis: str
+) -> Finding | None:
     own = [track for track in chosen(tracks, kinds=[kind], case=SINGLE) if track.views[0] in cameras]
     if not own:
         return None
-    found = accuracy(own)
-    seen = (
-        f"target: median {length(found['target_median'])}, 90 % {length(found['target_p90'])}; "
-        f"lost {found['lost']} of {found['performances']}"
+    measured = accuracy(own)
+    observed = (
+        f"target: median {length(measured['target_median'])}, 90 % {length(measured['target_p90'])}; "
+        f"lost {measured['lost']} of {measured['performances']}"
     )
     near = 5.0 if kind != "pointing_far" else 10.0
-    return Finding(where, said, seen, _verdict(found["target_p90"] <= near, found["target_median"] <= near))
+    return Finding(where, thesis, observed, _verdict(measured["target_p90"] <= near, measured["target_median"] <= near))
 
 
 def _recognition(tracks: Sequence[Track]) -> Finding | None:
     own = [track for track in chosen(tracks, kinds=["box"], case=SINGLE) if track.views == (1,)]
-    found = recognition(own)
-    if found is None:
+    measured = recognition(own)
+    if measured is None:
         return None
-    said = "camera 2: three of three performances are recognised when the object is grasped"
-    seen = f"camera 2: {found['right']} of {found['of']}"
-    return Finding("figure 6.24", said, seen, _verdict(found["share"] >= 0.95, found["share"] >= 0.75))
+    thesis = "camera 2: three of three performances are recognised when the object is grasped"
+    observed = f"camera 2: {measured['right']} of {measured['of']}"
+    return Finding("figure 6.24", thesis, observed, _verdict(measured["share"] >= 0.95, measured["share"] >= 0.75))
 
 
 def _complex(tracks: Sequence[Track]) -> Finding | None:
     own = [track for track in chosen(tracks, kinds=["complex"], case=SINGLE) if track.views == (1,)]
-    found = dual(own)
-    if found is None:
+    measured = dual(own)
+    if measured is None:
         return None
-    said = "camera 2: a simple and a dual pointing are told apart; a high p(B, τ > ½) tells"
-    seen = (
-        f"camera 2: {found['right']} of {found['of']} by the target that is reported, "
-        f"{100 * found['share by the posterior']:.0f} % by the posterior alone"
+    thesis = "camera 2: a simple and a dual pointing are told apart; a high p(B, τ > ½) tells"
+    observed = (
+        f"camera 2: {measured['right']} of {measured['of']} by the target that is reported, "
+        f"{100 * measured['share by the posterior']:.0f} % by the posterior alone"
     )
-    return Finding("figure 6.27", said, seen, _verdict(found["share"] >= 0.95, found["share"] >= 0.75))
+    return Finding("figure 6.27", thesis, observed, _verdict(measured["share"] >= 0.95, measured["share"] >= 0.75))
 
 
 def _verdict(yes: bool, part: bool) -> Verdict:

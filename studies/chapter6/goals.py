@@ -1,4 +1,4 @@
-"""What is wanted of tracking in action space, and whether it is so."""
+"""The goals for tracking in action space, and whether they are met."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from studies.chapter6.summary import (
 )
 from studies.chapter6.vocabularies import BY_OTHERS
 
-MIN_PERFORMANCES = 100
-"""As many performances it takes to judge a share of 2 %."""
+MIN_EXECUTIONS = 100
+"""A fraction of 2 % can be judged from as many executions on."""
 FAR = "pointing_far"
 RECORDED = "recorded"
 
@@ -75,14 +75,14 @@ def _targets(what: str, tracks: Sequence[Track], median: float, p90: float) -> l
 
 
 def _two_quantiles(what: str, tracks: Sequence[Track], median: float, p90: float) -> list[Goal]:
-    found = accuracy(tracks) if tracks else None
+    measured = accuracy(tracks) if tracks else None
     goals = []
     for name, key, limit in (("median", "target_median", median), ("90 %", "target_p90", p90)):
-        if found is None:
+        if measured is None:
             goals.append(_unjudged(f"{what}, {name}", f"≤ {limit:g} cm"))
             continue
-        of = f"{counted(found['targets'], 'target')}, {found['undetected']} not detected"
-        value = found[key]
+        of = f"{counted(measured['targets'], 'target')}, {measured['undetected']} not detected"
+        value = measured[key]
         goals.append(Goal(f"{what}, {name}", f"≤ {limit:g} cm", length(value), of, value <= limit))
     return goals
 
@@ -93,46 +93,56 @@ def length(value: float) -> str:
 
 
 def counted(number: int, what: str) -> str:
-    """A number of things, in words."""
+    """A number of things, as text."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _lost(what: str, tracks: Sequence[Track]) -> Goal:
-    found = accuracy(tracks) if tracks else {"performances": 0}
-    if found["performances"] < MIN_PERFORMANCES:
+    measured = accuracy(tracks) if tracks else {"performances": 0}
+    if measured["performances"] < MIN_EXECUTIONS:
         return _unjudged(
-            what, "≤ 2 %", f"only {counted(found['performances'], 'performance')}, {MIN_PERFORMANCES} expected"
+            what, "≤ 2 %", f"only {counted(measured['performances'], 'performance')}, {MIN_EXECUTIONS} expected"
         )
-    share = found["lost"] / found["performances"]
-    return Goal(what, "≤ 2 %", f"{100 * share:.1f} %", counted(found["performances"], "performance"), share <= 0.02)
+    fraction = measured["lost"] / measured["performances"]
+    return Goal(
+        what, "≤ 2 %", f"{100 * fraction:.1f} %", counted(measured["performances"], "performance"), fraction <= 0.02
+    )
 
 
 def _recognised(what: str, tracks: Sequence[Track]) -> Goal:
-    return _share(what, recognition([track for track in tracks if track.kind == "box"]))
+    return _fraction(what, recognition([track for track in tracks if track.kind == "box"]))
 
 
 def _complex(four: Sequence[Track]) -> list[Goal]:
-    found = dual([track for track in four if track.kind == "complex"])
+    measured = dual([track for track in four if track.kind == "complex"])
     what = "targets of dual pointing, four views"
-    goals = [_share("simple and dual pointing told apart, four views", found)]
+    goals = [_fraction("simple and dual pointing told apart, four views", measured)]
     for name in ("first", "second"):
-        if found is None or not found["dual"]:
+        if measured is None or not measured["dual"]:
             goals.append(_unjudged(f"{what}, {name}, median", "≤ 5 cm"))
             continue
-        value = found[f"{name}_median"]
+        value = measured[f"{name}_median"]
         goals.append(
             Goal(
-                f"{what}, {name}, median", "≤ 5 cm", length(value), counted(found["dual"], "performance"), value <= 5.0
+                f"{what}, {name}, median",
+                "≤ 5 cm",
+                length(value),
+                counted(measured["dual"], "performance"),
+                value <= 5.0,
             )
         )
     return goals
 
 
-def _share(what: str, found: dict[str, Any] | None) -> Goal:
-    if found is None:
+def _fraction(what: str, measured: dict[str, Any] | None) -> Goal:
+    if measured is None:
         return _unjudged(what, "≥ 95 %")
     return Goal(
-        what, "≥ 95 %", f"{100 * found['share']:.1f} %", f"{found['right']} of {found['of']}", found["share"] >= 0.95
+        what,
+        "≥ 95 %",
+        f"{100 * measured['share']:.1f} %",
+        f"{measured['right']} of {measured['of']}",
+        measured["share"] >= 0.95,
     )
 
 
@@ -141,13 +151,15 @@ def _simple(tracks: Sequence[Track]) -> Goal:
     own = chosen(tracks, likelihood="simple")
     if not own:
         return _unjudged(what, "≥ 10 %")
-    found = accuracy(own)
-    share = found["lost"] / found["performances"]
-    return Goal(what, "≥ 10 %", f"{100 * share:.1f} %", counted(found["performances"], "performance"), share >= 0.10)
+    measured = accuracy(own)
+    fraction = measured["lost"] / measured["performances"]
+    return Goal(
+        what, "≥ 10 %", f"{100 * fraction:.1f} %", counted(measured["performances"], "performance"), fraction >= 0.10
+    )
 
 
-def _unjudged(what: str, wanted: str, of: str = "no such track") -> Goal:
-    return Goal(what, wanted, "–", of, None)
+def _unjudged(what: str, required: str, of: str = "no such track") -> Goal:
+    return Goal(what, required, "–", of, None)
 
 
 def _number(tracks: Sequence[Track]) -> str:

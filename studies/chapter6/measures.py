@@ -32,9 +32,9 @@ class Performed:
 
     Attributes:
         action: what is performed. start_s, end_s: from leaving the base pose to being there again.
-        targets: true places (n, 3), m. arrives_s, leaves_s: of the hand at each, (n,).
+        targets: true positions (n, 3), m. arrives_s, leaves_s: of the hand at each, (n,).
         grasp_s: when an object is grasped; NaN without one.
-        from_true_poses: the place that the model infers from all true poses, (3,), m; None where it was not asked.
+        from_true_poses: the target that the model infers from all true poses, (3,), m; None without one.
     """
 
     action: str
@@ -55,22 +55,22 @@ class Track:
     """
 
     def __init__(self, result: Mapping[str, Any]) -> None:
-        found = result["values"]
+        values = result["values"]
         self.clip, self.kind, self.split = str(result["clip"]), str(result["kind"]), str(result["split"])
         self.views = tuple(int(view) for view in result["views"])
         self.likelihood = str(result["likelihood"])
-        self.times_s = np.array(found["times_s"])
-        self.poses, self.true_poses = np.array(found["poses"]), np.array(result["truth"]["poses"])
-        self.best_hands = np.array(found["best_hands"])
-        self.hand_deviations = np.array(found["hand_deviations"])
-        self.effective = np.array(found["effective"])
-        self.said_lost = np.array(found["lost"], dtype=np.bool_)
-        self.actions = {name: np.array(one) for name, one in found["actions"].items()}
-        self.tau = {name: np.array(one) for name, one in found["tau"].items()}
-        self.theta_deviation = np.array(found["theta_deviation"])
-        self.pointed = np.array(found["pointed"])
-        self.detected: list[dict[str, Any]] = found["detected"]
-        self.seconds = np.array(found["seconds"])
+        self.times_s = np.array(values["times_s"])
+        self.poses, self.true_poses = np.array(values["poses"]), np.array(result["truth"]["poses"])
+        self.best_hands = np.array(values["best_hands"])
+        self.hand_deviations = np.array(values["hand_deviations"])
+        self.effective = np.array(values["effective"])
+        self.reported_lost = np.array(values["lost"], dtype=np.bool_)
+        self.actions = {name: np.array(one) for name, one in values["actions"].items()}
+        self.tau = {name: np.array(one) for name, one in values["tau"].items()}
+        self.theta_deviation = np.array(values["theta_deviation"])
+        self.pointed = np.array(values["pointed"])
+        self.detected: list[dict[str, Any]] = values["detected"]
+        self.seconds = np.array(values["seconds"])
         self.acts = tuple(_performed(act) for act in result["truth"]["acts"])
         self.sight: Mapping[str, Any] | None = result["sight"]
 
@@ -81,7 +81,7 @@ class Track:
 
     @property
     def hand_errors(self) -> Floats:
-        """Estimated less true place of the hand, (T, 3)."""
+        """Estimated minus true position of the hand, (T, 3)."""
         return np.asarray(self.poses[:, -3:] - self.true_poses[:, -3:])
 
     @property
@@ -103,11 +103,11 @@ class Track:
 
     @property
     def pointed_errors(self) -> Floats:
-        """Distance of the place where theta leads from the target next arrived at, in each frame, (T,)."""
+        """Distance of the target of theta from the target next arrived at, in each frame, (T,)."""
         arrivals = np.concatenate([act.leaves_s for act in self.acts])
-        places = np.concatenate([act.targets for act in self.acts])
-        following = np.minimum(np.searchsorted(arrivals, self.times_s), len(places) - 1)
-        return np.asarray(np.linalg.norm(self.pointed - places[following], axis=1))
+        targets = np.concatenate([act.targets for act in self.acts])
+        following = np.minimum(np.searchsorted(arrivals, self.times_s), len(targets) - 1)
+        return np.asarray(np.linalg.norm(self.pointed - targets[following], axis=1))
 
     def frames_of(self, act: Performed) -> NDArray[np.bool_]:
         """Which frames show a performance, (T,)."""
@@ -127,53 +127,53 @@ class Track:
         """Whether a performance is lost."""
         return self.longest_off_s(act) >= LOST_S - 1e-9
 
-    def says_lost(self, act: Performed) -> bool:
-        """Whether the tracker itself says in a performance that it lost the arm."""
-        return bool(self.said_lost[self.frames_of(act)].any())
+    def reports_lost(self, act: Performed) -> bool:
+        """Whether the tracker reports in a performance that it lost the arm."""
+        return bool(self.reported_lost[self.frames_of(act)].any())
 
-    def detection(self, act: Performed, place: int) -> dict[str, Any] | None:
-        """The detected target whose time is nearest to when the hand arrives at a place, None if none is near."""
-        first, last = act.arrives_s[place] - TARGET_MARGIN_S, act.leaves_s[place] + TARGET_MARGIN_S
+    def detection(self, act: Performed, index: int) -> dict[str, Any] | None:
+        """The detected target whose time is nearest to when the hand arrives at a target, None if none is near."""
+        first, last = act.arrives_s[index] - TARGET_MARGIN_S, act.leaves_s[index] + TARGET_MARGIN_S
         near = [one for one in self.detected if first <= one["time_s"] <= last]
-        return min(near, key=lambda one: abs(one["time_s"] - act.arrives_s[place])) if near else None
+        return min(near, key=lambda one: abs(one["time_s"] - act.arrives_s[index])) if near else None
 
-    def target_error(self, act: Performed, place: int) -> float:
+    def target_error(self, act: Performed, index: int) -> float:
         """Distance of a detected from the true target, m; infinite where none was detected."""
-        found = self.detection(act, place)
-        return float("inf") if found is None else self._apart(np.array(found["place"]), act.targets[place])
+        detected = self.detection(act, index)
+        return float("inf") if detected is None else self._apart(np.array(detected["place"]), act.targets[index])
 
     def target_errors(self) -> list[float]:
         """Of all targets of all performances, m."""
-        return [self.target_error(act, place) for act in self.acts for place in range(len(act.targets))]
+        return [self.target_error(act, index) for act in self.acts for index in range(len(act.targets))]
 
     def target_angles(self) -> list[float]:
         """Between the directions of detected and true targets from the shoulder, rad; infinite where none is."""
-        found = []
+        angles = []
         for act in self.acts:
-            for place, true in enumerate(act.targets):
-                detected = self.detection(act, place)
-                found.append(float("inf") if detected is None else self._angle(np.array(detected["place"]), true))
-        return found
+            for index, true in enumerate(act.targets):
+                detected = self.detection(act, index)
+                angles.append(float("inf") if detected is None else self._angle(np.array(detected["place"]), true))
+        return angles
 
     def _angle(self, first: Floats, second: Floats) -> float:
-        """Between two places as seen from the shoulder at the beginning, rad."""
+        """Between two positions, from the shoulder at the beginning, rad."""
         lines = np.stack([first, second]) - self.true_poses[0, :3]
         across = np.linalg.norm(np.cross(lines[0], lines[1]))
         return float(np.arctan2(across, lines[0] @ lines[1]))
 
     def model_errors(self) -> list[float]:
-        """Of the places that the models infer from all true poses at once, m: what no tracker can do much better."""
+        """Of the targets that the models infer from all true poses at once, m: what no tracker can do much better."""
         return [
             self._apart(act.from_true_poses, act.targets[0]) for act in self.acts if act.from_true_poses is not None
         ]
 
-    def _apart(self, place: Floats, true: Floats) -> float:
-        """Between two places, m. How far away a recorded person's target is is not asked for."""
+    def _apart(self, position: Floats, true: Floats) -> float:
+        """Between two positions, m; without the distance from the shoulder for a recorded person's target."""
         if self.kind in ("recorded", BY_OTHERS):
             shoulder = self.true_poses[0, :3]
-            line = place - shoulder
-            place = shoulder + np.linalg.norm(true - shoulder) / np.linalg.norm(line) * line
-        return float(np.linalg.norm(place - true))
+            line = position - shoulder
+            position = shoulder + np.linalg.norm(true - shoulder) / np.linalg.norm(line) * line
+        return float(np.linalg.norm(position - true))
 
     def posterior_at(self, action: str, time_s: float) -> float:
         """Of an action in the last frame that is not later than a time."""
@@ -184,7 +184,7 @@ class Track:
         """Whether the performed action is the more probable one when the object is grasped (6.7.2)."""
         return self.posterior_at(act.action, act.grasp_s) > RECOGNISED
 
-    def said_dual(self, act: Performed) -> bool:
+    def reported_dual(self, act: Performed) -> bool:
         """Whether a target was reported with a redirect: shortly after redirecting was more than half-way (6.7.3)."""
         late = self.times_s[self.frames_of(act) & (self._late_redirect > RECOGNISED)]
         return any(
@@ -197,7 +197,7 @@ class Track:
         return any(one["actions"][0] == REDIRECT for one in self._reported(act))
 
     def late_redirect(self, act: Performed) -> float:
-        """Greatest posterior of redirecting with progress above one half, within a performance (6.7.3)."""
+        """Maximum posterior of redirecting with progress above one half, within a performance (6.7.3)."""
         return float(self._late_redirect[self.frames_of(act)].max())
 
     def _reported(self, act: Performed) -> list[dict[str, Any]]:
@@ -220,7 +220,7 @@ class Track:
 
 
 def _performed(act: Mapping[str, Any]) -> Performed:
-    grasp, told = act["grasp_s"], act.get("from_true_poses")
+    grasp, inferred = act["grasp_s"], act.get("from_true_poses")
     return Performed(
         str(act["action"]),
         float(act["start_s"]),
@@ -229,5 +229,5 @@ def _performed(act: Mapping[str, Any]) -> Performed:
         np.array(act["arrives_s"]),
         np.array(act["leaves_s"]),
         float("nan") if grasp is None else float(grasp),
-        None if told is None else np.array(told),
+        None if inferred is None else np.array(inferred),
     )

@@ -32,7 +32,7 @@ from studies.chapter6.tables import (
 from studies.chapter6.vocabularies import BY_OTHERS
 
 DATA = (
-    "Rendered performances of persons who differ from the demonstrator of the models in size, proportions, place, "
+    "Rendered performances of persons who differ from the demonstrator of the models in size, proportions, position, "
     "timing and habits, with clutter, shadows, textured sleeves and noise; recorded persons' movements; cameras and "
     "measures with errors. Everything counts: no performance is left out."
 )
@@ -44,13 +44,13 @@ LOST = (
 WHY_DEPTH = (
     "A camera sees the arm's outline. A hand that moves 5 cm across the line of sight moves by many pixels; 5 cm "
     "along it only makes it a little larger or smaller, which is less than the errors of the measured sizes (3 %) and "
-    "of the matched contour. What is known of depth comes from the models: which places and ways are usual. Where "
-    "these leave a choice, the way out for the way back, a single view can take the wrong one, and follow it."
+    "of the matched contour. What is known of depth comes from the models: which targets and paths are usual. Where "
+    "these leave a choice, the path out for the path back, a single view can take the wrong one, and follow it."
 )
 MODELS = (
-    "The place that an action's model infers if it is told all true poses of a performance at once, instead of images: "
-    "persons move otherwise than the model has learned, and recorded persons do not point exactly. Errors of the "
-    "tracker beside these are those of seeing."
+    "The target that an action's model infers from all true poses of a performance at once, instead of images: "
+    "persons move otherwise than the model has learned, and recorded persons do not point exactly. Larger errors of "
+    "the tracker come from the images."
 )
 ONE_CLIP = (
     "The clip whose hand error with all cameras is the median of its kind. Grey: the hand is at a target; blue: a "
@@ -63,7 +63,7 @@ TITLES = {
     "pointing": "Pointing with one and several views (6.7.1.2)",
     "pointing_far": "Pointing far (6.7.1.3)",
     "pouring": "Pouring into a teapot (6.7.1.4)",
-    "box": "Telling actions apart (6.7.2)",
+    "box": "Recognition of actions (6.7.2)",
     "complex": "Complex actions (6.7.3)",
     "recorded": "Recorded persons",
     BY_OTHERS: "Recorded persons, tracked with a model of the two others",
@@ -76,7 +76,7 @@ def write_results(
     """Writes `report.html` and `chapter6.json` into the folder. Returns the numbers and the goals.
 
     Args:
-        results: of all pieces of work. clips: by name; those that are missing are shown without images.
+        results: of all pieces of work. clips: by name; tracks of missing ones have no images.
     """
     folder.mkdir(parents=True, exist_ok=True)
     tracks = [Track(result) for result in results]
@@ -128,17 +128,19 @@ def _numbers(
 ) -> list[str]:
     parts = [
         section("Goals", f"{DATA} {LOST}", goals_table(goals, held_out)),
-        section("Beside the thesis", "The thesis tells of one to three performances each.", findings_table(findings)),
+        section(
+            "Compared with the thesis", "The thesis reports one to three performances each.", findings_table(findings)
+        ),
         section("All cases", LOST, cases_table(summary["cases"])),
-        section("What the models know", MODELS, models_table(summary["models"])),
+        section("Errors of the models", MODELS, models_table(summary["models"])),
         section("Lost performances", "With the matched likelihood, by clip and cameras.", _folded(summary["tracks"])),
     ]
     if summary["table 6.1"] is not None:
-        told = (
+        text = (
             "“estimate”: the best hypothesis (6.16); “median”: the same after a median over five frames; “refined”: "
             "the pose drawn to the mean of the hypotheses around (6.18). Axes are ours: the thesis's y stands under x."
         )
-        parts.append(section("The hand at 50 fps (table 6.1)", told, hand_table(summary["table 6.1"])))
+        parts.append(section("The hand at 50 fps (table 6.1)", text, hand_table(summary["table 6.1"])))
     return parts
 
 
@@ -158,18 +160,18 @@ def _single_views(tracks: Sequence[Track], summary: Mapping[str, Any], clips: Ma
 
 
 def _worst(single: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
-    """The track with the greatest error in depth among those that are not lost, seen by its own and another camera."""
-    kept = [track for track in single if not any(track.is_lost(act) for act in track.acts) and track.clip in clips]
-    if not kept:
+    """The track with the maximum error in depth among those that are not lost, in its own and another camera."""
+    tracked = [track for track in single if not any(track.is_lost(act) for act in track.acts) and track.clip in clips]
+    if not tracked:
         return []
-    worst = max(kept, key=lambda track: float((track.sight_errors()[0] ** 2).mean()))
+    worst = max(tracked, key=lambda track: float((track.sight_errors()[0] ** 2).mean()))
     own = worst.views[0]
     why = (
         f"{worst.clip}, tracked by camera {own + 1}: of all tracks with one camera that are not lost, the one with the "
-        "greatest error along the line of sight. In its own camera the outline fits; another camera shows the error."
+        "maximum error along the line of sight. In its own camera the outline fits; another camera shows the error."
     )
-    shown = [(worst, own), (worst, ACROSS[own])]
-    return [section("The same error from the side", why, strip(clips[worst.clip], shown, "an arm too near or too far"))]
+    rows = [(worst, own), (worst, ACROSS[own])]
+    return [section("The same error from the side", why, strip(clips[worst.clip], rows, "an arm too near or too far"))]
 
 
 def _kinds(tracks: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
@@ -178,11 +180,11 @@ def _kinds(tracks: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
     errors = {kind: _errors(chosen(tracks, kinds=[kind]), targets=True) for kind in kinds}
     hands = {kind: _errors(chosen(tracks, kinds=[kind]), targets=False) for kind in kinds}
     size = (max(2.0 * len(kinds), 6.0), 2.8)
-    told = "Share of detected targets, and of frames, whose error is below a length; what was not detected never is."
+    text = "Fraction of detected targets, and of frames, whose error is below a length; undetected ones never are."
     draw = drawing.distributions
     plots = drawn(partial(draw, kinds=errors, title="target, cm", maximum=15.0), size)
     plots += drawn(partial(draw, kinds=hands, title="hand, cm", maximum=15.0), size)
-    parts.append(section("All errors", told, plots))
+    parts.append(section("All errors", text, plots))
     for kind in kinds:
         own = typical(chosen(tracks, kinds=[kind]))
         why = f"{ONE_CLIP} Here: {own[0].clip}."
@@ -192,13 +194,13 @@ def _kinds(tracks: Sequence[Track], clips: Mapping[str, Clip]) -> list[str]:
 
 def _errors(tracks: Sequence[Track], *, targets: bool) -> dict[str, Floats]:
     """Errors in cm of all tracks of each set of views."""
-    found = {}
+    errors = {}
     for case in (FOUR, SINGLE, TWO):
         own = [track for track in tracks if case_of(track) == case]
         if own:
             parts = [track.target_errors() if targets else np.linalg.norm(track.hand_errors, axis=1) for track in own]
-            found[case] = 100.0 * np.concatenate([np.asarray(one) for one in parts])
-    return found
+            errors[case] = 100.0 * np.concatenate([np.asarray(one) for one in parts])
+    return errors
 
 
 def typical(tracks: Sequence[Track]) -> list[Track]:
@@ -211,24 +213,24 @@ def typical(tracks: Sequence[Track]) -> list[Track]:
 
 
 def _one_clip(kind: str, own: Sequence[Track], clip: Clip | None) -> str:
-    seen = strip(clip, _shown(own), f"{kind}: images with the estimated arm") if clip is not None else ""
+    images = strip(clip, _rows(own), f"{kind}: images with the estimated arm") if clip is not None else ""
     plots = drawn(partial(drawing.over_time, tracks=own), (11.0, 5.0))
     few = [track for track in own if len(track.views) != 2]
     plots += drawn(partial(drawing.deviations, tracks=few), (11.0, 2.4))
     if kind == FAST_KIND:
-        plots += drawn(partial(drawing.hand_beside_truth, track=own[0]), (11.0, 4.6))
+        plots += drawn(partial(drawing.hand_and_truth, track=own[0]), (11.0, 4.6))
     if len(own[0].actions) > 1:
         camera_2 = [track for track in own if track.views == (1,)]
         for track in (own[0], *camera_2):
             plots += drawn(partial(drawing.posteriors, track=track), (11.0, 1.6 + 1.1 * len(track.actions)))
-    return seen + plots
+    return images + plots
 
 
-def _shown(own: Sequence[Track]) -> list[tuple[Track, int]]:
+def _rows(own: Sequence[Track]) -> list[tuple[Track, int]]:
     """Which tracks of a clip are shown in which views: all cameras in two, camera 2 alone in its own and another."""
     if len(own[0].views) == 1:
         return [(own[0], own[0].views[0])]
     alone = [track for track in own if len(track.views) == 1]
     second = next((track for track in alone if track.views == (1,)), alone[0] if alone else None)
-    shown = [(own[0], 0), (own[0], 1)]
-    return shown if second is None else [*shown, (second, second.views[0]), (second, ACROSS[second.views[0]])]
+    rows = [(own[0], 0), (own[0], 1)]
+    return rows if second is None else [*rows, (second, second.views[0]), (second, ACROSS[second.views[0]])]

@@ -18,8 +18,8 @@ TABLE_KINDS = ("pointing", "pouring", "box", "complex")
 """Seen by four cameras, with targets within reach."""
 SLOW_KINDS = tuple(kind.name for kind in KINDS if not kind.one_view)
 FAST_KIND = "pointing_50fps"
-KEPT_CM = 100.0 * LOST_M[1]
-"""Frames with a greater error are those of an arm that is lost: what lies along the line of sight is then chance."""
+TRACKED_CM = 100.0 * LOST_M[1]
+"""Frames with a greater error are those of a lost arm: the part along the line of sight is then chance."""
 PHASES = ("elsewhere", "at the target")
 
 
@@ -53,23 +53,23 @@ def summarised(tracks: Sequence[Track]) -> dict[str, Any]:
         "recognition": {case: recognition(chosen(tracks, kinds=["box"], case=case)) for case in (FOUR, SINGLE, TWO)},
         "complex": {case: dual(chosen(tracks, kinds=["complex"], case=case)) for case in (FOUR, SINGLE, TWO)},
         "models": models(tracks),
-        "tracks": [told(track) for track in tracks],
+        "tracks": [track_numbers(track) for track in tracks],
         "cameras": cameras(chosen(tracks, kinds=SLOW_KINDS, case=SINGLE)),
     }
 
 
 def models(tracks: Sequence[Track]) -> dict[str, Any]:
-    """For each kind the errors, cm, of the place that the model infers from all true poses of a performance at once."""
-    found = {}
+    """For each kind the errors, cm, of the target that the model infers from all true poses of an execution at once."""
+    errors_by_kind = {}
     for kind in TRACKED_KINDS:
         clips = {track.clip: track for track in tracks if track.kind == kind}
         errors = 100.0 * np.array([error for track in clips.values() for error in track.model_errors()])
         if len(errors):
-            found[kind] = {"of": len(errors), "median": quantile(errors, 0.5), "p90": quantile(errors, 0.9)}
-    return found
+            errors_by_kind[kind] = {"of": len(errors), "median": quantile(errors, 0.5), "p90": quantile(errors, 0.9)}
+    return errors_by_kind
 
 
-def told(track: Track) -> dict[str, Any]:
+def track_numbers(track: Track) -> dict[str, Any]:
     """One track: errors in cm, and of each performance the longest time for which the hand was off, s."""
     return {
         "clip": track.clip,
@@ -81,7 +81,7 @@ def told(track: Track) -> dict[str, Any]:
         "targets": [100.0 * error for error in track.target_errors()],
         "off_s": [track.longest_off_s(act) for act in track.acts],
         "lost": [track.is_lost(act) for act in track.acts],
-        "said_lost": [track.says_lost(act) for act in track.acts],
+        "said_lost": [track.reports_lost(act) for act in track.acts],
     }
 
 
@@ -97,10 +97,10 @@ def cases(tracks: Sequence[Track]) -> list[dict[str, Any]]:
 
 
 def _by_views(tracks: Sequence[Track]) -> dict[str, list[Track]]:
-    found = {case: [one for one in tracks if case_of(one) == case] for case in (FOUR, TWO, SINGLE)}
+    parts = {case: [one for one in tracks if case_of(one) == case] for case in (FOUR, TWO, SINGLE)}
     for camera in range(4):
-        found[f"camera {camera + 1}"] = [one for one in tracks if one.views == (camera,)]
-    return {name: part for name, part in found.items() if part}
+        parts[f"camera {camera + 1}"] = [one for one in tracks if one.views == (camera,)]
+    return {name: part for name, part in parts.items() if part}
 
 
 def accuracy(tracks: Sequence[Track]) -> dict[str, Any]:
@@ -111,7 +111,7 @@ def accuracy(tracks: Sequence[Track]) -> dict[str, Any]:
     angles = np.degrees([angle for track in tracks for angle in track.target_angles()])
     acts = [(track, act) for track in tracks for act in track.acts]
     lost = [track.is_lost(act) for track, act in acts]
-    said = [track.says_lost(act) for track, act in acts]
+    reported = [track.reports_lost(act) for track, act in acts]
     return {
         "tracks": len(tracks),
         "performances": len(acts),
@@ -125,38 +125,38 @@ def accuracy(tracks: Sequence[Track]) -> dict[str, Any]:
         "target_median_deg": quantile(angles, 0.5),
         "undetected": int(np.isinf(targets).sum()),
         "lost": int(np.sum(lost)),
-        "said_lost": int(np.sum(said)),
-        "lost_and_said": int(np.sum(np.logical_and(lost, said))),
+        "said_lost": int(np.sum(reported)),
+        "lost_and_said": int(np.sum(np.logical_and(lost, reported))),
         "effective_median": float(np.median(np.concatenate([track.effective for track in tracks]))),
         "ms": float(1e3 * np.median(np.concatenate([track.seconds for track in tracks]))),
     }
 
 
-def quantile(values: Floats, share: float) -> float:
-    """The smallest value that at least this share of the values does not exceed; infinite ones count."""
-    return float(np.quantile(values, share, method="inverted_cdf"))
+def quantile(values: Floats, fraction: float) -> float:
+    """The smallest value that at least this fraction of the values does not exceed; infinite ones count."""
+    return float(np.quantile(values, fraction, method="inverted_cdf"))
 
 
 def table_6_1(tracks: Sequence[Track]) -> dict[str, Any] | None:
-    """Mean, RMS and greatest absolute error of the hand per axis, cm: at 50 fps, of one view."""
+    """Mean, RMS and maximum absolute error of the hand per axis, cm: at 50 fps, of one view."""
     if not tracks:
         return None
-    of = {
+    parts_of = {
         "median": [track.median_errors for track in tracks],
         "estimate": [track.best_errors for track in tracks],
         "refined": [track.hand_errors for track in tracks],
     }
-    found = {}
-    for name, parts in of.items():
+    rows = {}
+    for name, parts in parts_of.items():
         errors = 100.0 * np.concatenate(parts)
-        found[f"{name}: mean"] = np.abs(errors).mean(axis=0).tolist()
-        found[f"{name}: RMS"] = np.sqrt((errors**2).mean(axis=0)).tolist()
-        found[f"{name}: max"] = np.abs(errors).max(axis=0).tolist()
-    return found
+        rows[f"{name}: mean"] = np.abs(errors).mean(axis=0).tolist()
+        rows[f"{name}: RMS"] = np.sqrt((errors**2).mean(axis=0)).tolist()
+        rows[f"{name}: max"] = np.abs(errors).max(axis=0).tolist()
+    return rows
 
 
 def recognition(tracks: Sequence[Track]) -> dict[str, Any] | None:
-    """How many of the carrying actions are told apart when the object is grasped."""
+    """How many of the carrying actions are recognised when the object is grasped."""
     acts = [(track, act) for track in tracks for act in track.acts]
     if not acts:
         return None
@@ -165,14 +165,14 @@ def recognition(tracks: Sequence[Track]) -> dict[str, Any] | None:
 
 
 def dual(tracks: Sequence[Track]) -> dict[str, Any] | None:
-    """How many simple and dual pointing actions are told apart, and the errors of both targets of the dual, cm."""
+    """How many simple and dual pointing actions are recognised, and the errors of both targets of the dual, cm."""
     acts = [(track, act) for track in tracks for act in track.acts]
     if not acts:
         return None
-    right = [track.said_dual(act) == (act.action == DUAL) for track, act in acts]
+    right = [track.reported_dual(act) == (act.action == DUAL) for track, act in acts]
     named = [track.named_dual(act) == (act.action == DUAL) for track, act in acts]
     late = [(track.late_redirect(act) > RECOGNISED) == (act.action == DUAL) for track, act in acts]
-    both = [[100.0 * track.target_error(act, place) for place in (0, 1)] for track, act in acts if act.action == DUAL]
+    both = [[100.0 * track.target_error(act, index) for index in (0, 1)] for track, act in acts if act.action == DUAL]
     medians = [quantile(errors, 0.5) for errors in np.array(both).reshape(-1, 2).T] if both else [np.nan, np.nan]
     return {
         "of": len(right),
@@ -187,13 +187,13 @@ def dual(tracks: Sequence[Track]) -> dict[str, Any] | None:
 
 
 def cameras(tracks: Sequence[Track]) -> dict[str, Any]:
-    """For each camera alone: errors of the hand along the line of sight and across it, where, and what is seen."""
-    found = {}
+    """For each camera alone: errors of the hand along the line of sight and across it, and where; its size."""
+    by_camera = {}
     for camera in range(4):
         own = [track for track in tracks if track.views == (camera,)]
         if own:
-            found[f"camera {camera + 1}"] = _of_camera(own)
-    return found
+            by_camera[f"camera {camera + 1}"] = _of_camera(own)
+    return by_camera
 
 
 def _of_camera(tracks: Sequence[Track]) -> dict[str, Any]:
@@ -205,16 +205,16 @@ def _of_camera(tracks: Sequence[Track]) -> dict[str, Any]:
     distance = np.concatenate([_distances(track) for track in tracks])
     focal = float(np.mean([_sight(track)["focal_px"] for track in tracks]))
     squared = along**2 + across**2
-    kept = squared < KEPT_CM**2
-    spread = [track.hand_deviations[track.frames_of(act)] for track in tracks for act in track.acts]
+    tracked = squared < TRACKED_CM**2
+    deviations = [track.hand_deviations[track.frames_of(act)] for track in tracks for act in track.acts]
     return {
         "depth_rms": _rms(along),
         "across_rms": _rms(across),
         "depth_share": float((along**2).sum() / max(float(squared.sum()), 1e-12)),
-        "depth_rms_of_kept": _rms(along[kept]),
-        "across_rms_of_kept": _rms(across[kept]),
-        "depth_share_of_kept": float((along[kept] ** 2).sum() / max(float(squared[kept].sum()), 1e-12)),
-        "deviations": (100.0 * np.concatenate(spread).mean(axis=0)).tolist(),
+        "depth_rms_of_kept": _rms(along[tracked]),
+        "across_rms_of_kept": _rms(across[tracked]),
+        "depth_share_of_kept": float((along[tracked] ** 2).sum() / max(float(squared[tracked].sum()), 1e-12)),
+        "deviations": (100.0 * np.concatenate(deviations).mean(axis=0)).tolist(),
         "hand_rms": np.sqrt((errors**2).mean(axis=0)).tolist(),
         **{
             f"depth_rms {phase}": _rms(along[where])

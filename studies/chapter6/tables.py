@@ -25,7 +25,7 @@ def met(goal: Goal) -> str:
 
 
 def goals_table(goals: Sequence[Goal], held_out: Sequence[Goal]) -> str:
-    """Goals: wanted, measured over all clips, and over those that were never used for tuning."""
+    """Goals: required, measured over all clips, and over those that were never used for tuning."""
     apart = {goal.what: goal for goal in held_out}
     rows = []
     for goal in goals:
@@ -33,20 +33,20 @@ def goals_table(goals: Sequence[Goal], held_out: Sequence[Goal]) -> str:
         cells = [escape(cell) for cell in goal[:4]]
         of_third = ["–", MARKS["–"]] if other is None else [escape(other.measured), MARKS[met(other)]]
         rows.append((*cells, MARKS[met(goal)], *of_third))
-    return table(("goal", "wanted", "measured", "of", "met", "held-out third", "met there"), rows)
+    return table(("goal", "required", "measured", "of", "met", "held-out third", "met there"), rows)
 
 
 def findings_table(findings: Sequence[Finding]) -> str:
-    """What the thesis saw, and what is seen here."""
+    """What the thesis observed, and what is observed here."""
     rows = [(*map(escape, finding[:3]), MARKS[finding.verdict]) for finding in findings]
     return table(("where", "the thesis", "here", "the same"), rows)
 
 
-def hand_table(found: Mapping[str, Sequence[float]]) -> str:
+def hand_table(errors: Mapping[str, Sequence[float]]) -> str:
     """Table 6.1 and ours."""
     rows = [
         (escape(name), *(f"{value:.2f}" for value in values), *_thesis(TABLE_6_1.get(name)))
-        for name, values in found.items()
+        for name, values in errors.items()
     ]
     heads = ("50 fps, one view", "x, cm", "y, cm", "z, cm", "thesis x", "thesis y", "thesis z")
     return table(heads, rows, numbers=range(1, 7))
@@ -86,14 +86,14 @@ def cases_table(rows: Sequence[Mapping[str, Any]]) -> str:
             "median, ° from the shoulder",
             "not detected",
             "lost",
-            "said to be lost (and was)",
+            "reported as lost (and was)",
         ),
         *("effective particles", "ms a frame, one core"),
     )
     return table(heads, cells, numbers=range(3, 17))
 
 
-def cameras_table(found: Mapping[str, Any]) -> str:
+def cameras_table(cameras: Mapping[str, Any]) -> str:
     """Where the errors of single views lie."""
     rows = [
         (
@@ -112,12 +112,12 @@ def cameras_table(found: Mapping[str, Any]) -> str:
             f"{100 * one['share_larger_per_5cm_depth']:.1f} %",
             f"{one['lost']} of {one['performances']}",
         )
-        for name, one in found.items()
+        for name, one in cameras.items()
     ]
     heads = (
-        *("alone", "depth, RMS cm", "across", "share of depth", "depth, frames within 25 cm", "across, same frames"),
+        *("alone", "depth, RMS cm", "across", "fraction of depth", "depth, frames within 25 cm", "across, same frames"),
         *(
-            "share of depth, same frames",
+            "fraction of depth, same frames",
             "depth at the target",
             "depth elsewhere",
             "x",
@@ -131,9 +131,9 @@ def cameras_table(found: Mapping[str, Any]) -> str:
     return table(heads, rows, numbers=range(1, 16))
 
 
-def models_table(found: Mapping[str, Any]) -> str:
+def models_table(models: Mapping[str, Any]) -> str:
     """What the models infer from true poses."""
-    rows = [(escape(kind), str(one["of"]), number(one["median"]), number(one["p90"])) for kind, one in found.items()]
+    rows = [(escape(kind), str(one["of"]), number(one["median"]), number(one["p90"])) for kind, one in models.items()]
     return table(("clips", "performances", "target, median cm", "90 %"), rows, numbers=(1, 2, 3))
 
 
@@ -153,10 +153,10 @@ def lost_table(tracks: Sequence[Mapping[str, Any]]) -> str:
         for act, lost in enumerate(track["lost"])
         if lost and track["likelihood"] == "matched"
     ]
-    heads = ("clip", "cameras", "performance", "off for, s", "said so", "targets of the clip, cm", "held out")
+    heads = ("clip", "cameras", "performance", "off for, s", "reported", "targets of the clip, cm", "held out")
     return table(heads, rows, numbers=(2, 3)) if rows else "<p>None.</p>"
 
 
 def number(value: float) -> str:
-    """A length, or that it is not known or without end."""
+    """A length, a dash if unknown, ∞ if infinite."""
     return "–" if value != value else "∞" if value == float("inf") else f"{value:.2f}"

@@ -1,4 +1,4 @@
-"""One clip tracked as an application would track it, and what is kept of that (thesis 6.7)."""
+"""One clip tracked as an application would track it, and the stored estimates (thesis 6.7)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sim.persons.performances import Act
 from studies.chapter6.vocabularies import Knowledge, knowledge_of
 
 LENGTH_DIGITS = 4
-"""Lengths are kept in m to 0.1 mm."""
+"""Lengths are stored in m to 0.1 mm."""
 
 
 def tracked_clip(
@@ -32,15 +32,14 @@ def tracked_clip(
 
     Args:
         views: numbers of the cameras, from 0. seed: of the filter. data: folder of recorded people.
-        known: what the tracker is given, see `knowledge_of`; by default that of the clip's kind.
+        known: kind whose models the tracker gets, see `knowledge_of`; by default that of the clip's kind.
     """
     clip = read_clip(folder)
     knowledge = knowledge_of(known or clip.kind, clip.number, data)
     follower = Follower(clip, views, knowledge, likelihood, seed)
     for time_s, images in zip(clip.times_s, clip.frames(views), strict=True):
         follower.see(float(time_s), [images[view] for view in views])
-    found = follower.found()
-    return {"values": found, "truth": _truth(clip, knowledge), "sight": _sight(clip, views)}
+    return {"values": follower.estimates(), "truth": _truth(clip, knowledge), "sight": _sight(clip, views)}
 
 
 class Follower:
@@ -70,14 +69,18 @@ class Follower:
             self._detect(time_s, estimate.target)
 
     def _detect(self, time_s: float, target: DetectedTarget) -> None:
-        """The latest word on each target, when it was first said, and all actions that it was said of."""
+        """The latest report of each target, the time of its first report, and all actions that it was reported with."""
         if not self._detected or self._detected[-1]["number"] != target.number:
             self._detected.append({"number": target.number, "said_s": round(time_s, 4), "actions": []})
         last = self._detected[-1]
         if target.action not in last["actions"]:
             last["actions"].append(target.action)
-        place = self._knowledge.pointed(target.place, self.placement)
-        last |= {"time_s": round(target.time_s, 4), "place": _lengths(place), "deviation": round(target.deviation, 4)}
+        position = self._knowledge.pointed(target.place, self.placement)
+        last |= {
+            "time_s": round(target.time_s, 4),
+            "place": _lengths(position),
+            "deviation": round(target.deviation, 4),
+        }
 
     def found(self) -> dict[str, Any]:
         """All estimates, one entry per frame; lengths in m."""
@@ -114,18 +117,18 @@ def _truth(clip: Clip, knowledge: Knowledge) -> dict[str, Any]:
                 "arrives_s": act.arrives_s.tolist(),
                 "leaves_s": act.leaves_s.tolist(),
                 "grasp_s": None if np.isnan(act.grasp_s) else act.grasp_s,
-                "from_true_poses": place_from_true_poses(clip, act, knowledge),
+                "from_true_poses": target_from_true_poses(clip, act, knowledge),
             }
             for act in truth.acts
         ],
     }
 
 
-def place_from_true_poses(clip: Clip, act: Act, knowledge: Knowledge) -> list[float] | None:
-    """Where the action's model believes a performance to lead if it is told all true poses at once, (3,), m.
+def target_from_true_poses(clip: Clip, act: Act, knowledge: Knowledge) -> list[float] | None:
+    """The target that the action's model infers from all true poses of a performance at once, (3,), m.
 
     No tracker can be expected to do much better: persons move otherwise than the model learned. None for an action
-    that has no model of its own. A recorded person's model knows the way out only.
+    that has no model of its own. A recorded person's model knows the path out only.
     """
     names = knowledge.vocabulary.names
     if act.action not in names:
@@ -139,9 +142,9 @@ def place_from_true_poses(clip: Clip, act: Act, knowledge: Knowledge) -> list[fl
     placement = PersonPlacement.of_arm(truth.shoulder, truth.sizes.length)
     points = np.concatenate([truth.poses, truth.wrist], axis=1)[inside, : action.pose_size]
     theta = action.model.estimate(placement.in_model(points)).theta
-    place = knowledge.pointed(placement.in_world(action.target(theta)), placement)
-    found: list[float] = _lengths(place)
-    return found
+    position = knowledge.pointed(placement.in_world(action.target(theta)), placement)
+    target: list[float] = _lengths(position)
+    return target
 
 
 def _sight(clip: Clip, views: Sequence[int]) -> dict[str, Any] | None:

@@ -33,8 +33,8 @@ after:
   withdraw(b): point(a)
 switching: {share: 0.1, before: 0.8}
 """
-"""Simple and dual pointing, figure 6.26. What follows a place may be taken for the other until late: where the second
-place is not known, few hypotheses of going on to it are near the right one, and at first going back fits better."""
+"""Simple and dual pointing, figure 6.26. What follows a target may be taken for the other until late: where the second
+target is not known, few hypotheses of going on to it are near the right one, and at first going back fits better."""
 
 ACTIONS: dict[str, tuple[str, ...]] = {
     "pointing_50fps": ("pointing",),
@@ -52,12 +52,12 @@ BY_OTHERS = "recorded_by_others"
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What a tracker is given.
+    """The models of a tracker.
 
     Attributes:
         vocabulary, grammar: of the actions.
-        pointed: from the place where the tracker's theta leads (3,) and the person's placement to the place that is
-            meant in the world, (3,), m.
+        pointed: from the target of the tracker's theta (3,) and the person's placement to the target
+            in the world, (3,), m.
     """
 
     vocabulary: Vocabulary
@@ -68,8 +68,8 @@ class Knowledge:
 def knowledge_of(kind: str, number: int, folder: Path | None = None) -> Knowledge:
     """What is known when a clip is tracked.
 
-    Of a recorded person: what this person showed in all other directions (kind "recorded"), or what the other persons
-    showed in all directions (`BY_OTHERS`).
+    Of a recorded person: this person's demonstrations in all other directions (kind "recorded"), or the other persons'
+    demonstrations in all directions (`BY_OTHERS`).
 
     Args:
         kind, number: of the clip. folder: of the recordings; only for recorded persons.
@@ -96,18 +96,18 @@ def _knowledge(kind: str) -> Knowledge:
     return Knowledge(vocabulary, grammar, on_far_plane if kind == "pointing_far" else as_it_is)
 
 
-def as_it_is(place: Floats, placement: PersonPlacement) -> Floats:
-    """A place within reach is the place that is meant."""
-    return place
+def as_it_is(target: Floats, placement: PersonPlacement) -> Floats:
+    """A target within reach is the target itself."""
+    return target
 
 
-def on_far_plane(place: Floats, placement: PersonPlacement) -> Floats:
-    """Where the line from the person's eye through a far place meets the plane, which stands in the world. (3,), m.
+def on_far_plane(target: Floats, placement: PersonPlacement) -> Floats:
+    """Where the line from the person's eye through a far target meets the plane, which stands in the world. (3,), m.
 
     The models' plane grows with the person; the plane that is pointed at does not.
     """
     eye = placement.in_world(EYE)
-    line = place - eye
+    line = target - eye
     return np.asarray(eye + (FAR_ORIGIN[0] - eye[0]) / line[0] * line)
 
 
@@ -119,9 +119,9 @@ def _action(name: str) -> ActionModel:
 def _recorded_action(subject: int, target: int | None, folder: Path | None) -> ActionModel:
     """Of the person without the movements to a target, or, without one, of all other persons."""
     if target is None:
-        told, show = f"without person {subject}", partial(recorded_demonstrations, subject, folder)
+        description, show = f"without person {subject}", partial(recorded_demonstrations, subject, folder)
     else:
-        told = f"person {subject} without target {target}"
+        description = f"person {subject} without target {target}"
         show = partial(recorded_demonstrations, None, folder, of_subject=subject, without_target=target)
-    source = f"pointing27 {told}, {folder or 'usual folder'}"
+    source = f"pointing27 {description}, {folder or 'usual folder'}"
     return cached_action("recorded_pointing", source, show, target=direction_place)

@@ -29,7 +29,8 @@ def kills(
     jobs: Annotated[int, typer.Option(min=1, help="runs at the same time; times are only of worth with 1")] = 1,
     json_file: JsonFileOption = None,
     runs: Annotated[
-        Path | None, typer.Option(help="where runs and results are kept (default: runs/kills); finished ones are used")
+        Path | None,
+        typer.Option(help="where runs and results are stored (default: runs/kills); finished ones are used"),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="world of all runs")] = 0,
     pace: Annotated[
@@ -37,9 +38,9 @@ def kills(
     ] = 1.0,
     again: Annotated[bool, typer.Option("--again", help="every case again, also those with a result")] = False,
 ) -> None:
-    """Kill (KILL) and stop (STOP) every process of the running demo, the launcher too, at three moments each.
+    """Kill (KILL) and stop (STOP) every process of the running demo, the launcher too, in three phases each.
 
-    Each run is the real launch in real time. Moments: moving, rest, holding. Measured: when it is reported, when the
+    Each run is the real launch in real time. Phases: moving, rest, holding. Measured: when it is reported, when the
     process is back, whether the arm ever jumped, how the run ends, what is left over. Ctrl-C and the same command
     again: goes on with the cases that are missing. Exit codes: 0 all passed; 3 not all did; 130 interrupted.
     """
@@ -89,11 +90,11 @@ def faults(
         Console(stderr=True, highlight=False, markup=False).print(str(error), soft_wrap=True)
         code = exit_codes.INPUT_MISSING if isinstance(error, FileNotFoundError) else exit_codes.CONFIGURATION
         raise typer.Exit(code) from error
-    wanted = _names(section)
+    chosen = _names(section)
     known = sorted({row.id[0] for row in rows})
-    if unknown := [letter for letter in wanted if letter not in known]:
+    if unknown := [letter for letter in chosen if letter not in known]:
         raise typer.BadParameter(f"no section {', '.join(unknown)} with rows; there are {', '.join(known)}")
-    rows = [row for row in rows if not wanted or row.id[0] in wanted]
+    rows = [row for row in rows if not chosen or row.id[0] in chosen]
     with Progress(*PROGRESS, console=console) as progress:
         task = progress.add_task("tests", total=None)
         try:
@@ -136,16 +137,16 @@ def _perform(missing: list[Any], options: Any, results: dict[str, dict[str, Any]
         try:
             run_cases(missing, options, begun, ended)
         except KeyboardInterrupt:
-            console.print(f"interrupted; {len(results)} results are kept in {options.folder}", soft_wrap=True)
+            console.print(f"interrupted; {len(results)} results are stored in {options.folder}", soft_wrap=True)
             raise typer.Exit(130) from None
 
 
 def _fault_table(results: list[Any]) -> Table:
     counts = {name: sum(result.outcome == name for result in results) for name in _STYLES}
-    said = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    summary = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
     table = Table(show_edge=False, pad_edge=False, show_footer=True)
     table.add_column("id")
-    table.add_column("fault", footer=f"{len(results)} faults: {said}")
+    table.add_column("fault", footer=f"{len(results)} faults: {summary}")
     table.add_column("what happens")
     table.add_column("tests", justify="right", footer=str(sum(r.passed + r.failed + r.skipped for r in results)))
     table.add_column("result")

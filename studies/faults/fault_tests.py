@@ -1,4 +1,4 @@
-"""Runs the tests of the table of faults, and says row by row what came out."""
+"""Runs the tests of the table of faults, and reports the result of each row."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class TestsNotRunError(RuntimeError):
 
 @dataclass(frozen=True)
 class RowResult:
-    """What the tests of a row said.
+    """The result of the tests of a row.
 
     Attributes:
         outcome: "passed" (all that ran), "failed", "skipped" (all) or "missing" (there is no such test).
@@ -62,16 +62,16 @@ def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int
     Raises:
         TestsNotRunError: pytest itself failed.
     """
-    wanted = list(
+    chosen = list(
         dict.fromkeys(test for row in rows for test in row.tests if (workspace / test.split("::")[0]).exists())
     )
     with tempfile.TemporaryDirectory(prefix="paramove-faults-") as folder:
         file = Path(folder) / "results.jsonl"
         file.touch()
         command = [sys.executable, "-m", "pytest", "-q", "--no-header", "--tb=line", "--continue-on-collection-errors"]
-        command += ["-p", "no:cacheprovider", "-p", "studies.faults.pytest_results", *wanted]
-        found_by = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # the plugin too
-        environment = os.environ | {FILE_VARIABLE: str(file), "PYTHONPATH": found_by}
+        command += ["-p", "no:cacheprovider", "-p", "studies.faults.pytest_results", *chosen]
+        search_path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # the plugin too
+        environment = os.environ | {FILE_VARIABLE: str(file), "PYTHONPATH": search_path}
         with (Path(folder) / "output").open("w+", encoding="utf-8") as output:
             process = subprocess.Popen(
                 command, cwd=workspace, env=environment, stdout=output, stderr=output, stdin=subprocess.DEVNULL
@@ -82,20 +82,22 @@ def run_tests(rows: Sequence[FaultRow], workspace: Path, progress: Callable[[int
                 if process.poll() is None:
                     process.terminate()
                 process.wait()
-            told = [line for line in _read(file) if "test" in line]
-            if process.returncode not in _ALL_RAN or not told:
+            reported = [line for line in _read(file) if "test" in line]
+            if process.returncode not in _ALL_RAN or not reported:
                 output.seek(0)
-                said = output.read()[-2000:]
-                raise TestsNotRunError(f"pytest ended with {process.returncode} after {len(told)} tests:\n{said}")
-    return judge(rows, told)
+                printed = output.read()[-2000:]
+                raise TestsNotRunError(
+                    f"pytest ended with {process.returncode} after {len(reported)} tests:\n{printed}"
+                )
+    return judge(rows, reported)
 
 
-def judge(rows: Iterable[FaultRow], told: Sequence[dict[str, Any]]) -> list[RowResult]:
-    """What the rows' tests said, from one dict per test: `test`, `outcome`, `message`."""
+def judge(rows: Iterable[FaultRow], reported: Sequence[dict[str, Any]]) -> list[RowResult]:
+    """The results of the rows, from one dict per test: `test`, `outcome`, `message`."""
     results = []
     for row in rows:
-        own = [line for line in told if any(_is_of(line["test"], test) for test in row.tests)]
-        missing = [test for test in row.tests if not any(_is_of(line["test"], test) for line in told)]
+        own = [line for line in reported if any(_is_of(line["test"], test) for test in row.tests)]
+        missing = [test for test in row.tests if not any(_is_of(line["test"], test) for line in reported)]
         counts = {name: sum(line["outcome"] == name for line in own) for name in ("passed", "failed", "skipped")}
         worst = next((line for name in ("failed", "skipped") for line in own if line["outcome"] == name), None)
         message = " ".join(worst["message"]) if worst else ""
@@ -117,9 +119,9 @@ def _follow(process: subprocess.Popen[bytes], file: Path, progress: Callable[[in
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(LOOK_S)
-        told = _read(file)
-        done = {line["test"] for line in told if "test" in line}
-        progress(len(done), max((line["collected"] for line in told if "collected" in line), default=0))
+        reported = _read(file)
+        done = {line["test"] for line in reported if "test" in line}
+        progress(len(done), max((line["collected"] for line in reported if "collected" in line), default=0))
         if process.returncode is not None:
             return
 

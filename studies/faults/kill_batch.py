@@ -1,4 +1,4 @@
-"""All cases of an evaluation by kills, run by run; results are kept, so that it can be interrupted and gone on with."""
+"""All cases of an evaluation by kills, run by run; results are stored, so that an interrupted one continues."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class KillOptions:
 
     Attributes:
         workspace: Root of the workspace.
-        folder: Where runs and results are kept.
+        folder: Where runs and results are stored.
         jobs: Runs at the same time; each uses about two cores, and times are only those of an idle machine with one.
         seed, pace: Of the world, see `LiveRun`.
     """
@@ -37,12 +37,12 @@ class KillOptions:
 
 
 def result_file(folder: Path, case: KillCase) -> Path:
-    """Where the result of a case is kept."""
+    """Where the result of a case is stored."""
     return folder / f"{case.name}.json"
 
 
 def finished(folder: Path, cases: Sequence[KillCase]) -> dict[str, dict[str, Any]]:
-    """Results that are there already, by the cases' names."""
+    """Stored results, by the cases' names."""
     paths = {case.name: result_file(folder, case) for case in cases}
     return {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items() if path.is_file()}
 
@@ -55,8 +55,8 @@ def run_cases(
 ) -> None:
     """Perform all cases; `begun` and `ended` are called in this thread.
 
-    A case whose run ended before its moment came is made again in another run, up to three times in all.
-    A KeyboardInterrupt ends the runs under way in order; their cases have no result then.
+    A case whose run ended before its phase began is repeated in another run, up to three times in all.
+    A KeyboardInterrupt ends the current runs in order; their cases have no result then.
     """
     options.folder.mkdir(parents=True, exist_ok=True)
     waiting = [(group, 1) for group in runs_of(cases)]
@@ -75,7 +75,7 @@ def run_cases(
                     waiting += [(group, attempt + 1) for group in runs_of(again)]
                     for result in future.result():
                         if result.case not in again:
-                            _keep(options.folder, result)
+                            _store(options.folder, result)
                             ended(result)
         except KeyboardInterrupt:
             interrupted.set()
@@ -93,7 +93,7 @@ def _perform(
         return []
 
 
-def _keep(folder: Path, result: KillResult) -> None:
+def _store(folder: Path, result: KillResult) -> None:
     with replacing(result_file(folder, result.case)) as unfinished:
         text = json.dumps(result.as_json(), indent=2, sort_keys=True, ensure_ascii=False)
         unfinished.write_text(text + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Which process is killed or stopped at which moment, and what must happen then."""
+"""Which process is killed or stopped in which phase of a run, and what must happen then."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ MOMENTS = {
 
 
 class CaseError(ValueError):
-    """No such node, signal or moment; the message names those that there are."""
+    """No such node, signal or phase; the message names the valid ones."""
 
 
 class Expected(enum.Enum):
     """What must follow."""
 
     GOES_ON = "goes on"  # restarted, and the run goes on
-    ENDS_BACK = "ends, back"  # restarted, and then the run ends with a sentence
-    ENDS = "ends"  # the run ends with a sentence
+    ENDS_BACK = "ends, back"  # restarted, and then the run ends with a message
+    ENDS = "ends"  # the run ends with a message
     ALL_END = "all end"  # the launcher was killed: nothing may outlive it
-    UNHARMED = "unharmed"  # the launcher was stopped and goes on: as if nothing had been
+    UNHARMED = "unharmed"  # the launcher was stopped and goes on: as if nothing had happened
 
 
 @dataclass(frozen=True)
 class KillCase:
-    """One process, one signal, one moment."""
+    """One process, one signal, one phase of the run."""
 
     node: str
     signal: str
@@ -53,7 +53,7 @@ class KillCase:
 
 
 def expected_of(node: str, signal_name: str, file: LaunchFile) -> Expected:
-    """What the launch file says must happen."""
+    """What must happen according to the launch file."""
     if node == LAUNCHER:
         return Expected.ALL_END if signal_name == "KILL" else Expected.UNHARMED
     settings = file.nodes[node]
@@ -65,14 +65,14 @@ def expected_of(node: str, signal_name: str, file: LaunchFile) -> Expected:
 def cases_of(
     file: LaunchFile, nodes: Sequence[str] = (), signals: Sequence[str] = (), moments: Sequence[str] = ()
 ) -> list[KillCase]:
-    """The cases asked for, all where nothing is asked for; raises CaseError."""
+    """The requested cases, all of them without a request; raises CaseError."""
     known = {"node": [*file.nodes, LAUNCHER], "signal": list(SIGNALS), "moment": list(MOMENTS)}
-    wanted = {"node": nodes, "signal": signals, "moment": moments}
-    for what, names in wanted.items():
+    requested = {"node": nodes, "signal": signals, "moment": moments}
+    for what, names in requested.items():
         for name in names:
             if name not in known[what]:
                 raise CaseError(f"no {what} {name!r}; there are {', '.join(known[what])}")
-    chosen = {what: names or known[what] for what, names in wanted.items()}
+    chosen = {what: names or known[what] for what, names in requested.items()}
     return [
         KillCase(node, name, moment, expected_of(node, name, file))
         for name in chosen["signal"]

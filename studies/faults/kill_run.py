@@ -23,7 +23,7 @@ from studies.faults.live_run import LiveRun
 REPORT_MS = 50.0
 RESTART_S = 2.0
 GOES_ON_S = 8.0
-SETTLE_S = 60.0  # for the moment to come, for a node to be ready again, for a goal to be done
+SETTLE_S = 60.0  # for the phase to begin, for a node to be ready again, for a goal to be done
 END_S = 30.0
 GONE_S = 3.0
 STOPPED_LAUNCHER_S = 1.5
@@ -79,7 +79,7 @@ class KillRun:
         folder: Of this run's files.
         domain: Of the bus.
         seed, pace: Of the world.
-        interrupted: Asked again and again; the run is given up when it says yes.
+        interrupted: Called in a loop; the run is given up when it returns True.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class KillRun:
         self._interrupted = interrupted
 
     def perform(self, cases: Sequence[KillCase]) -> list[KillResult]:
-        """Start the demo, perform the cases as their moments come, end it; raises InterruptedRunError."""
+        """Start the demo, perform each case in its phase, end it; raises InterruptedRunError."""
         results = [KillResult(case) for case in cases]
         with LiveRun(self._workspace, self._folder, self._domain, self._seed, self._pace) as run:
             waiting = list(results)
@@ -120,16 +120,16 @@ class KillRun:
         return results
 
     def _next(self, run: LiveRun, waiting: list[KillResult]) -> KillResult | None:
-        """Waits for the moment of one of the cases; None, and told in all of them, if none comes."""
-        found: list[KillResult] = []
+        """Waits for the phase of one of the cases; None, noted in all of them, if none begins."""
+        ready: list[KillResult] = []
 
-        def come() -> bool:
-            found.extend(result for result in waiting if run.is_moment(result.case.moment))
-            return bool(found)
+        def begun() -> bool:
+            ready.extend(result for result in waiting if run.is_moment(result.case.moment))
+            return bool(ready)
 
-        if self._until(run, come, SETTLE_S):
-            return found[0]
-        why = "the moment never came" if run.alive else f"the run had ended before: {run.last_sentence}"
+        if self._until(run, begun, SETTLE_S):
+            return ready[0]
+        why = "its phase never began" if run.alive else f"the run had ended before: {run.last_sentence}"
         for result in waiting:
             result.not_sent = why
         return None
@@ -182,7 +182,7 @@ class KillRun:
             result.sentence = str(ready.get("sentence", ""))
 
     def _follow_end(self, run: LiveRun, result: KillResult, struck_ns: int) -> None:
-        """The run must end by itself, with a sentence that names the node and what befell it."""
+        """The run must end by itself, with a message that names the node and what happened to it."""
         node = result.case.node
         if not self._until(run, lambda: not run.alive, END_S):
             result.problems.append(f"the run did not end within {END_S:g} s")
@@ -192,11 +192,11 @@ class KillRun:
         result.sentence = run.last_sentence
         if result.exit_code != exit_codes.FAILURE:
             result.problems.append(f"exit code {result.exit_code}, expected {exit_codes.FAILURE}")
-        wanted = [node, f"SIG{result.case.signal}"]
-        wanted += ["is back", "disarmed"] if result.case.expected is Expected.ENDS_BACK else []
-        missing = [word for word in wanted if not re.search(rf"\b{word}\b", result.sentence)]
+        expected = [node, f"SIG{result.case.signal}"]
+        expected += ["is back", "disarmed"] if result.case.expected is Expected.ENDS_BACK else []
+        missing = [word for word in expected if not re.search(rf"\b{word}\b", result.sentence)]
         if missing:
-            result.problems.append(f"the last sentence does not say {', '.join(missing)}: {result.sentence}")
+            result.problems.append(f"the last message lacks {', '.join(missing)}: {result.sentence}")
 
     def _follow_launcher(self, run: LiveRun, result: KillResult, struck_ns: int) -> None:
         if result.case.signal == "KILL":
@@ -205,7 +205,7 @@ class KillRun:
             _wait(lambda: "launcher" in run.last_sentence)
             result.sentence = run.last_sentence
             if "launcher" not in result.sentence:
-                result.problems.append(f"nobody says that the launcher was killed; last: {result.sentence}")
+                result.problems.append(f"no message that the launcher was killed; last: {result.sentence}")
             if not _wait(lambda: not left_over(run.domain, run.bus_folder.parent)):
                 result.problems.append("nodes outlive the launcher by more than 3 s")
             result.end_s = (time.monotonic_ns() - struck_ns) * 1e-9

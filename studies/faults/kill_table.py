@@ -10,8 +10,8 @@ from rich.text import Text
 
 LEGEND = (
     "reported: from the signal to the launcher's log; restarted, ready: from the signal to the new process and to its "
-    "word that it is ready; ended: to the end of the whole run; step: largest step of any joint in a millisecond, in "
-    "the firmware's own log of the whole run, as a share of what is allowed; pace: simulated seconds per second"
+    "report that it is ready; ended: to the end of the whole run; step: largest step of any joint in a millisecond, in "
+    "the firmware's own log of the whole run, as a fraction of the allowed one; pace: simulated seconds per second"
 )
 _NUMBERS = (
     ("reported\nms", "report_ms", "{:.0f}"),
@@ -47,7 +47,7 @@ def table_of(results: Sequence[dict[str, Any]]) -> Table:
 
 
 def problems_of(results: Sequence[dict[str, Any]]) -> list[str]:
-    """One line per problem, per lateness and per case that was never made."""
+    """One line per problem, per delay and per case that was never run."""
     return [
         f"{result['case']['node']} {result['case']['signal']} {result['case']['moment']}: {problem} "
         f"({result['run_folder']})"

@@ -15,37 +15,37 @@ from paramove.bus import is_alive
 def processes_of(domain: str) -> list[tuple[int, str]]:
     """Id and command of living processes whose environment names the domain.
 
-    Dead ones that nobody has waited for do not count.
+    Zombies do not count.
     """
-    found = []
+    processes = []
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error, OSError):  # it has just ended
             named = process.environ().get("PARAMOVE_DOMAIN") == domain and process.pid != os.getpid()
             if named and process.status() not in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
-                found.append((process.pid, " ".join(process.cmdline()[1:4])))
-    return found
+                processes.append((process.pid, " ".join(process.cmdline()[1:4])))
+    return processes
 
 
 def left_over(domain: str, runtime: Path) -> list[str]:
-    """In words, what is left of a run that has ended: processes, sockets that are listened at, locks that are held.
+    """Messages on what is left of a run that has ended: processes, open sockets, locks that are held.
 
     Args:
         domain: Of the run.
         runtime: Folder above the domain's.
     """
-    words = [f"process {pid} ({command})" for pid, command in processes_of(domain)]
-    places = [runtime / domain, runtime / f"truth-{domain}"]
+    messages = [f"process {pid} ({command})" for pid, command in processes_of(domain)]
+    folders = [runtime / domain, runtime / f"truth-{domain}"]
     with contextlib.suppress(FileNotFoundError):
-        places[1].chmod(0o700)  # nobody may list it while a run goes on
-    # A folder that goes meanwhile is passed over, as `rglob` does not.
-    files = [Path(top) / name for place in places for top, _, names in os.walk(place) for name in names]
+        folders[1].chmod(0o700)  # it cannot be listed while a run goes on
+    # A folder that vanishes meanwhile is passed over, as `rglob` does not.
+    files = [Path(top) / name for folder in folders for top, _, names in os.walk(folder) for name in names]
     files.append(runtime / f"{domain}.lock")
     for path in files:
         if path.is_socket() and is_alive(path):
-            words.append(f"socket {path.name} is listened at")
+            messages.append(f"socket {path.name} is open")
         elif path.suffix == ".lock" and _held(path):
-            words.append(f"lock {path.name} is held")
-    return words
+            messages.append(f"lock {path.name} is held")
+    return messages
 
 
 def _held(path: Path) -> bool:

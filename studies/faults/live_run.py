@@ -1,4 +1,4 @@
-"""The demo under observation while it runs in real time: its launcher, its events, and what is said on its bus."""
+"""The demo under observation while it runs in real time: its launcher, its events, and the messages on its bus."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from studies.faults.kill_cases import LAUNCHER
 APPLICATION = "rule_learning"
 LOOK_S = 0.01
 STEADY_S = {"moving": 0.4, "rest": 0.5, "holding": 0.2}
-"""So long must a moment last already when it is used."""
+"""A phase counts after this time."""
 STOP_S = 30.0
 
-_HEARD = (topics.WIRE_HOAP3_STATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
+_TOPICS = (topics.WIRE_HOAP3_STATE, topics.RELOCATION_STATUS, topics.ARM_SAFETY)
 OVERLAY = """\
-# Made for this run: it is ended on purpose, so nobody judges it; the firmware logs every frame that it plays.
+# Made for this run: it is ended on purpose, so it is not judged; the firmware logs every frame that it plays.
 after_run: null
 nodes:
   simulator:
@@ -39,7 +39,7 @@ class LiveRun:
 
     Args:
         workspace: Root of the workspace.
-        folder: Where run folder and output are kept; made if need be.
+        folder: Of run folder and output; created if missing.
         domain: Of the bus, not used by anything else.
         seed: Of the world.
         pace: Simulated seconds per second, less than 1 for a machine that is too slow or too busy.
@@ -114,18 +114,18 @@ class LiveRun:
         self._read_events()
         if self._exchange is None and (self.bus_folder / "clock").exists():
             self._exchange = Exchange("onlooker", BusSettings(folder=self.bus_folder))
-            for topic in _HEARD:
+            for topic in _TOPICS:
                 self._exchange.subscribe(topic)
         if self._exchange is None:
             time.sleep(wait_s)
             return
         self._exchange.wait(wait_s)
-        for heard in self._exchange.take(topic.name for topic in _HEARD):
-            self._take(heard.topic, heard.message)
+        for received in self._exchange.take(topic.name for topic in _TOPICS):
+            self._take(received.topic, received.message)
         self._note_moments()
 
     def is_moment(self, name: str) -> bool:
-        """Whether it is the moment `name` now, and has been for a little."""
+        """Whether the run is in the phase `name`, for `STEADY_S` at least."""
         since = self._since.get(name)
         return since is not None and time.monotonic() - since >= STEADY_S[name]
 

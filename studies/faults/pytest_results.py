@@ -1,4 +1,4 @@
-"""A pytest plugin (`-p studies.faults.pytest_results`) that tells each test's result as a line of JSON.
+"""A pytest plugin (`-p studies.faults.pytest_results`) that reports each test's result as a line of JSON.
 
 The lines go to the file that the environment variable PARAMOVE_FAULT_RESULTS names.
 """

@@ -23,33 +23,38 @@ FOLDER = Path("runs/evaluation/imitation")
 def imitation(
     seeds: Annotated[str, typer.Option(help="synthetic demonstrators: 7, 0-4 or 0,3,5-7")] = "0-4",
     repetitions: Annotated[int, typer.Option(min=2, help="demonstrations that a reference averages")] = 40,
-    raster: Annotated[bool, typer.Option("--raster/--no-raster", help="also targets all over the table")] = True,
+    grid: Annotated[bool, typer.Option("--grid/--no-grid", help="also targets all over the table")] = True,
+    raster: Annotated[bool | None, typer.Option("--raster/--no-raster", hidden=True)] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="where the report goes (default: runs/evaluation/imitation)")
     ] = None,
 ) -> None:
-    """Compare the robot's reaching with the person's: errors of gripper and elbow, beside those of thesis 5.2.7.
+    """Compare the robot's reaching with the person's: errors of gripper and elbow, compared with thesis 5.2.7.
 
     Writes report.html, imitation.json and the plots. Exit codes: 0 every goal is met; 3 some are not, and the report
-    says in which states and why.
+    shows in which states and why.
     """
     from studies.imitation.experiment import Setup, run_experiment
     from studies.imitation.report import write_results
     from studies.imitation.thesis import compared
 
+    if raster is not None:  # the spelling until 0.2
+        old, new = ("--raster", "--grid") if raster else ("--no-raster", "--no-grid")
+        typer.echo(f"{old} is now {new}; the old spelling works for one more release", err=True)
+        grid = raster
     console = Console(highlight=False, emoji=False)
-    wanted, workspace = seeds_in(seeds), Workspace.here().root
+    workspace = Workspace.here().root
     cache = user_cache_path("paramove")
     cache.mkdir(parents=True, exist_ok=True)
-    setup = Setup(Path("hoap3"), tuple(wanted), repetitions, raster, cache)
+    setup = Setup(Path("hoap3"), tuple(seeds_in(seeds)), repetitions, grid, cache)
     with console.status("training") as status:
         experiment = run_experiment(setup, status.update)
         folder = (report or workspace / FOLDER).resolve()
         numbers = write_results(experiment, folder)
     rows = compared(numbers)
     Console(highlight=False, emoji=False, width=max(console.width, 100)).print(_table(rows))
-    for sentence in numbers["why"]:
-        console.print(f"\n{sentence}", markup=False)
+    for message in numbers["why"]:
+        console.print(f"\n{message}", markup=False)
     console.print(f"\nreport: {folder / 'report.html'}", markup=False, soft_wrap=True)
     raise typer.Exit(exit_codes.OK if all(one.met is not False for one in rows) else exit_codes.JUDGED_A_FAILURE)
 
@@ -65,5 +70,5 @@ def _table(rows: list[Compared]) -> Table:
         mark = {True: "[green]met[/]", False: "[red]not met[/]", None: ""}[one.met]
         goal = "" if one.row.goal is None else f"≤ {one.row.goal:g}"
         values = ["–" if value is None else f"{value:.1f}" for value in (one.median, one.largest)]
-        table.add_row(one.row.words, one.row.place.name, one.row.thesis or "", *values, goal, mark)
+        table.add_row(one.row.text, one.row.target.name, one.row.thesis or "", *values, goal, mark)
     return table

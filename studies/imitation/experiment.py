@@ -17,25 +17,23 @@ from studies.imitation.reference import ReferenceKind, References, on_robot, ref
 
 
 @dataclass(frozen=True)
-class Place:
+class Target:
     """A target by its interpolation coordinates (u, v, w): forward, from right to left, up; all from 0 to 1."""
 
     name: str
     coordinates: tuple[float, float, float]
 
 
-CENTRE = Place("centre", (0.5, 0.5, 0.0))
-RIGHT_SIDE = Place("right side", (0.5, 0.0, 0.0))
-THESIS_PLACES = (CENTRE, RIGHT_SIDE)
+CENTRE = Target("centre", (0.5, 0.5, 0.0))
+RIGHT_SIDE = Target("right side", (0.5, 0.0, 0.0))
+THESIS_TARGETS = (CENTRE, RIGHT_SIDE)
 """t₁ and t₂ of 5.2.7. There v runs to the right, so that t₂ is (0.5, 1, 0)."""
 
 
-def raster() -> tuple[Place, ...]:
+def table_grid() -> tuple[Target, ...]:
     """Targets on the lower face of the cuboid between the demonstrated corners, 3 × 5 without the corners."""
-    places = [(u, v) for u in (0.0, 0.5, 1.0) for v in (0.0, 0.25, 0.5, 0.75, 1.0)]
-    return tuple(
-        Place(f"u {u:g}, v {v:g}", (u, v, 0.0)) for u, v in places if not (u in (0.0, 1.0) and v in (0.0, 1.0))
-    )
+    grid = [(u, v) for u in (0.0, 0.5, 1.0) for v in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    return tuple(Target(f"u {u:g}, v {v:g}", (u, v, 0.0)) for u, v in grid if not (u in (0.0, 1.0) and v in (0.0, 1.0)))
 
 
 @dataclass(frozen=True)
@@ -46,14 +44,14 @@ class Setup:
         robot_folder: Folder of the robot's description.
         seeds: Synthetic demonstrators' seeds, one experiment each.
         repetitions: Demonstrations per reference.
-        with_raster: Also targets all over the table.
+        with_grid: Also targets all over the table.
         cache: Folder for trained models.
     """
 
     robot_folder: Path
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     repetitions: int = 40
-    with_raster: bool = True
+    with_grid: bool = True
     cache: Path | None = None
 
 
@@ -63,7 +61,7 @@ class Comparison:
 
     Attributes:
         seed: Of the demonstrator.
-        place: The target.
+        target: What is reached for.
         reference: How the reference was trained.
         synthesised, linear, against: Movement of the interpolative model, the same with elbows interpolated as points
             (as the thesis does), and the reference.
@@ -71,7 +69,7 @@ class Comparison:
     """
 
     seed: int
-    place: Place
+    target: Target
     reference: ReferenceKind
     synthesised: Movement
     linear: Movement
@@ -94,9 +92,9 @@ class Experiment:
     lengths: tuple[float, float]
     comparisons: list[Comparison] = field(default_factory=list)
 
-    def of(self, place: Place, reference: ReferenceKind = "own") -> list[Comparison]:
+    def of(self, target: Target, reference: ReferenceKind = "own") -> list[Comparison]:
         """The comparisons of one target, one per seed."""
-        return [c for c in self.comparisons if c.place == place and c.reference == reference]
+        return [c for c in self.comparisons if c.target == target and c.reference == reference]
 
 
 def run_experiment(setup: Setup, progress: Callable[[str], None] = lambda _: None) -> Experiment:
@@ -114,14 +112,14 @@ def run_experiment(setup: Setup, progress: Callable[[str], None] = lambda _: Non
         movement = RobotMovement.from_model(model, solver.length)
         linear = RobotMovement.from_model(model, solver.length, elbow_interpolation="linear")
         references = References.of(model, seed, setup.repetitions)
-        for number, (place, kind) in enumerate(_wanted(setup)):
-            progress(f"demonstrator {seed}: {place.name}")
-            parameter = movement.grid.theta(np.array(place.coordinates))
-            target = model.grid_.theta(np.array(place.coordinates))
-            means = references.means(target, number, kind)
+        for number, (target, kind) in enumerate(_compared_targets(setup)):
+            progress(f"demonstrator {seed}: {target.name}")
+            parameter = movement.grid.theta(np.array(target.coordinates))
+            position = model.grid_.theta(np.array(target.coordinates))
+            means = references.means(position, number, kind)
             comparison = Comparison(
                 seed,
-                place,
+                target,
                 kind,
                 on_robot(movement.poses(parameter), solver),
                 on_robot(linear.poses(parameter), solver),
@@ -132,12 +130,12 @@ def run_experiment(setup: Setup, progress: Callable[[str], None] = lambda _: Non
     return experiment
 
 
-def _wanted(setup: Setup) -> list[tuple[Place, ReferenceKind]]:
-    wanted: list[tuple[Place, ReferenceKind]] = [(place, "own") for place in THESIS_PLACES]
-    if setup.with_raster:
-        known = {place.coordinates for place in THESIS_PLACES}
-        wanted += [(place, "own") for place in raster() if place.coordinates not in known]
-    return wanted + [(place, "global") for place in THESIS_PLACES]
+def _compared_targets(setup: Setup) -> list[tuple[Target, ReferenceKind]]:
+    compared: list[tuple[Target, ReferenceKind]] = [(target, "own") for target in THESIS_TARGETS]
+    if setup.with_grid:
+        known = {target.coordinates for target in THESIS_TARGETS}
+        compared += [(target, "own") for target in table_grid() if target.coordinates not in known]
+    return compared + [(target, "global") for target in THESIS_TARGETS]
 
 
 def maxima(comparison: Comparison) -> dict[str, Any]:
@@ -172,23 +170,23 @@ def maxima(comparison: Comparison) -> dict[str, Any]:
 
 def over_seeds(values: Iterable[float | None]) -> dict[str, float | None]:
     """Median and largest over the demonstrators."""
-    found = [value for value in values if value is not None]
-    if not found:
+    known = [value for value in values if value is not None]
+    if not known:
         return {"median": None, "max": None}
-    return {"median": float(np.median(found)), "max": float(np.max(found))}
+    return {"median": float(np.median(known)), "max": float(np.max(known))}
 
 
 def numbers_of(experiment: Experiment) -> dict[str, Any]:
     """Everything as plain numbers, for JSON."""
-    places: list[dict[str, Any]] = []
-    for place, kind in _wanted(experiment.setup):
-        comparisons = experiment.of(place, kind)
+    rows: list[dict[str, Any]] = []
+    for target, kind in _compared_targets(experiment.setup):
+        comparisons = experiment.of(target, kind)
         each = [maxima(comparison) for comparison in comparisons]
         names = [name for name in each[0] if name != "limited_states"]
-        places.append(
+        rows.append(
             {
-                "place": place.name,
-                "coordinates": list(place.coordinates),
+                "place": target.name,
+                "coordinates": list(target.coordinates),
                 "reference": kind,
                 "mm": {name: over_seeds(one[name] for one in each) for name in names},
                 "limited_states": [one["limited_states"] for one in each],
@@ -200,5 +198,5 @@ def numbers_of(experiment: Experiment) -> dict[str, Any]:
         "seeds": list(experiment.setup.seeds),
         "repetitions": experiment.setup.repetitions,
         "least_reach_mm": 1000.0 * experiment.min_reach,
-        "places": places,
+        "places": rows,
     }

@@ -15,12 +15,12 @@ from paramove.runs import STYLE
 from studies.imitation.errors import SIGNIFICANT, Errors
 from studies.imitation.experiment import (
     CENTRE,
-    THESIS_PLACES,
+    THESIS_TARGETS,
     Comparison,
     Experiment,
-    Place,
+    Target,
     maxima,
-    raster,
+    table_grid,
 )
 
 BLUE, RED, BLACK, MAGENTA, GREEN = "#2f6fc4", "#c8372d", "#1d2530", "#b0309a", "#1f7a45"
@@ -44,10 +44,10 @@ def png_of(draw: Callable[[Experiment, Figure], None], experiment: Experiment, s
 
 def gripper(experiment: Experiment, figure: Figure) -> None:
     """Figures 5.15 and 5.16: synthesis error of the gripper over the states."""
-    for axes, place, name in zip(_row(figure), THESIS_PLACES, ("5.15", "5.16"), strict=True):
-        _states(axes, experiment, place, f"{place.name} (figure {name})")
-        _line(axes, experiment, place, "gripper", GREEN, "‖r − r̂‖")
-        _line(axes, experiment, place, "gripper", GREEN, "the same after time warping", aligned=True)
+    for axes, target, name in zip(_row(figure), THESIS_TARGETS, ("5.15", "5.16"), strict=True):
+        _states(axes, experiment, target, f"{target.name} (figure {name})")
+        _line(axes, experiment, target, "gripper", GREEN, "‖r − r̂‖")
+        _line(axes, experiment, target, "gripper", GREEN, "the same after time warping", aligned=True)
         axes.hlines(8.0, *SIGNIFICANT, colors="#777777", linestyles=":", lw=1.2, label="thesis: below 8 mm")
         axes.set_ylim(0, None)
         axes.legend(loc="upper center")
@@ -56,14 +56,14 @@ def gripper(experiment: Experiment, figure: Figure) -> None:
 def elbow(experiment: Experiment, figure: Figure) -> None:
     """Figures 5.17 and 5.18: errors of the elbow over the states; below, after time warping."""
     rows = figure.subplots(2, 2, sharex=True, sharey=True)
-    for column, (place, name) in enumerate(zip(THESIS_PLACES, ("5.17", "5.18"), strict=True)):
+    for column, (target, name) in enumerate(zip(THESIS_TARGETS, ("5.17", "5.18"), strict=True)):
         for axes, aligned in ((rows[0, column], False), (rows[1, column], True)):
-            words = ", after time warping" if aligned else ""
-            _states(axes, experiment, place, f"{place.name}{words} (figure {name})")
+            alignment = ", after time warping" if aligned else ""
+            _states(axes, experiment, target, f"{target.name}{alignment} (figure {name})")
             for attribute, colour, label in ELBOW_LINES:
-                _line(axes, experiment, place, attribute, colour, label, aligned=aligned)
+                _line(axes, experiment, target, attribute, colour, label, aligned=aligned)
             if not aligned:
-                _line(axes, experiment, place, "elbow", "#8db4e8", "interpolated as a point", linear=True)
+                _line(axes, experiment, target, "elbow", "#8db4e8", "interpolated as a point", linear=True)
     rows[0, 0].set_xlabel("")
     rows[0, 1].set_xlabel("")
     handles, labels = rows[0, 0].get_legend_handles_labels()
@@ -74,14 +74,14 @@ def elbow(experiment: Experiment, figure: Figure) -> None:
 def limits(experiment: Experiment, figure: Figure) -> None:
     """What joint limits change: how far they are exceeded, and the errors with and without those states."""
     rows = figure.subplots(2, 2, sharex=True, height_ratios=(2, 1.3))
-    for column, place in enumerate(THESIS_PLACES):
+    for column, target in enumerate(THESIS_TARGETS):
         upper, lower = rows[0, column], rows[1, column]
-        _states(upper, experiment, place, place.name)
+        _states(upper, experiment, target, target.name)
         upper.set_xlabel("")
         for attribute, colour, label in (ELBOW_LINES[1], ELBOW_LINES[3]):
-            _line(upper, experiment, place, attribute, colour, f"{label}, closed form")
-            _line(upper, experiment, place, attribute, colour, f"{label}, within limits", executed=True)
-        limited = np.any([c.errors().limited for c in experiment.of(place)], axis=0)
+            _line(upper, experiment, target, attribute, colour, f"{label}, closed form")
+            _line(upper, experiment, target, attribute, colour, f"{label}, within limits", executed=True)
+        limited = np.any([c.errors().limited for c in experiment.of(target)], axis=0)
         for axes in (upper, lower):
             axes.fill_between(
                 np.arange(1, len(limited) + 1),
@@ -95,14 +95,14 @@ def limits(experiment: Experiment, figure: Figure) -> None:
                 transform=axes.get_xaxis_transform(),
                 label="a joint limit moves the elbow",
             )
-        _excess(lower, experiment, place)
+        _excess(lower, experiment, target)
         upper.set_ylim(0, None)
     handles, labels = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
 
 
-def _excess(axes: Axes, experiment: Experiment, place: Place) -> None:
-    comparisons = experiment.of(place)
+def _excess(axes: Axes, experiment: Experiment, target: Target) -> None:
+    comparisons = experiment.of(target)
     outside = np.rad2deg(np.max([c.synthesised.outside for c in comparisons], axis=0))
     turn = np.rad2deg(np.max([np.abs(c.synthesised.within_limits.elbow_turn) for c in comparisons], axis=0))
     states = np.arange(1, len(outside) + 1)
@@ -125,31 +125,31 @@ def over_the_table(experiment: Experiment, figure: Figure) -> None:
         ("effective_aligned", "effective, after time warping"),
     )
     all_axes = figure.subplots(2, 3, sharex=True, sharey=True)
-    for axes, (name, words) in zip(all_axes.flat, quantities, strict=True):
-        _map(axes, experiment, name, words)
+    for axes, (name, title) in zip(all_axes.flat, quantities, strict=True):
+        _map(axes, experiment, name, title)
 
 
-def _map(axes: Axes, experiment: Experiment, name: str, words: str) -> None:
-    found: list[tuple[float, float, float]] = []
-    for place in raster():
-        comparisons = experiment.of(_known(place))
+def _map(axes: Axes, experiment: Experiment, name: str, title: str) -> None:
+    errors: list[tuple[float, float, float]] = []
+    for target in table_grid():
+        comparisons = experiment.of(_known(target))
         if comparisons:
             value = float(np.median([maxima(comparison)[name] for comparison in comparisons]))
-            found.append((place.coordinates[1], place.coordinates[0], value))
-    across, forward, values = np.array(found).T
+            errors.append((target.coordinates[1], target.coordinates[0], value))
+    across, forward, values = np.array(errors).T
     axes.scatter(across, forward, c=values, cmap="YlOrRd", vmin=0, vmax=18, s=900, marker="s")
-    for v, u, value in found:
+    for v, u, value in errors:
         axes.text(v, u, f"{value:.1f}", ha="center", va="center", fontsize=9, c="white" if value > 12 else BLACK)
     axes.plot([0, 0, 1, 1], [0, 1, 0, 1], "k^", ms=7)
-    axes.set(title=f"{words}, mm", xlim=(1.15, -0.15), ylim=(-0.25, 1.25), yticks=[0, 0.5, 1], xticks=[0, 0.5, 1])
+    axes.set(title=f"{title}, mm", xlim=(1.15, -0.15), ylim=(-0.25, 1.25), yticks=[0, 0.5, 1], xticks=[0, 0.5, 1])
     axes.set_xticklabels(["right", "", "left"])
     axes.set_yticklabels(["near", "", "far"])
     axes.grid(visible=False)
 
 
-def _known(place: Place) -> Place:
-    same = [known for known in THESIS_PLACES if known.coordinates == place.coordinates]
-    return same[0] if same else place
+def _known(target: Target) -> Target:
+    same = [known for known in THESIS_TARGETS if known.coordinates == target.coordinates]
+    return same[0] if same else target
 
 
 def arms(experiment: Experiment, figure: Figure) -> None:
@@ -186,19 +186,19 @@ def _row(figure: Figure) -> list[Axes]:
     return list(figure.subplots(1, 2, sharey=True))
 
 
-def _states(axes: Axes, experiment: Experiment, place: Place, title: str) -> None:
+def _states(axes: Axes, experiment: Experiment, target: Target, title: str) -> None:
     axes.axvspan(*SIGNIFICANT, color="#eef2f6", lw=0, zorder=0)
-    reach = experiment.of(place)[0].reach_state
+    reach = experiment.of(target)[0].reach_state
     axes.axvline(reach, c="#999999", lw=0.8)
     axes.set(xlabel="state", ylabel="mm", title=title, xlim=(1, 80))
 
 
 def _line(
-    axes: Axes, experiment: Experiment, place: Place, attribute: str, colour: str, label: str, **how: bool
+    axes: Axes, experiment: Experiment, target: Target, attribute: str, colour: str, label: str, **how: bool
 ) -> None:
-    """Median over the demonstrators, with least and largest as a band."""
-    states = np.arange(1, len(experiment.of(place)[0].synthesised.outside) + 1)
-    errors: list[Errors] = [comparison.errors(**how) for comparison in experiment.of(place)]
+    """Median over the demonstrators, with minimum and maximum as a band."""
+    states = np.arange(1, len(experiment.of(target)[0].synthesised.outside) + 1)
+    errors: list[Errors] = [comparison.errors(**how) for comparison in experiment.of(target)]
     courses = np.array([np.interp(states, one.state, getattr(one, attribute)) for one in errors])
     dashed = how.get("executed", False) or (how.get("aligned", False) and attribute == "gripper")
     axes.plot(states, np.median(courses, axis=0), c=colour, lw=1.6, ls="--" if dashed else "-", label=label)

@@ -19,7 +19,7 @@ ReferenceKind = Literal["own", "global"]
 
 @dataclass(frozen=True)
 class References:
-    """Trains local models for targets that the interpolative model has not seen.
+    """Trains local models for targets that the interpolative model was not trained on.
 
     Attributes:
         model: The interpolative model: numbers of states and frames, scale and shoulder come from it.
@@ -36,9 +36,9 @@ class References:
     @classmethod
     def of(cls, model: InterpolativePHMM, seed: int, repetitions: int, training_repetitions: int = 10) -> References:
         """With the global model, trained again on the demonstrations that trained `model`."""
-        shown = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=training_repetitions)
+        demonstrations = reaching_grid_demonstrations(np.random.default_rng(seed), repetitions=training_repetitions)
         references = cls(model, seed, repetitions, None)
-        frames = [references._resampled(sequence) for sequence in shown.sequences]
+        frames = [references._resampled(sequence) for sequence in demonstrations.sequences]
         return cls(model, seed, repetitions, references._empty().fit(frames).parameters)
 
     def means(self, target: Floats, number: int, kind: ReferenceKind) -> Floats:
@@ -48,8 +48,8 @@ class References:
         the local models of the interpolative model are, its states aligned by the global model (3.4.1), (3.7).
         """
         rng = np.random.default_rng([self.seed, 1, number])
-        shown = demonstrations_at(target, rng, repetitions=self.repetitions)
-        frames = [self._resampled(sequence) for sequence in shown.sequences]
+        demonstrations = demonstrations_at(target, rng, repetitions=self.repetitions)
+        frames = [self._resampled(sequence) for sequence in demonstrations.sequences]
         if kind == "own":
             return self._empty().fit(frames).parameters.means
         if self.everything is None:
@@ -78,10 +78,10 @@ def on_robot(poses: ArmPoses, solver: ArmPoseSolver, options: RelocationOptions 
     keep_out = options or RelocationOptions()
     plain = solver.without_limits(poses.elbow, poses.gripper, poses.finger_to_thumb)
     gripper = solver.moved_outward(poses.gripper, keep_out.reach_margin, keep_out.reach_width)
-    kept = solver.solve(poses.elbow, gripper, poses.finger_to_thumb)
+    limited = solver.solve(poses.elbow, gripper, poses.finger_to_thumb)
     return Movement(
         poses,
         RobotArm(plain.elbow, poses.gripper, plain.elbow_turn),
-        RobotArm(kept.elbow, gripper, kept.elbow_turn),
+        RobotArm(limited.elbow, gripper, limited.elbow_turn),
         solver.outside_limits(plain.angles),
     )

@@ -17,7 +17,7 @@ TEXTS = {
     "gripper": (
         "The gripper (figures 5.15 and 5.16)",
         "Distance between the gripper of the synthesised movement and that of a local model trained for this very "
-        "target. Line: median over the demonstrators; band: least to largest. Grey: the significant states; the thin "
+        "target. Line: median over the demonstrators; band: minimum to maximum. Grey: the significant states; the thin "
         "line is where the target is reached. Outside the grey the resting hands differ.",
     ),
     "elbow": (
@@ -29,7 +29,7 @@ TEXTS = {
     "limits": (
         "Joint limits",
         "Full lines: the closed form of 5.2.4, which knows no limits, as in the thesis. Dashed: what the arm does, "
-        "with the gripper kept outside its least reach and the elbow turned where a limit asks for it. Below: by how "
+        "with the gripper kept outside its minimum reach and the elbow turned where a limit requires it. Below: by how "
         "many degrees the closed form exceeds limits (largest over the demonstrators).",
     ),
     "arms": (
@@ -39,9 +39,9 @@ TEXTS = {
     ),
     "table": (
         "All over the table",
-        "Held-out targets on the lower face of the demonstrated cuboid (triangles: demonstrated corners), seen by the "
-        "person. Medians over the demonstrators of the largest error in states 20-60 or at the target. What time "
-        "warping removes is a difference of progress: the same path, run through earlier or later.",
+        "Held-out targets on the lower face of the demonstrated cuboid (triangles: demonstrated corners), from the "
+        "person's side. Medians over the demonstrators of the largest error in states 20-60 or at the target. What "
+        "time warping removes is a difference of progress: the same path, run through earlier or later.",
     ),
 }
 
@@ -53,7 +53,7 @@ def write_results(experiment: Experiment, folder: Path) -> dict[str, Any]:
     rows = compared(numbers)
     numbers["goals"] = verdicts(rows)
     numbers["why"] = why(experiment)
-    names = [name for name, _, _ in PLOTS if name != "table" or experiment.setup.with_raster]
+    names = [name for name, _, _ in PLOTS if name != "table" or experiment.setup.with_grid]
     pictures = {name: png_of(draw, experiment, size) for name, draw, size in PLOTS if name in names}
     for name, picture in pictures.items():
         (folder / f"{name}.png").write_bytes(picture)
@@ -88,30 +88,30 @@ def _comparison(rows: list[Compared]) -> str:
     for one in rows:
         mark = {True: "<span class=yes>met</span>", False: "<span class=no>not met</span>", None: ""}[one.met]
         goal = "" if one.row.goal is None else f"≤ {one.row.goal:g}"
-        indent = " style='padding-left:18px'" if one.row.words.startswith(" ") else ""
+        indent = " style='padding-left:18px'" if one.row.text.startswith(" ") else ""
         lines.append(
-            f"<tr><td{indent}>{escape(one.row.words.strip())}</td><td>{escape(one.row.place.name)}</td>"
+            f"<tr><td{indent}>{escape(one.row.text.strip())}</td><td>{escape(one.row.target.name)}</td>"
             f"<td class=n>{escape(one.row.thesis or '')}</td><td class=n>{_mm(one.median)}</td>"
             f"<td class=n>{_mm(one.largest)}</td><td class=n>{goal}</td><td>{mark}</td></tr>"
         )
     return (
-        "<section><h2>The thesis's numbers beside ours</h2><p class=why>Largest error in states 20-60, mm, in the "
+        "<section><h2>Compared with the thesis</h2><p class=why>Largest error in states 20-60, mm, in the "
         "scale of the robot; median and largest over the demonstrators. Goals are held against the median.</p>"
         "<table><tr><th>error</th><th>target</th><th class=n>thesis</th><th class=n>median</th><th class=n>largest</th>"
         f"<th class=n>goal</th><th></th></tr>{''.join(lines)}</table></section>"
     )
 
 
-def _why(sentences: list[str]) -> str:
-    if not sentences:
+def _why(messages: list[str]) -> str:
+    if not messages:
         return ""
-    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    items = "".join(f"<li>{escape(message)}</li>" for message in messages)
     return f"<section><h2>What is missed, where, and why</h2><ul>{items}</ul></section>"
 
 
 def _limits(uses: list[LimitUse]) -> str:
     lines = "".join(
-        f"<tr><td>{escape(use.place.name)}</td><td>{escape(use.joint)}</td><td>{escape(use.states)}</td>"
+        f"<tr><td>{escape(use.target.name)}</td><td>{escape(use.joint)}</td><td>{escape(use.states)}</td>"
         f"<td class=n>{use.outside_deg:.1f}</td><td class=n>{use.elbow_turn_deg:.1f}</td>"
         f"<td class=n>{use.gripper_moved_mm:.1f}</td></tr>"
         for use in uses
@@ -125,9 +125,9 @@ def _limits(uses: list[LimitUse]) -> str:
 
 
 def _picture(name: str, picture: bytes) -> str:
-    heading, words = TEXTS[name]
-    shown = image(picture, heading)
-    return f"<section><h2>{escape(heading)}</h2><p class=why>{escape(words)}</p>{shown}</section>"
+    heading, text = TEXTS[name]
+    picture_html = image(picture, heading)
+    return f"<section><h2>{escape(heading)}</h2><p class=why>{escape(text)}</p>{picture_html}</section>"
 
 
 def _alignment(numbers: dict[str, Any]) -> str:
@@ -144,7 +144,7 @@ def _alignment(numbers: dict[str, Any]) -> str:
         "with the same time restrictions, as the thesis makes references in 4.2.4. Here its states are aligned by the "
         "global model of the training (3.4.1), as those of the corners are. At the centre such a reference runs ahead "
         "of the synthesised movement on the way out and behind on the way back. Time warping removes most of that. It "
-        "makes the summed distance of the whole movement least, resting hands included; the largest one in states "
+        "minimises the summed distance of the whole movement, resting hands included; the largest one in states "
         "20-60 can grow.</p><table><tr><th>target</th><th class=n>gripper</th>"
         "<th class=n>after warping</th><th class=n>effective elbow</th><th class=n>after warping</th></tr>"
         f"{lines}</table></section>"

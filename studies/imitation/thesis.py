@@ -1,11 +1,11 @@
-"""The thesis's figures (5.2.7) beside ours, and the goals made of them."""
+"""The thesis's figures (5.2.7) compared with ours, and the goals made of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from studies.imitation.experiment import CENTRE, RIGHT_SIDE, Place
+from studies.imitation.experiment import CENTRE, RIGHT_SIDE, Target
 
 
 @dataclass(frozen=True)
@@ -13,22 +13,22 @@ class Row:
     """One line of the comparison.
 
     Attributes:
-        words: What is compared.
+        text: What is compared.
         name: Its name among the numbers.
-        place: Where.
-        thesis: What the thesis says, mm; None if it gives no figure.
+        target: Where.
+        thesis: What the thesis reports, mm; None if it gives no figure.
         goal: Not more than this, mm; None if it is no goal.
     """
 
-    words: str
+    text: str
     name: str
-    place: Place
+    target: Target
     thesis: str | None
     goal: float | None = None
 
 
-def _both(words: str, name: str, thesis: tuple[str | None, str | None], goal: float | None = None) -> list[Row]:
-    return [Row(words, name, place, said, goal) for place, said in zip((CENTRE, RIGHT_SIDE), thesis, strict=True)]
+def _both(text: str, name: str, thesis: tuple[str | None, str | None], goal: float | None = None) -> list[Row]:
+    return [Row(text, name, target, figure, goal) for target, figure in zip((CENTRE, RIGHT_SIDE), thesis, strict=True)]
 
 
 ROWS: tuple[Row, ...] = (
@@ -69,8 +69,8 @@ class Compared:
 
 def compared(numbers: dict[str, Any]) -> list[Compared]:
     """The comparison, from the numbers of an experiment."""
-    found = {(one["place"], one["reference"]): one["mm"] for one in numbers["places"]}
-    ours = [(row, found[row.place.name, "own"][row.name]) for row in ROWS]
+    by_target = {(one["place"], one["reference"]): one["mm"] for one in numbers["places"]}
+    ours = [(row, by_target[row.target.name, "own"][row.name]) for row in ROWS]
     return [Compared(row, value["median"], value["max"]) for row, value in ours]
 
 
@@ -78,8 +78,8 @@ def verdicts(rows: list[Compared]) -> list[dict[str, Any]]:
     """The goals, for JSON."""
     return [
         {
-            "what": one.row.words,
-            "place": one.row.place.name,
+            "what": one.row.text,
+            "place": one.row.target.name,
             "goal_mm": one.row.goal,
             "thesis": one.row.thesis,
             "median_mm": one.median,

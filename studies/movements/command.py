@@ -1,4 +1,4 @@
-"""`python -m studies real` and `peers`: movement models on recorded people, and beside other methods."""
+"""`python -m studies real` and `peers`: movement models on recorded people, and compared with other methods."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rich.table import Table
 from paramove.cli import JsonFileOption, write_numbers
 from paramove.documents import exit_codes
 from paramove.workspace import Workspace
-from studies.terminal import say_error, stored_results
+from studies.terminal import print_error, stored_results
 
 if TYPE_CHECKING:
     from studies.movements.sweep import Row
@@ -38,7 +38,7 @@ class Scope(StrEnum):
 
 DataOption = Annotated[
     Path | None,
-    typer.Option(metavar="FOLDER", help="recordings (default: $PARAMOVE_DATA, or shared/data beside the clone)"),
+    typer.Option(metavar="FOLDER", help="recordings (default: $PARAMOVE_DATA, or shared/data next to the clone)"),
 ]
 OutOption = Annotated[Path | None, typer.Option(metavar="FOLDER", help="where report.html and movements.json go")]
 JobsOption = Annotated[int, typer.Option(min=1, help="processes at the same time")]
@@ -84,7 +84,7 @@ def peers(
     methods: MethodsOption = None,
     tasks: TasksOption = None,
 ) -> None:
-    """Measure this project's movement models beside other methods, by the same folds and resampling.
+    """Measure this project's movement models and compare them with other methods, by the same folds and resampling.
 
     Needs `pip install 'paramove[peers]'`; methods whose library is missing are named and left out. Ctrl-C and the same
     command again: goes on where it was. Exit codes: 0 measured; 66 no recordings, cluster or peer; 130 interrupted.
@@ -99,13 +99,15 @@ def peers(
     left_out = [name for name, names in absent.items() if names]
     notes = [f"not installed: {', '.join(without)}; left out: {', '.join(left_out)}"] if left_out else []
     for note in notes:
-        say_error(f"{note}. pip install 'paramove[peers]' brings them")
+        print_error(f"{note}. pip install 'paramove[peers]' brings them")
     if len(left_out) == len(theirs):
-        say_error("no peer is installed: pip install 'paramove[peers]' brings them")
+        print_error("no peer is installed: pip install 'paramove[peers]' brings them")
         raise typer.Exit(exit_codes.INPUT_MISSING)
     rows = _chosen([*our_rows(), *(row for row in theirs if not absent[row.name])], methods)
     folds = _tasks(on, data, tasks)
-    _compare("Movement models beside other methods", rows, folds, out, "peers", json_file, jobs, scheduler, notes)
+    _compare(
+        "Movement models compared with other methods", rows, folds, out, "peers", json_file, jobs, scheduler, notes
+    )
 
 
 def _chosen(rows: Sequence[Row], methods: list[str] | None) -> list[Row]:
@@ -115,23 +117,23 @@ def _chosen(rows: Sequence[Row], methods: list[str] | None) -> list[Row]:
     return chosen
 
 
-def _tasks(on: Scope, data: Path | None, wanted: list[str] | None) -> dict[str, list[Fold]]:
+def _tasks(on: Scope, data: Path | None, names: list[str] | None) -> dict[str, list[Fold]]:
     from paramove.demonstrations import RecordingsError
-    from studies.movements.tasks import raster_tasks, real_tasks
+    from studies.movements.tasks import grid_tasks, real_tasks
 
     folds: dict[str, list[Fold]] = {}
     try:
         if on is not Scope.RASTER:
             folds |= real_tasks(data)
         if on is not Scope.REAL:
-            folds |= raster_tasks()
+            folds |= grid_tasks()
     except RecordingsError as error:
-        say_error(str(error))
+        print_error(str(error))
         raise typer.Exit(exit_codes.INPUT_MISSING) from error
     if not folds:
-        say_error("nothing can be left out of these recordings: they are of one person, or of one target")
+        print_error("these recordings are of one person, or of one target: cross-validation needs at least two")
         raise typer.Exit(exit_codes.INPUT_MISSING)
-    chosen = {name: found for name, found in folds.items() if not wanted or any(text in name for text in wanted)}
+    chosen = {name: own for name, own in folds.items() if not names or any(text in name for text in names)}
     if not chosen:
         raise typer.BadParameter(f"tasks are {', '.join(folds)}", param_hint="--task")
     return chosen
@@ -159,25 +161,27 @@ def _compare(
     results = stored_results(work, keys_of(work), cache, "folds", console, jobs=jobs, scheduler=scheduler)
     summary = summarised(results)
     wide = Console(highlight=False, emoji=False, width=max(console.width, 150))
-    for task, found in summary.items():
-        wide.print(_table(task, found))
+    for task, rows_of_task in summary.items():
+        wide.print(_table(task, rows_of_task))
     page = write_report(summary, folder, title=title, ours=frozenset(row.name for row in rows if row.ours), notes=notes)
     console.print(f"report: {page}", markup=False, soft_wrap=True)
     write_numbers(json_file, plain(summary), console)
 
 
 def _table(task: str, rows: dict[str, dict[str, Any]]) -> Table:
-    from studies.movements.report import formatted, heading, leading, shown_quantities
+    from studies.movements.report import formatted, heading, leading, quantities_of
 
     table = Table(title=task, show_edge=False, pad_edge=False, title_justify="left")
     table.add_column("method", no_wrap=True)
-    shown = [quantity for quantity in shown_quantities(rows) if quantity.name in TABLE_COLUMNS]
-    for quantity in shown:
+    quantities = [quantity for quantity in quantities_of(rows) if quantity.name in TABLE_COLUMNS]
+    for quantity in quantities:
         table.add_column(heading(quantity, task), justify="right")
     table.add_column("learn, s", justify="right")
-    best = {quantity.name: leading(rows, quantity) for quantity in shown}
+    best = {quantity.name: leading(rows, quantity) for quantity in quantities}
     for name, row in rows.items():
-        cells = [formatted(quantity, row["measures"].get(quantity.name)) for quantity in shown]
-        marked = [f"[bold]{cell}[/]" if name in best[q.name] else cell for cell, q in zip(cells, shown, strict=True)]
+        cells = [formatted(quantity, row["measures"].get(quantity.name)) for quantity in quantities]
+        marked = [
+            f"[bold]{cell}[/]" if name in best[q.name] else cell for cell, q in zip(cells, quantities, strict=True)
+        ]
         table.add_row(name, *marked, f"{row['seconds']['fit']:.2f}")
     return table

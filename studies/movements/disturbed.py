@@ -10,7 +10,7 @@ SENSOR_NOISE_M = 0.001
 
 
 def aborted(x: Floats) -> Floats:
-    """Cut half-way and taken back along the same way at the same pace. Shapes (T, D) -> (T, D)."""
+    """Cut half-way and taken back along the same path at the same pace. Shapes (T, D) -> (T, D)."""
     half = x[: (len(x) + 1) // 2]
     return np.concatenate([half, half[::-1]])[: len(x)]
 

@@ -14,16 +14,16 @@ from studies.movements.method import FRAMES, Estimate
 
 ThetaKind = Literal["direction", "place", "raster"]
 
-RASTER_CM = np.array([80.0, 30.0])
-"""Width and depth of the synthetic demonstrator's raster, whose coordinates run from 0 to 1."""
+GRID_CM = np.array([80.0, 30.0])
+"""Width and depth of the synthetic demonstrator's grid, whose coordinates run from 0 to 1."""
 
 
 def synthesis_errors(synthesised: Floats, recorded: Floats, tip: int) -> dict[str, float]:
     """A synthesised movement (100, D) against a recorded one (T, D), cm.
 
     dtw, dtw_cut: root mean square over the body points after time warping, of all frames and without 15 % at both
-    ends; rms: frame by frame at equal shares of the duration; tip_rms: the same of the fingertip alone; end: distance
-    of the fingertips in the last frame.
+    ends; rms: frame by frame at equal fractions of the duration; tip_rms: the same of the fingertip alone; end:
+    distance of the fingertips in the last frame.
     """
     truth = resample(recorded, FRAMES)
     difference = (synthesised - truth).reshape(FRAMES, -1, 3)
@@ -39,11 +39,11 @@ def synthesis_errors(synthesised: Floats, recorded: Floats, tip: int) -> dict[st
 
 
 def theta_error(estimated: Floats, true: Floats, kind: ThetaKind) -> float:
-    """Angle between directions (azimuth, elevation) in degrees, or distance of places in cm."""
+    """Angle between directions (azimuth, elevation) in degrees, or distance of positions in cm."""
     if kind == "direction":
         cosine = float(_unit(estimated) @ _unit(true))
         return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-    scale = RASTER_CM if kind == "raster" else 100.0
+    scale = GRID_CM if kind == "raster" else 100.0
     return float(np.linalg.norm((estimated - true) * scale))
 
 
@@ -53,8 +53,8 @@ def _unit(direction: Floats) -> Floats:
     return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
 
 
-def covered(estimate: Estimate, true: Floats, share: float = 0.95) -> float | None:
-    """1 if the true theta lies in the region that should hold it in `share` of the cases, else 0; None without one."""
+def covered(estimate: Estimate, true: Floats, fraction: float = 0.95) -> float | None:
+    """1 if the true theta lies in the region of this probability, else 0; None without one."""
     if estimate.covariance is None:
         return None
     difference = true - estimate.theta
@@ -62,7 +62,7 @@ def covered(estimate: Estimate, true: Floats, share: float = 0.95) -> float | No
         squared = float(difference @ np.linalg.solve(estimate.covariance, difference))
     except np.linalg.LinAlgError:
         return 0.0
-    return float(0.0 <= squared <= chi2.ppf(share, len(true)))
+    return float(0.0 <= squared <= chi2.ppf(fraction, len(true)))
 
 
 def auroc(genuine: Floats, others: Floats) -> float:

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from paramove.documents import Floats, Ints
 
 SYNTHESIS, THETA, CLASSES, BEGINNINGS, OUTLIERS = "synthesis", "theta", "classes", "beginnings", "outliers"
-"""What a method can do, as it says itself; what it cannot is a dash in the tables."""
+"""What a method declares that it can do; the tables show a dash for anything else."""
 FRAMES = 100
 """Frames that movements are resampled to wherever a method needs equal lengths."""
 
 
 class Estimate(NamedTuple):
-    """Theta (P,) and its covariance (P, P); None from methods that do not know how sure they are."""
+    """Theta (P,) and its covariance (P, P); None from methods without one."""
 
     theta: Floats
     covariance: Floats | None
@@ -70,7 +70,7 @@ class Examples:
 
 @runtime_checkable
 class Method(Protocol):
-    """A model under comparison. One object is fitted once per fold and then asked."""
+    """A model under comparison. One object is fitted once per fold and then tested."""
 
     can: frozenset[str]
 
@@ -87,7 +87,7 @@ class Method(Protocol):
         """The action of a movement (T, D); of a beginning where not finished: how long it will be is unknown."""
 
     def score(self, x: Floats) -> float:
-        """How well a movement (T, D) fits the action learned: the greater, the better."""
+        """How well a movement (T, D) fits the action learned: greater is better."""
 
 
 class NotAble:

@@ -26,7 +26,7 @@ from studies.movements.method import (
 from studies.movements.sweep import Row
 
 FLOOR_M = 1e-4
-"""Recordings may hold a point that never moves: nothing is known better than to a tenth of a millimetre."""
+"""Recordings may hold a point that never moves: no deviation is taken to be below a tenth of a millimetre."""
 
 
 class Models(NotAble):
@@ -53,8 +53,8 @@ class Models(NotAble):
 
     def estimate(self, x: Floats) -> Estimate:
         """The likeliest theta and its covariance."""
-        found = self.model.estimate(x)
-        return Estimate(found.theta, found.covariance)
+        estimate = self.model.estimate(x)
+        return Estimate(estimate.theta, estimate.covariance)
 
     def classify(self, x: Floats, finished: bool) -> str:
         """The most probable action."""

@@ -50,10 +50,10 @@ class PerAction(NotAble):
 
 
 class ByElapsedTime(NotAble):
-    """Classifies beginnings with models of beginnings: trained on what had been seen after the same time.
+    """Classifies beginnings with models of beginnings: trained on beginnings of the same length.
 
-    Nothing is known of how long the movement will be. The time seen is rounded to a geometric raster, and one model
-    is trained per time, when it is first asked for. Training movements that ended earlier stay at their last frame.
+    The length of the whole movement is unknown. The elapsed time is rounded to a geometric grid, and one model is
+    trained per time, when it is first needed. Training movements that ended earlier stay at their last frame.
     """
 
     STEP = 1.12
@@ -89,8 +89,8 @@ class ByElapsedTime(NotAble):
         frames = round(self.STEP**exponent)
         if frames not in self.by_length:
             model = self.make()
-            seen = [first_frames(one, frames) for one in self.examples.sequences]
-            model.fit(replace(self.examples, sequences=seen))
+            beginnings = [first_frames(one, frames) for one in self.examples.sequences]
+            model.fit(replace(self.examples, sequences=beginnings))
             self.by_length[frames] = model
         return self.by_length[frames].classify(x, True)
 

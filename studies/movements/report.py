@@ -17,10 +17,10 @@ THETA_UNITS = {"pointing": "°", "table": "cm", "raster": "cm"}
 TEXTS = {
     "pointing/direction": "Pointing, one target left out: per person, all directions but one are learned.",
     "pointing/corners": "Pointing, learned from the corners: per person, the four corner directions of all depths are "
-    "learned, all other targets are asked.",
+    "learned, all other targets are tested.",
     "table/actions": "Kinds of movement at the table, one person left out; finished movements.",
     "table/beginnings": "Kinds of movement at the table while they go on, one person left out. All are cut at their "
-    "beginning by one absolute rule for speeds, and nobody is told how long a movement will be.",
+    "beginning by one absolute rule for speeds, and the length of a movement is unknown.",
     **{
         f"table/first {milliseconds} ms": f"Kinds of movement at the table after the first {milliseconds} ms, one "
         "person left out. Learned from as much of the others' movements."
@@ -48,7 +48,7 @@ def plain(summary: dict[str, dict[str, dict[str, Any]]]) -> dict[str, Any]:
     return {
         task: {
             row: {
-                "measures": {name: found._asdict() for name, found in values["measures"].items()},
+                "measures": {name: measured._asdict() for name, measured in values["measures"].items()},
                 "seconds": values["seconds"],
                 "folds": values["folds"],
             }
@@ -80,7 +80,7 @@ def write_report(
 
 
 def _section(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -> str:
-    words = TEXTS.get(task, f"{task}: synthesis, parameters and rejection.")
+    text = TEXTS.get(task, f"{task}: synthesis, parameters and rejection.")
     folds = max(row["folds"] for row in rows.values())
     if task.endswith("/beginnings"):
         picture = plots.beginnings(rows, ours)
@@ -88,26 +88,26 @@ def _section(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -
         names = ("dtw", "end", "theta", "covered", "auroc_aborted", "auroc_stopped", "auroc_others", "correct")
         picture = plots.intervals(rows, [q for q in QUANTITIES if q.name in names], ours)
     return (
-        f"<section><h2>{escape(task)}</h2><p class=why>{escape(words)} {folds} folds.</p>{picture}"
+        f"<section><h2>{escape(task)}</h2><p class=why>{escape(text)} {folds} folds.</p>{picture}"
         f"<div class=scroll>{_table(task, rows, ours)}</div></section>"
     )
 
 
 def _table(task: str, rows: dict[str, dict[str, Any]], ours: frozenset[str]) -> str:
-    shown = shown_quantities(rows)
-    asked = [name for name in SECONDS if any(name in row["seconds"] for row in rows.values())]
-    heads = "".join(f"<th class=n>{escape(heading(q, task))}</th>" for q in shown)
-    heads += "".join(f"<th class=n>{SECOND_HEADINGS[name]}</th>" for name in asked)
+    quantities = quantities_of(rows)
+    timed = [name for name in SECONDS if any(name in row["seconds"] for row in rows.values())]
+    heads = "".join(f"<th class=n>{escape(heading(q, task))}</th>" for q in quantities)
+    heads += "".join(f"<th class=n>{SECOND_HEADINGS[name]}</th>" for name in timed)
     lines = []
     for name, row in rows.items():
-        cells = "".join(f"<td class=n>{_cell(rows, name, q)}</td>" for q in shown)
-        cells += "".join(f"<td class=n>{_seconds(row, second)}</td>" for second in asked)
+        cells = "".join(f"<td class=n>{_cell(rows, name, q)}</td>" for q in quantities)
+        cells += "".join(f"<td class=n>{_seconds(row, second)}</td>" for second in timed)
         label = f"<b>{escape(name)}</b>" if name in ours else escape(name)
         lines.append(f"<tr><td style='white-space:nowrap'>{label}</td>{cells}</tr>")
     return f"<table><tr><th>method</th>{heads}</tr>{''.join(lines)}</table>"
 
 
-def shown_quantities(rows: dict[str, dict[str, Any]]) -> list[Quantity]:
+def quantities_of(rows: dict[str, dict[str, Any]]) -> list[Quantity]:
     """The quantities that any of the rows has."""
     return [q for q in QUANTITIES if any(q.name in row["measures"] for row in rows.values())]
 
@@ -118,37 +118,37 @@ def heading(quantity: Quantity, task: str) -> str:
     return f"{quantity.heading}, {unit}" if unit else quantity.heading
 
 
-def formatted(quantity: Quantity, found: Measured | None) -> str:
+def formatted(quantity: Quantity, measured: Measured | None) -> str:
     """A value as text: two digits for lengths and angles, one for per cent, three for AUROC."""
-    if found is None:
+    if measured is None:
         return "–"
     digits = 3 if not quantity.unit else 1 if quantity.unit == "%" else 2
-    return f"{found.value:.{digits}f}"
+    return f"{measured.value:.{digits}f}"
 
 
 def leading(rows: dict[str, dict[str, Any]], quantity: Quantity) -> set[str]:
     """The best row and those whose value lies within its interval; for coverage those whose interval holds 95 %."""
-    found: dict[str, Measured] = {
+    measured: dict[str, Measured] = {
         name: row["measures"][quantity.name] for name, row in rows.items() if quantity.name in row["measures"]
     }
-    if not found:
+    if not measured:
         return set()
     if quantity.name == "covered":
-        return {name for name, one in found.items() if one.low <= 95.0 <= one.high}
+        return {name for name, one in measured.items() if one.low <= 95.0 <= one.high}
     if quantity.more_is_better:
-        best = max(found.values(), key=lambda one: one.value)
-        return {name for name, one in found.items() if one.value >= best.low}
-    best = min(found.values(), key=lambda one: one.value)
-    return {name for name, one in found.items() if one.value <= best.high}
+        best = max(measured.values(), key=lambda one: one.value)
+        return {name for name, one in measured.items() if one.value >= best.low}
+    best = min(measured.values(), key=lambda one: one.value)
+    return {name for name, one in measured.items() if one.value <= best.high}
 
 
 def _cell(rows: dict[str, dict[str, Any]], name: str, quantity: Quantity) -> str:
-    found: Measured | None = rows[name]["measures"].get(quantity.name)
-    text = formatted(quantity, found)
-    if found is None:
+    measured: Measured | None = rows[name]["measures"].get(quantity.name)
+    text = formatted(quantity, measured)
+    if measured is None:
         return text
     digits = len(text.partition(".")[2])
-    interval = f"<br><span class=soft>[{found.low:.{digits}f}, {found.high:.{digits}f}]</span>"
+    interval = f"<br><span class=soft>[{measured.low:.{digits}f}, {measured.high:.{digits}f}]</span>"
     value = f"<b>{text}</b>" if name in leading(rows, quantity) else text
     return f"{value}{interval}"
 

@@ -37,7 +37,7 @@ def _mean(values: Floats) -> float:
     return float(values.mean())
 
 
-def _share(values: Floats) -> float:
+def _percent(values: Floats) -> float:
     return float(100.0 * values.mean())
 
 
@@ -52,17 +52,17 @@ def _median(values: Floats) -> float:
 QUANTITIES = (
     Quantity("dtw", "RMS, warped", "cm", False, ("dtw",), _mean),
     Quantity("dtw_cut", "RMS, warped, without ends", "cm", False, ("dtw_cut",), _mean),
-    Quantity("rms", "RMS, same share of time", "cm", False, ("rms",), _mean),
+    Quantity("rms", "RMS, same fraction of time", "cm", False, ("rms",), _mean),
     Quantity("tip_rms", "fingertip RMS", "cm", False, ("tip_rms",), _mean),
     Quantity("end", "end-point miss", "cm", False, ("end",), _mean),
     Quantity("theta", "θ error, mean", "θ", False, ("theta",), _mean),
     Quantity("theta_median", "θ error, median", "θ", False, ("theta",), _median),
     Quantity("theta_p95", "θ error, 95 %", "θ", False, ("theta",), _p95),
-    Quantity("covered", "95 % region covers", "%", True, ("covered",), _share),
-    Quantity("correct", "right action", "%", True, ("correct",), _share),
+    Quantity("covered", "95 % region covers", "%", True, ("covered",), _percent),
+    Quantity("correct", "right action", "%", True, ("correct",), _percent),
     *(
-        Quantity(f"correct_{share}", f"right after {share} %", "%", True, (f"correct_{share}",), _share)
-        for share in (25, 50, 75, 100)
+        Quantity(f"correct_{percent}", f"right after {percent} %", "%", True, (f"correct_{percent}",), _percent)
+        for percent in (25, 50, 75, 100)
     ),
     Quantity("auroc_others", "AUROC other movements", "", True, ("score_genuine", "score_others"), auroc),
     Quantity("auroc_aborted", "AUROC aborted", "", True, ("score_genuine", "score_aborted"), auroc),
@@ -73,11 +73,11 @@ SECONDS = ("fit", "synthesize", "estimate", "classify", "classify_beginning")
 
 
 def summarised(results: Sequence[dict[str, Any]]) -> dict[str, dict[str, dict[str, Any]]]:
-    """task -> row -> {"measures": name -> Measured, "seconds": name -> least, "folds": number}."""
+    """task -> row -> {"measures": name -> Measured, "seconds": name -> minimum, "folds": number}."""
     grouped: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for result in results:
         grouped.setdefault(result["task"], {}).setdefault(result["row"], []).append(result)
-    return {task: {row: _row(found) for row, found in rows.items()} for task, rows in grouped.items()}
+    return {task: {row: _row(own) for row, own in rows.items()} for task, rows in grouped.items()}
 
 
 def _row(results: Sequence[dict[str, Any]]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""Runs all jobs of a comparison, on this machine or on a cluster, and keeps what is finished.
+"""Runs all jobs of a comparison, on this machine or on a cluster, and stores each result.
 
 A job is one row (method with parameters and seed) on one fold. Its result is a small file under a name that follows
-from the row, the data, and the source code that makes it: the same comparison goes on where it was interrupted, and
-what a change of code or data makes invalid is not found again.
+from the row, the data, and the source code that makes it: an interrupted comparison continues, and
+a change of code or data gives other names.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TIMEOUT_S = 10.0
 
 
 class ClusterMissingError(RuntimeError):
-    """No cluster can be used: the library is missing or nobody answers."""
+    """No cluster can be used: the library is missing or no scheduler answers."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Row:
     """A line of the comparison.
 
     Attributes:
-        name: as it is shown.
+        name: in reports.
         make: an unfitted method for a seed.
-        parameters: everything else that decides what comes out, in words: the name alone may stay when they change.
+        parameters: everything else that decides the result, as text: the name alone may stay when they change.
         libraries: packages of others whose versions do.
         seeds: repetitions for methods with chance in them.
         ours: whether it is this project's.
@@ -60,7 +60,7 @@ class Work(Protocol):
 
     @property
     def label(self) -> str:
-        """As the progress shows it."""
+        """Shown by the progress bar."""
 
     def run(self) -> dict[str, Any]:
         """The result: plain JSON with "values"."""
@@ -76,7 +76,7 @@ class Job:
 
     @property
     def label(self) -> str:
-        """As the progress shows it."""
+        """Shown by the progress bar."""
         return f"{self.row.name}: {self.fold.task} {self.fold.name}"
 
     def key(self, data: str) -> str:
@@ -88,12 +88,12 @@ class Job:
 
     def run(self) -> dict[str, Any]:
         """Measure; the result is plain JSON."""
-        found = measure(self.row.make(self.seed), self.fold)
-        return {"row": self.row.name, "seed": self.seed, **found}
+        result = measure(self.row.make(self.seed), self.fold)
+        return {"row": self.row.name, "seed": self.seed, **result}
 
 
 def jobs_of(rows: Sequence[Row], tasks: Mapping[str, Sequence[Fold]]) -> list[Job]:
-    """All jobs of rows that can do something of what the folds ask."""
+    """All jobs of rows that can do some of the tasks of the folds."""
     jobs: list[Job] = []
     for folds in tasks.values():
         for row in rows:
@@ -110,16 +110,16 @@ def run_jobs(
     scheduler: str | None = None,
     finished: Callable[[int, int, str], None] = lambda done, total, name: None,
 ) -> list[dict[str, Any]]:
-    """Results of all jobs in their order; `finished` hears how many are done, of how many, and what was last.
+    """Results of all jobs in their order; `finished` gets how many are done, of how many, and the last name.
 
-    Interrupted, everything that is finished stays in `cache`. With `scheduler` (host:port of a Dask scheduler) the
+    Finished results stay in `cache` after an interruption. With `scheduler` (host:port of a Dask scheduler) the
     cluster computes. Raises ClusterMissingError without one.
     """
     return run_stored(jobs, keys_of(jobs), cache, workers=workers, scheduler=scheduler, finished=finished)
 
 
 def keys_of(jobs: Sequence[Job]) -> list[str]:
-    """Under which the jobs' results are stored."""
+    """Names under which the jobs' results are stored."""
     digests = {id(fold): fold_digest(fold) for fold in {id(job.fold): job.fold for job in jobs}.values()}
     return [job.key(digests[id(job.fold)]) for job in jobs]
 
@@ -235,10 +235,10 @@ def _version(package: str) -> str:
 def _stored(file: Path) -> dict[str, Any] | None:
     """A result from its file; None where there is none or it was cut off while it was written."""
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        result = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) and "values" in found else None
+    return result if isinstance(result, dict) and "values" in result else None
 
 
 def _store(file: Path, result: dict[str, Any]) -> None:

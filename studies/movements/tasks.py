@@ -1,14 +1,14 @@
 """The tasks: what is trained, what is tested, and along which folds.
 
-A fold leaves out a whole direction, person or raster, never single repetitions at random:
+A fold leaves out a whole direction, person or grid, never single repetitions at random:
 
 - `pointing/direction`: per person, one of the targets is left out.
-- `pointing/corners`: per person, trained on the targets in the corners of the raster, those of all depths together,
+- `pointing/corners`: per person, trained on the targets in the corners of the grid, those of all depths together,
   tested on all others.
 - `table/<action>`: one person is left out; both hands together. Drinking counts up to the grasp.
 - `table/actions`: the kinds of movement, one person left out; whole movements.
 - `table/beginnings`: the same while they go on, all cut at their beginning by one absolute rule.
-- `table/first 100 ms` and more: the same, everybody sees that much from the beginning.
+- `table/first 100 ms` and more: the same, every movement is cut after that time.
 - `raster/<action>`, `raster/actions`, `raster/beginnings`: the synthetic demonstrator; 3 x 3 targets 10 times against
   7 x 5 targets 4 times; a fold is a seed.
 """
@@ -38,7 +38,7 @@ from studies.movements.measures import ThetaKind
 from studies.movements.method import Examples
 from studies.movements.per_action import first_frames
 
-RASTER_ACTIONS = ("reaching", "pointing")
+GRID_ACTIONS = ("reaching", "pointing")
 FIRST_MS = (100, 200, 400)
 
 
@@ -52,7 +52,7 @@ class Fold:
         others: movements of other kinds by whom or what was left out, for rejection.
         kind: what theta is.
         tip: which body point is the fingertip.
-        beginnings: the kind is asked while the movement goes on.
+        beginnings: the kind is estimated while the movement goes on.
     """
 
     task: str
@@ -76,14 +76,14 @@ def real_tasks(folder: Path | None = None) -> dict[str, list[Fold]]:
     Raises RecordingsError where there is no folder, no data set, or a damaged one.
     """
     root = data_folder(folder)
-    found = [name for name in ("pointing27", "table_reach") if (root / name / "data.npz").is_file()]
-    if not found:
+    present = [name for name in ("pointing27", "table_reach") if (root / name / "data.npz").is_file()]
+    if not present:
         raise RecordingsError(f"{root} has neither pointing27/data.npz nor table_reach/data.npz")
     tasks: dict[str, list[Fold]] = {}
-    if "pointing27" in found:
+    if "pointing27" in present:
         pointing = load_recordings("pointing27", root)
         tasks |= {"pointing/direction": _directions(pointing), "pointing/corners": _corners(pointing)}
-    if "table_reach" in found:
+    if "table_reach" in present:
         tasks |= _table_tasks(load_recordings("table_reach", root))
     return {name: folds for name, folds in tasks.items() if folds}
 
@@ -100,20 +100,20 @@ def _table_tasks(table: Recordings) -> dict[str, list[Fold]]:
     return tasks
 
 
-def raster_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
+def grid_tasks(seeds: Sequence[int] = (0, 1, 2, 3, 4)) -> dict[str, list[Fold]]:
     """All tasks on the synthetic demonstrator, by name."""
-    tasks: dict[str, list[Fold]] = {f"raster/{action}": [] for action in (*RASTER_ACTIONS, "actions", "beginnings")}
+    tasks: dict[str, list[Fold]] = {f"raster/{action}": [] for action in (*GRID_ACTIONS, "actions", "beginnings")}
     for seed in seeds:
-        train = {action: _raster(action, 3, 3, 10, [seed, 0]) for action in RASTER_ACTIONS}
-        test = {action: _raster(action, 7, 5, 4, [seed, 1]) for action in RASTER_ACTIONS}
-        for action, other in zip(RASTER_ACTIONS, RASTER_ACTIONS[::-1], strict=True):
+        train = {action: _grid(action, 3, 3, 10, [seed, 0]) for action in GRID_ACTIONS}
+        test = {action: _grid(action, 7, 5, 4, [seed, 1]) for action in GRID_ACTIONS}
+        for action, other in zip(GRID_ACTIONS, GRID_ACTIONS[::-1], strict=True):
             others = test[other].sequences
             tasks[f"raster/{action}"].append(
                 Fold(f"raster/{action}", str(seed), train[action], test[action], others, "raster", 5)
             )
-        both, asked = _joined(train.values()), _joined(test.values())
-        tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, asked, [], "raster", 5))
-        tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, asked, [], "raster", 5, True))
+        both, tests = _joined(train.values()), _joined(test.values())
+        tasks["raster/actions"].append(Fold("raster/actions", str(seed), both, tests, [], "raster", 5))
+        tasks["raster/beginnings"].append(Fold("raster/beginnings", str(seed), both, tests, [], "raster", 5, True))
     return tasks
 
 
@@ -141,10 +141,10 @@ def _corners(pointing: Recordings) -> list[Fold]:
     return folds
 
 
-def corner_targets(places: dict[int, Floats]) -> set[int]:
+def corner_targets(positions_by_target: dict[int, Floats]) -> set[int]:
     """Targets at the outermost left or right and, at the same time, the lowest or highest; of every depth."""
-    numbers = list(places)
-    positions = np.array([places[number] for number in numbers])
+    numbers = list(positions_by_target)
+    positions = np.array([positions_by_target[number] for number in numbers])
     outermost = np.ones(len(numbers), dtype=bool)
     for axis in (1, 2):
         values = positions[:, axis]
@@ -204,7 +204,7 @@ def _first(milliseconds: int) -> Part:
 
 
 def _table_examples(movements: list[RecordedMovement], tip: int, part: Part) -> Examples:
-    """Theta is the target; a movement without one gets the place where its fingertip starts."""
+    """Theta is the target; a movement without one gets the start of its fingertip."""
     sequences = [part(one) for one in movements]
     starts = np.array([x[0, 3 * tip : 3 * tip + 3] for x in sequences]).reshape(-1, 3)
     theta = np.array([one.target for one in movements]).reshape(-1, 3)
@@ -218,13 +218,13 @@ def _targets(movements: Sequence[RecordedMovement]) -> Floats:
     return np.array([one.target for one in movements])
 
 
-def _raster(action: str, columns: int, rows: int, repetitions: int, seed: Sequence[int]) -> Examples:
+def _grid(action: str, columns: int, rows: int, repetitions: int, seed: Sequence[int]) -> Examples:
     targets, coordinates = table_targets(columns, rows)
-    rng = np.random.default_rng([*seed, RASTER_ACTIONS.index(action)])
-    shown = demonstrations_at(targets, rng, action=action, repetitions=repetitions)  # type: ignore[arg-type]
+    rng = np.random.default_rng([*seed, GRID_ACTIONS.index(action)])
+    demonstrations = demonstrations_at(targets, rng, action=action, repetitions=repetitions)  # type: ignore[arg-type]
     theta = np.repeat(coordinates, repetitions, axis=0)
     cells = np.repeat(np.arange(len(targets)), repetitions)
-    return Examples(shown.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ)
+    return Examples(demonstrations.sequences, theta, [action] * len(theta), cells, SAMPLE_RATE_HZ)
 
 
 def _joined(parts: Iterable[Examples]) -> Examples:

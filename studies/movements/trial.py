@@ -12,14 +12,14 @@ from studies.movements.measures import covered, synthesis_errors, theta_error
 from studies.movements.method import BEGINNINGS, CLASSES, FRAMES, OUTLIERS, SYNTHESIS, THETA, Method
 from studies.movements.tasks import Fold
 
-SHARES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of a movement, from its onset, after which its kind is asked."""
+FRACTIONS = (0.25, 0.5, 0.75, 1.0)
+"""Fractions of a movement, from its onset, after which its kind is estimated."""
 
 Numbers = dict[str, list[float]]
 
 
 def able(method: Method, fold: Fold) -> bool:
-    """Whether a method can do anything of what a fold asks."""
+    """Whether a method can do any of the tasks of a fold."""
     if not fold.several_actions:
         return bool(method.can & {SYNTHESIS, THETA, OUTLIERS})
     return (BEGINNINGS if fold.beginnings else CLASSES) in method.can
@@ -73,14 +73,14 @@ def _classification(method: Method, fold: Fold, values: Numbers, seconds: dict[s
         values["correct"] = [float(a == b) for a, b in zip(answers, fold.test.labels, strict=True)]
         seconds["classify"] = (time.perf_counter() - began) / len(answers)
         return
-    for share in SHARES:
-        parts = [x[: max(2, round(share * len(x)))] for x in fold.test.sequences]
+    for fraction in FRACTIONS:
+        parts = [x[: max(2, round(fraction * len(x)))] for x in fold.test.sequences]
         answers = [method.classify(x, False) for x in parts]
         right = [float(a == b) for a, b in zip(answers, fold.test.labels, strict=True)]
-        values[f"correct_{round(100 * share)}"] = right
-    seconds["classify_beginning"] = (time.perf_counter() - began) / (len(SHARES) * len(fold.test))
+        values[f"correct_{round(100 * fraction)}"] = right
+    seconds["classify_beginning"] = (time.perf_counter() - began) / (len(FRACTIONS) * len(fold.test))
 
 
-def _add(values: Numbers, found: dict[str, float]) -> None:
-    for name, value in found.items():
+def _add(values: Numbers, measures: dict[str, float]) -> None:
+    for name, value in measures.items():
         values.setdefault(name, []).append(float(value))

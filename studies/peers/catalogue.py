@@ -21,7 +21,7 @@ from studies.peers.tuning import Tuned
 Parameters = dict[str, Any]
 
 
-def raster_of(**values: list[Any]) -> list[Parameters]:
+def grid_of(**values: list[Any]) -> list[Parameters]:
     """All combinations of some values of hyper-parameters."""
     return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
 
@@ -68,7 +68,7 @@ def both(
 
 def ridge_rows() -> list[Row]:
     """Alignment, principal components and ridge regression: the strong simple baseline."""
-    candidates = raster_of(components=[4, 8, 16], degree=[1, 2])
+    candidates = grid_of(components=[4, 8, 16], degree=[1, 2])
     rest = (AlignedRidge, candidates, ("tslearn", "scikit-learn"))
     return [
         *both("DTW + PCA + quadratic ridge, diagonal", *rest),
@@ -79,7 +79,7 @@ def ridge_rows() -> list[Row]:
 
 def promp_rows() -> list[Row]:
     """Probabilistic movement primitives with quadratic context."""
-    candidates = raster_of(weights=[8, 15], degree=[1, 2], noise_m=[0.003, 0.01, 0.03])
+    candidates = grid_of(weights=[8, 15], degree=[1, 2], noise_m=[0.003, 0.01, 0.03])
     rest = (ContextualProMP, candidates, ("movement-primitives", "gmr", "tslearn"))
     return [
         *both("ProMP, quadratic context, linear time", *rest),
@@ -89,8 +89,8 @@ def promp_rows() -> list[Row]:
 
 def hmm_rows() -> list[Row]:
     """Hidden Markov models: hmmlearn without parameters, dynamax with theta as its input."""
-    plain = (raster_of(n_states=[10, 20, 30]), ("hmmlearn",))
-    driven = (raster_of(n_states=[10, 20], floor_m=[0.003, 0.01]), ("dynamax", "jax"))
+    plain = (grid_of(n_states=[10, 20, 30]), ("hmmlearn",))
+    driven = (grid_of(n_states=[10, 20], floor_m=[0.003, 0.01]), ("dynamax", "jax"))
     return [
         *both("hmmlearn, one HMM per action", GaussianHMM, *plain),
         *both("hmmlearn, one HMM per target", CellHMMs, *plain),
@@ -101,8 +101,8 @@ def hmm_rows() -> list[Row]:
 
 def classifier_rows() -> list[Row]:
     """Classification and regression of time series."""
-    rocket = (raster_of(kernels=[1_000, 10_000]), ("sktime", "scikit-learn"))
-    nearest = (raster_of(neighbours=[1, 3, 5], radius=[10, None]), ("tslearn",))
+    rocket = (grid_of(kernels=[1_000, 10_000]), ("sktime", "scikit-learn"))
+    nearest = (grid_of(neighbours=[1, 3, 5], radius=[10, None]), ("tslearn",))
     return [
         *both("MiniRocket", MiniRocket, *rocket, whole=classifier),
         *both("kNN-DTW", NearestByWarping, *nearest, whole=classifier),

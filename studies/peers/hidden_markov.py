@@ -68,12 +68,12 @@ class CellHMMs(NotAble):
 
     def fit(self, examples: Examples) -> None:
         """Learn one model of each group."""
-        self.models, places = [], []
+        self.models, targets = [], []
         for group in np.unique(examples.groups):
             own = examples.chosen(examples.groups == group)
             self.models.append(trained_hmm(own.sequences, self.n_states))
-            places.append(own.theta.mean(axis=0))
-        self.places = np.array(places)
+            targets.append(own.theta.mean(axis=0))
+        self.targets = np.array(targets)
 
     def _scores(self, x: Floats) -> Floats:
         return np.array([model.score(resample(x, FRAMES)) for model in self.models])
@@ -82,8 +82,8 @@ class CellHMMs(NotAble):
         """Mean and covariance of theta under the posterior of the targets."""
         scores = self._scores(x)
         weights = np.exp(scores - logsumexp(scores))
-        theta = weights @ self.places
-        off = self.places - theta
+        theta = weights @ self.targets
+        off = self.targets - theta
         return Estimate(theta, np.einsum("k,ki,kj->ij", weights, off, off) + 1e-12 * np.eye(len(theta)))
 
     def score(self, x: Floats) -> float:

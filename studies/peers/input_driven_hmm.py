@@ -109,7 +109,7 @@ class InputDrivenHMM(NotAble):
         self.params = params._replace(emissions=params.emissions._replace(covs=params.emissions.covs + floor))
         distinct = np.unique(examples.theta, axis=0)
         starts = distinct[np.linspace(0, len(distinct) - 1, min(9, len(distinct))).astype(int)]
-        self.starts = (starts - self.features.centre) / self.features.spread
+        self.starts = (starts - self.features.centre) / self.features.scale
 
     def _begin(self, x: Floats, phi: Floats) -> tuple[Floats, Floats, Floats]:
         """Regression of the frames of equal segments on the features, with a slight ridge."""
@@ -130,8 +130,8 @@ class InputDrivenHMM(NotAble):
         """Theta in standardised units and the log-likelihood there."""
         costs = [self._cost(start, frames)[0] for start in self.starts]
         best = self.starts[int(np.argmin(costs))]
-        found = minimize(self._cost, best, (frames,), jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(best))
-        return np.asarray(found.x), -float(found.fun)
+        solution = minimize(self._cost, best, (frames,), jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(best))
+        return np.asarray(solution.x), -float(solution.fun)
 
     def _frames(self, x: Floats) -> Floats:
         result: Floats = resample(x, FRAMES) - self.centre
@@ -161,9 +161,9 @@ class InputDrivenHMM(NotAble):
         """Maximum likelihood theta and the inverse of the curvature there."""
         frames = self._frames(x)
         u, _ = self._climbed(frames)
-        spread = self.features.spread
-        covariance = np.linalg.pinv(self._curvature(u, frames)) * np.outer(spread, spread)
-        return Estimate(self.features.centre + spread * u, covariance)
+        scale = self.features.scale
+        covariance = np.linalg.pinv(self._curvature(u, frames)) * np.outer(scale, scale)
+        return Estimate(self.features.centre + scale * u, covariance)
 
     def score(self, x: Floats) -> float:
         """Log-likelihood at the best theta."""

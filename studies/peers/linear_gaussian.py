@@ -17,7 +17,7 @@ class QuadraticFeatures:
     """(theta, theta squared, products) of standardised theta, without the constant. Shape (Q,)."""
 
     centre: Floats
-    spread: Floats
+    scale: Floats
     degree: int = 2
 
     @classmethod
@@ -27,7 +27,7 @@ class QuadraticFeatures:
 
     def __call__(self, theta: Floats) -> Floats:
         """Features of theta (..., P). Shape (..., Q)."""
-        u = (theta - self.centre) / self.spread
+        u = (theta - self.centre) / self.scale
         if self.degree == 1:
             return u
         i, j = np.triu_indices(u.shape[-1])
@@ -36,14 +36,14 @@ class QuadraticFeatures:
 
 @dataclass(frozen=True)
 class LinearGaussian:
-    """z = offset + slopes features(theta) + e, e ~ N(0, S), kept whitened: L^-1 z with S = L L'.
+    """z = offset + slopes features(theta) + e, e ~ N(0, S), stored whitened: L^-1 z with S = L L'.
 
     Attributes:
         features: of theta.
         factor: lower triangular L, shape (Q, Q).
         offset, slopes: multiplied by L^-1, shapes (Q,) and (Q, F).
         starts: parameters at which the search begins, shape (M, P).
-        bounds: least and greatest theta of the search, shape (2, P).
+        bounds: minimum and maximum theta of the search, shape (2, P).
     """
 
     features: QuadraticFeatures
@@ -71,10 +71,10 @@ class LinearGaussian:
         white = self._whitened(z)
         costs = ((white - self.features(self.starts) @ self.slopes.T) ** 2).sum(axis=1)
         start = self.starts[int(np.argmin(costs))]
-        found = least_squares(
+        solution = least_squares(
             lambda theta: white - self.slopes @ self.features(theta), start, bounds=tuple(self.bounds)
         )
-        return Estimate(found.x, np.linalg.pinv(found.jac.T @ found.jac))
+        return Estimate(solution.x, np.linalg.pinv(solution.jac.T @ solution.jac))
 
     def log_likelihood(self, z: Floats, theta: Floats) -> float:
         """ln N(z; mean(theta), S)."""

@@ -17,7 +17,7 @@ from studies.peers.linear_gaussian import LinearGaussian, QuadraticFeatures
 def weights_per_frame(weights: int) -> Floats:
     """The library's regression of weights on frames is linear and the same for all dimensions: here its matrix.
 
-    Asked for once with single frames of one: the library builds all dimensions anew for each movement, which takes
+    Evaluated once with single frames of one: the library builds all dimensions anew for each movement, which takes
     25 ms. Shape (weights, FRAMES).
     """
     one = library("movement_primitives.promp", "movement_primitives").ProMP(n_dims=1, n_weights_per_dim=weights)

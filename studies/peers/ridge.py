@@ -18,8 +18,8 @@ ALPHAS = np.logspace(-4, 3, 15)
 class AlignedRidge(NotAble):
     """tslearn and scikit-learn: align to a reference, PCA, RidgeCV from features of theta to the components.
 
-    Theta is found by the inverse: the Gaussian deviations of the components, with their variances alone ("diagonal")
-    or their covariance by Ledoit and Wolf ("full").
+    Theta is estimated by the inverse: the Gaussian deviations of the components, with their variances alone
+    ("diagonal") or their covariance by Ledoit and Wolf ("full").
     """
 
     can = frozenset({SYNTHESIS, THETA, OUTLIERS})
@@ -43,8 +43,8 @@ class AlignedRidge(NotAble):
         self.reference = min(resampled, key=lambda x: float(((x - self.mean_path) ** 2).sum()))
         rows = np.stack([self._row(x) for x in resampled])
         self.dim = resampled[0].shape[1]
-        kept = min(self.components, len(rows) - 1)
-        self.pca = decomposition.PCA(kept).fit(rows)
+        n_components = min(self.components, len(rows) - 1)
+        self.pca = decomposition.PCA(n_components).fit(rows)
         z = self.pca.transform(rows)
         self.features = QuadraticFeatures.of(examples.theta, self.degree)
         self.ridge = linear_model.RidgeCV(alphas=ALPHAS).fit(self.features(examples.theta), z)
@@ -53,16 +53,16 @@ class AlignedRidge(NotAble):
             self.features, self.ridge.intercept_, self.ridge.coef_, self._spread(residual), examples.theta
         )
         rest = rows - self.pca.inverse_transform(z)
-        self.rest_variance = float((rest**2).mean()) * len(rows) / max(1, len(rows) - kept) + 1e-8
+        self.rest_variance = float((rest**2).mean()) * len(rows) / max(1, len(rows) - n_components) + 1e-8
 
     def _spread(self, residual: Floats) -> Floats:
         freedom = len(residual) / max(1, len(residual) - self.features(np.zeros(len(self.features.centre))).size - 1)
         if self.covariance == "full":
             shrunk = library("sklearn.covariance", "scikit-learn").LedoitWolf(assume_centered=True).fit(residual)
-            found: Floats = shrunk.covariance_ * freedom
+            covariance: Floats = shrunk.covariance_ * freedom
         else:
-            found = np.diag((residual**2).mean(axis=0) * freedom)
-        return found + 1e-10 * np.eye(len(found))
+            covariance = np.diag((residual**2).mean(axis=0) * freedom)
+        return covariance + 1e-10 * np.eye(len(covariance))
 
     def _components_at(self, theta: Floats) -> Floats:
         features = self.features(theta)

@@ -12,15 +12,15 @@ from paramove.hmm import resample
 from studies.movements.method import CLASSES, FRAMES, SYNTHESIS, THETA, Estimate, Examples, Method, NotAble
 
 INNER_FOLDS = 3
-MAX_ASKED = 24
-"""About as many movements are asked in an inner fold, evenly chosen: more cost time and change few choices."""
+MAX_TESTED = 24
+"""About as many movements are tested in an inner fold, evenly chosen: more cost time and change few choices."""
 
 
 class Tuned(NotAble):
     """Fits the candidate that does best when whole groups of the training movements are left out, in three folds.
 
-    For one action that is the least product of the errors of synthesis and theta (whichever the method can do),
-    for several the greatest share of right answers.
+    For one action that is the minimum product of the errors of synthesis and theta (whichever the method can do),
+    for several the maximum fraction of right answers.
     """
 
     def __init__(self, make: Callable[..., Method], candidates: Sequence[dict[str, Any]]) -> None:
@@ -47,8 +47,8 @@ class Tuned(NotAble):
             )
         loss = 0.0
         if THETA in method.can:
-            spread = np.maximum(train.theta.std(axis=0), 1e-9)
-            errors = [(method.estimate(x).theta - theta) / spread for x, theta in _pairs(test)]
+            deviation = np.maximum(train.theta.std(axis=0), 1e-9)
+            errors = [(method.estimate(x).theta - theta) / deviation for x, theta in _pairs(test)]
             loss += float(np.log(np.mean(np.linalg.norm(errors, axis=1))))
         if SYNTHESIS in method.can:
             off = [((method.synthesize(theta, FRAMES) - resample(x, FRAMES)) ** 2).mean() for x, theta in _pairs(test)]
@@ -81,9 +81,9 @@ def inner_folds(examples: Examples) -> list[tuple[Examples, Examples]]:
     folds = []
     for k in range(count):
         left_out = np.isin(examples.groups, groups[k::count])
-        asked = np.flatnonzero(left_out)
-        step = max(1, len(asked) // MAX_ASKED)
-        folds.append((examples.chosen(~left_out), examples.chosen(asked[::step])))
+        tested = np.flatnonzero(left_out)
+        step = max(1, len(tested) // MAX_TESTED)
+        folds.append((examples.chosen(~left_out), examples.chosen(tested[::step])))
     return folds
 
 

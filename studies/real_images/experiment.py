@@ -21,7 +21,7 @@ SEEDS = (0, 1, 2, 3, 4)
 
 @dataclass(frozen=True)
 class Case:
-    """One way to replay: pictures a second, and the share of particles that are retargeted."""
+    """One way to replay: pictures a second, and the fraction of particles that are retargeted."""
 
     name: str
     rate_hz: float = RATE_HZ
@@ -39,12 +39,12 @@ CASES = (
 
 @dataclass(frozen=True)
 class Replay:
-    """One case with one seed: what was said, and how far that is from the reference."""
+    """One case with one seed: the estimates, and their distances from the reference."""
 
     case: Case
     seed: int
-    said: list[ReplayedEstimate]
-    found: Distances
+    estimates: list[ReplayedEstimate]
+    distances: Distances
 
 
 def recording_folder(data: Path | None) -> Path:
@@ -62,7 +62,7 @@ def run_all(
     folder: Path,
     seeds: Sequence[int] = SEEDS,
     cases: Sequence[Case] = CASES,
-    done: Callable[[str], None] = lambda told: None,
+    done: Callable[[str], None] = lambda case: None,
     models: Path | None = None,
 ) -> list[Replay]:
     """Replays; the reference is compared with each after it has ended. Raises InputError for a recording of no use."""
@@ -70,8 +70,8 @@ def run_all(
     replays = []
     for case in cases:
         for seed in seeds:
-            said = replayed(folder, rate_hz=case.rate_hz, retargeted=case.retargeted, seed=seed, models=models)
-            replays.append(Replay(case, seed, said, distances(said, reference, camera)))
+            estimates = replayed(folder, rate_hz=case.rate_hz, retargeted=case.retargeted, seed=seed, models=models)
+            replays.append(Replay(case, seed, estimates, distances(estimates, reference, camera)))
             done(f"{case.name}, seed {seed}")
     return replays
 
@@ -81,7 +81,7 @@ def numbers_of(replays: Sequence[Replay]) -> dict[str, Any]:
     cases = {}
     for case in dict.fromkeys(replay.case for replay in replays):
         own = [replay for replay in replays if replay.case == case]
-        runs = [{"seed": replay.seed, **replay.found.numbers()} for replay in own]
+        runs = [{"seed": replay.seed, **replay.distances.numbers()} for replay in own]
         cases[case.name] = {
             "rate_hz": case.rate_hz,
             "retargeted": case.retargeted,
@@ -93,8 +93,10 @@ def numbers_of(replays: Sequence[Replay]) -> dict[str, Any]:
 
 
 def resting_numbers(folder: Path) -> dict[str, Any]:
-    """What a hand scores that is believed to stay on the knee: no tracker may do worse."""
+    """The score of an estimate that always stays on the knee: no tracker may do worse."""
     camera, reference = seated_person.camera(folder), read_reference(folder)
     rest = seated_person.resting_pose(camera)
-    said = [ReplayedEstimate(frame, rest, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in range(len(reference))]
-    return distances(said, reference, camera).numbers()
+    estimates = [
+        ReplayedEstimate(frame, rest, np.empty((0, 2)), 0.0, np.zeros(2), False) for frame in range(len(reference))
+    ]
+    return distances(estimates, reference, camera).numbers()

@@ -1,6 +1,6 @@
-"""The recording played through the parts of the nodes: camera source, image messages, tracker, and what it says.
+"""The recording played through the parts of the nodes: camera source, image messages, tracker, and its estimates.
 
-Nothing here knows where the hand truly is. What is kept comes out of the messages that would be on the bus.
+The true position of the hand is not used here. Estimates are read from the messages that would be on the bus.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from studies.real_images.pointing_model import NAME, pointing_action
 
 IMAGES = "color"
 RATE_HZ = 10.0
-"""Assumed, since the recording does not tell: every third frame of a camera at 30 Hz."""
+"""Assumed, since the recording has no times: every third frame of a camera at 30 Hz."""
 PARTICLES = 1000
 RETARGETED = 0.2
 CAMERA = "camera_1"
@@ -43,12 +43,12 @@ CAMERA = "camera_1"
 
 @dataclass(frozen=True)
 class ReplayedEstimate:
-    """What the tracker says about one frame.
+    """The tracker's estimate of one frame.
 
     Attributes:
         frame: number of the picture. pose: shoulder, elbow, tip of the index finger (9,), m, in the world.
         outline: of the arm, (N, 2), px. progress: mean of tau. direction: mean of theta (u, v), (2,).
-        lost: whether the tracker calls the arm lost, or sees nothing.
+        lost: whether the tracker reports the arm as lost, or sees nothing.
     """
 
     frame: int
@@ -66,18 +66,18 @@ def replayed(
 
     Args:
         rate_hz: assumed pictures a second. retargeted: see `PropagationOptions`. seed: of the filter.
-        models: where the trained model is kept; by default the user's cache.
+        models: folder of the trained model; by default the user's cache.
     """
     camera = seated_person.camera(folder)
     tracker = video_tracker(camera, rate_hz, retargeted, seed, models)
-    said = []
+    estimates = []
     for index, image in camera_messages(folder / IMAGES, camera, rate_hz):
-        for moment in tracker.see(CAMERA, image.timestamp.ToNanoseconds(), decode(image)):
-            estimate = estimate_message(moment, tracker.parameter_names, PARTICLES).SerializeToString()
-            pose = arm_pose_message(moment).SerializeToString()
-            outline = outline_message(moment).SerializeToString()
-            said.append(_heard(index, estimate, pose, outline))
-    return said
+        for tracked in tracker.see(CAMERA, image.timestamp.ToNanoseconds(), decode(image)):
+            estimate = estimate_message(tracked, tracker.parameter_names, PARTICLES).SerializeToString()
+            pose = arm_pose_message(tracked).SerializeToString()
+            outline = outline_message(tracked).SerializeToString()
+            estimates.append(_received(index, estimate, pose, outline))
+    return estimates
 
 
 def video_tracker(
@@ -94,7 +94,7 @@ def video_tracker(
 
 
 def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) -> Iterator[tuple[int, CompressedImage]]:
-    """Number and message of each picture, as the camera node says them. Raises InputError for pictures of no use."""
+    """Number and message of each picture, as the camera node publishes them. Raises InputError."""
     source = open_source(f"folder:{pictures}@{rate_hz:g}", camera.width_px, camera.height_px)
     checks = FrameChecks(camera.width_px, camera.height_px)
     tick = 0
@@ -112,8 +112,8 @@ def camera_messages(pictures: Path, camera: CalibratedCamera, rate_hz: float) ->
         source.close()
 
 
-def _heard(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> ReplayedEstimate:
-    """The three messages, read as a listener reads them."""
+def _received(frame: int, estimate_data: bytes, pose_data: bytes, outline_data: bytes) -> ReplayedEstimate:
+    """The three messages, read as a subscriber reads them."""
     estimate, pose = ActionEstimate.FromString(estimate_data), ArmPose.FromString(pose_data)
     outline = ImageAnnotations.FromString(outline_data).points[0].points
     progress = np.array(estimate.progress)

@@ -23,12 +23,12 @@ MAX_PX = 250.0
 OURS, THEIRS = "#2f6fc4", "#c8372d"
 WHAT = (
     "A seated person points to the own right and then slides the stretched arm across the body and up. Pose of the "
-    "camera, place of the shoulder and the arm's sizes were set on frame 0 alone. The distance is that of the middle "
-    "of the believed hand from the middle of the skin of the seen one; the rate of the pictures is assumed."
+    "camera, position of the shoulder and the arm's sizes were set on frame 0 alone. The distance is that of the "
+    "middle of the estimated hand from the middle of the skin of the visible one; the rate of the pictures is assumed."
 )
 OUTLINES = (
-    "Blue: outline of the believed arm of the first seed, as said on the bus, and the middle of its hand. Red: the "
-    "reference. The pictures themselves are not shown, as a face is visible in them."
+    "Blue: outline of the estimated arm of the first seed, as published on the bus, and the middle of its hand. Red: "
+    "the reference. The pictures themselves are not shown, as a face is visible in them."
 )
 
 
@@ -45,13 +45,13 @@ def write_report(
         section("Distances, px", WHAT, _table(numbers["cases"])),
         section("Frame by frame", "Each line is a seed; grey: the judged frames.",
                 drawn(partial(_over_frames, replays=replays), (11.0, 7.2))),
-        section("What was believed", OUTLINES,
+        section("Estimates", OUTLINES,
                 drawn(partial(_outlines, replay=judged[0], reference=reference, camera=camera), (11.0, 4.6))),
     ]  # fmt: skip
     title = "Tracking on real images"
-    wanted = f"Wanted: the median at most {GOAL_PX:g} px in both ranges of frames, with every seed."
+    goal = f"Goal: the median at most {GOAL_PX:g} px in both ranges of frames, with every seed."
     page = folder / "report.html"
-    text = report_page(title, f"{title}: {verdict}", wanted, parts, good=numbers["met"])
+    text = report_page(title, f"{title}: {verdict}", goal, parts, good=numbers["met"])
     page.write_text(text, encoding="utf-8")
     return page
 
@@ -65,14 +65,14 @@ def _table(cases: Mapping[str, Any]) -> str:
             cells = [f"<td>{escape(name)}</td><td class=n>{run['seed']}</td>"]
             for part in (run[one] for one in RANGES):
                 kind = "yes" if part["median_px"] is not None and part["median_px"] <= GOAL_PX else "no"
-                cells.append(f"<td class='n {kind}'>{_told(part['median_px'])}</td>")
-                cells.append(f"<td class=n>{_told(part['median_of_tip_px'])}</td>")
+                cells.append(f"<td class='n {kind}'>{_formatted(part['median_px'])}</td>")
+                cells.append(f"<td class=n>{_formatted(part['median_of_tip_px'])}</td>")
                 cells.append(f"<td class=n>{part['far_frames']} of {part['frames']}</td>")
             rows.append("".join(cells))
     return "<table>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
 
 
-def _told(value: float | None) -> str:
+def _formatted(value: float | None) -> str:
     return "–" if value is None else f"{value:.1f}"
 
 
@@ -81,7 +81,7 @@ def _over_frames(figure: Figure, replays: Sequence[Replay]) -> None:
     cases = list(dict.fromkeys(replay.case for replay in replays))
     for axes, case in zip(figure.subplots(len(cases), 1, sharex=True, squeeze=False)[:, 0], cases, strict=True):
         for replay in (one for one in replays if one.case == case):
-            axes.plot(replay.found.frames, replay.found.middle, color=OURS, lw=0.9, alpha=0.7)
+            axes.plot(replay.distances.frames, replay.distances.middle, color=OURS, lw=0.9, alpha=0.7)
         for first, last in RANGES.values():
             axes.axvspan(first - 0.5, last + 0.5, color="#dfe4ea", lw=0, zorder=0)
         axes.axhline(GOAL_PX, color=THEIRS, lw=0.8)
@@ -90,8 +90,8 @@ def _over_frames(figure: Figure, replays: Sequence[Replay]) -> None:
 
 
 def _outlines(figure: Figure, replay: Replay, reference: Floats, camera: CalibratedCamera) -> None:
-    """The believed arm beside the reference on empty canvases."""
-    chosen = [one for one in replay.said if one.frame in SHOWN_FRAMES]
+    """The estimated arm and the reference on empty canvases."""
+    chosen = [one for one in replay.estimates if one.frame in SHOWN_FRAMES]
     for axes, one in zip(figure.subplots(2, 4, sharex=True, sharey=True).ravel(), chosen, strict=False):
         closed = np.concatenate([one.outline, one.outline[:1]])
         axes.plot(*closed.T, color=OURS, lw=1.0)

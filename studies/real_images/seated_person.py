@@ -52,32 +52,32 @@ def camera(folder: Path) -> CalibratedCamera:
     """
     path = folder / INTRINSICS
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        width, height = int(told["width"]), int(told["height"])
-        matrix = np.array(told["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T  # stored column by column
+        lens = json.loads(path.read_text(encoding="utf-8"))
+        width, height = int(lens["width"]), int(lens["height"])
+        matrix = np.array(lens["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T  # stored column by column
     except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file; it tells the camera's lens", missing=True) from error
+        raise InputError(f"{path}: no such file; the camera's lens is read from it", missing=True) from error
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise InputError(f"{path}: {error!r}; width, height and a 3 x 3 intrinsic_matrix expected") from error
     return CalibratedCamera("camera_1", width, height, matrix, np.zeros(0), _camera_from_world())
 
 
-def placement(seen_by: CalibratedCamera) -> PersonPlacement:
+def placement(camera: CalibratedCamera) -> PersonPlacement:
     """The resting shoulder and how large the arm is."""
-    return PersonPlacement.of_arm(in_world(SHOULDER_PX, SHOULDER_DEPTH, seen_by), SIZES.length)
+    return PersonPlacement.of_arm(in_world(SHOULDER_PX, SHOULDER_DEPTH, camera), SIZES.length)
 
 
-def resting_pose(seen_by: CalibratedCamera) -> Floats:
+def resting_pose(camera: CalibratedCamera) -> Floats:
     """The pose with the hand on the knee, (9,), m, in the world: the points of frame 0, fitted to the arm's lengths."""
-    seen = ((SHOULDER_PX, SHOULDER_DEPTH), (ELBOW_PX, ELBOW_DEPTH), (FINGERTIP_PX, FINGERTIP_DEPTH))
-    points = np.concatenate([in_world(pixel, depth, seen_by) for pixel, depth in seen])
+    points_px = ((SHOULDER_PX, SHOULDER_DEPTH), (ELBOW_PX, ELBOW_DEPTH), (FINGERTIP_PX, FINGERTIP_DEPTH))
+    points = np.concatenate([in_world(pixel, depth, camera) for pixel, depth in points_px])
     return np.asarray(fitted_poses(points[None], SIZES)[0])
 
 
-def in_world(pixel: tuple[float, float], depth: float, seen_by: CalibratedCamera) -> Floats:
-    """The place (3,), m, of a pixel at a depth, m, along the camera's axis."""
-    ray = np.linalg.solve(seen_by.matrix, np.array([*pixel, 1.0]))
-    turn, shift = seen_by.camera_from_world[:3, :3], seen_by.camera_from_world[:3, 3]
+def in_world(pixel: tuple[float, float], depth: float, camera: CalibratedCamera) -> Floats:
+    """The position (3,), m, of a pixel at a depth, m, along the camera's axis."""
+    ray = np.linalg.solve(camera.matrix, np.array([*pixel, 1.0]))
+    turn, shift = camera.camera_from_world[:3, :3], camera.camera_from_world[:3, 3]
     return np.asarray(turn.T @ (depth * ray - shift))
 
 

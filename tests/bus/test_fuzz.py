@@ -38,7 +38,7 @@ def test_a_crash_is_told_with_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     def crash(*_: object) -> None:
         raise IndexError("made up")
 
-    monkeypatch.setattr(Fuzzer, "_hear", crash)
+    monkeypatch.setattr(Fuzzer, "_receive", crash)
     told: list[str] = []
     assert fuzz(1.0, 3, told.append) == 1
     assert told[0].startswith("seed 3, execution 1: IndexError: made up")
@@ -69,7 +69,7 @@ def test_a_subscriber_survives_a_thousand_inputs(context: zmq.Context[Any], fold
         else:
             speaker.socket.send_multipart([b"truth/state\0" + header, payload])
 
-    fuzzer._hear = say  # type: ignore[method-assign]
+    fuzzer._receive = say  # type: ignore[method-assign]
     for number in range(1000):
         fuzzer.step()
         if number % 100 == 99:

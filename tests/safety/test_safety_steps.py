@@ -21,10 +21,10 @@ def test_nothing_given_is_ever_outside_the_limits(seed: int) -> None:
 
 def test_the_episodes_are_worth_judging() -> None:
     """Every state is reached, most kinds of fault are found, and enough is given."""
-    seen = sum((run.seen for run in map(_run, range(20))), start=Episode(0).seen)
-    assert {state.value for state in State} <= set(seen)
-    assert seen["given"] > 500
-    assert len([what for what in seen if what.startswith("fault ")]) >= 20
+    counts = sum((run.counts for run in map(_run, range(20))), start=Episode(0).counts)
+    assert {state.value for state in State} <= set(counts)
+    assert counts["given"] > 500
+    assert len([what for what in counts if what.startswith("fault ")]) >= 20
 
 
 def _run(seed: int) -> Episode:

@@ -14,7 +14,7 @@ from studies.__main__ import app
 from studies.chapter2 import experiment, figures, findings
 from studies.chapter2.drawing import ellipse
 from studies.chapter2.figures import FIGURES, PLAIN_5, TIMED_5, TIMED_10, Setting
-from studies.chapter2.movement import PARAMETER_SETS, performance, prototype, training_set
+from studies.chapter2.movement import PARAMETER_SETS, demonstration, prototype, training_set
 from studies.chapter2.training import trained
 
 PROPERTY = settings(max_examples=25, deadline=None, derandomize=True)
@@ -28,7 +28,7 @@ def test_the_prototype_goes_out_along_its_slope_and_back_to_the_axis() -> None:
 @PROPERTY
 @given(st.floats(-0.25, 0.25), st.integers(20, 100), st.integers(0, 999))
 def test_a_performance_is_its_prototype_at_another_rate_and_with_noise(p: float, frames: int, seed: int) -> None:
-    movement = performance(p, frames, np.random.default_rng(seed))
+    movement = demonstration(p, frames, np.random.default_rng(seed))
     assert movement.shape == (frames, 2)
     times = np.linspace(0.0, 2.0, 2001)
     gap = np.abs(movement[:, None] - prototype(p, times)[None]).max(axis=2).min(axis=1)
@@ -39,10 +39,10 @@ def test_a_performance_is_its_prototype_at_another_rate_and_with_noise(p: float,
 
 @pytest.mark.parametrize("name", PARAMETER_SETS)
 def test_parameters_of_a_set_lie_within_the_bound_about_zero(name: str) -> None:
-    shares = PARAMETER_SETS[name](np.random.default_rng(0))  # type: ignore[index]
-    assert len(shares) == 10
-    assert np.abs(shares).max() <= 1.0
-    assert_allclose(shares.mean(), 0.0, rtol=0.0, atol=1e-12)
+    fractions = PARAMETER_SETS[name](np.random.default_rng(0))  # type: ignore[index]
+    assert len(fractions) == 10
+    assert np.abs(fractions).max() <= 1.0
+    assert_allclose(fractions.mean(), 0.0, rtol=0.0, atol=1e-12)
     assert len(training_set(0, parameters=name)) == 10  # type: ignore[arg-type]
 
 
@@ -58,22 +58,22 @@ def test_an_ellipse_has_mahalanobis_distance_one() -> None:
 )
 def test_the_likelihood_never_falls(setting: Setting) -> None:
     training = trained(setting, 0, 15)
-    assert len(training.moments) == len(training.log_likelihoods) == 16
+    assert len(training.snapshots) == len(training.log_likelihoods) == 16
     steps = np.diff(training.log_likelihoods)
     assert (steps > -1e-6 * np.abs(training.log_likelihoods[0])).all()
 
 
 def test_time_restrictions_keep_the_means_on_the_axis_where_a_plain_chain_leaves_it() -> None:
     plain, timed = trained(PLAIN_5, 0, 150), trained(TIMED_5, 0, 50)
-    assert experiment.drift(plain.moments[0], PLAIN_5) < findings.ON_AXIS
-    assert experiment.drift(plain.moments[-1], PLAIN_5) > findings.ON_AXIS
-    assert experiment.drift(timed.moments[-1], TIMED_5) < 0.5 * findings.ON_AXIS
-    assert experiment.unevenness(timed.moments[-1]) < 1.3
+    assert experiment.drift(plain.snapshots[0], PLAIN_5) < findings.ON_AXIS
+    assert experiment.drift(plain.snapshots[-1], PLAIN_5) > findings.ON_AXIS
+    assert experiment.drift(timed.snapshots[-1], TIMED_5) < 0.5 * findings.ON_AXIS
+    assert experiment.unevenness(timed.snapshots[-1]) < 1.3
 
 
 def test_five_iterations_suffice_with_time_restrictions_from_simple_means() -> None:
-    there = trained(TIMED_10, 0, 5).moments[-1].means
-    simple = trained(Setting("durations", 10, d_min=3, d_max=6, start="simple"), 0, 5).moments[-1].means
+    there = trained(TIMED_10, 0, 5).snapshots[-1].means
+    simple = trained(Setting("durations", 10, d_min=3, d_max=6, start="simple"), 0, 5).snapshots[-1].means
     assert_allclose(simple, there, rtol=0.0, atol=0.05)
 
 
@@ -93,7 +93,7 @@ def test_the_command_writes_a_report_of_every_figure_that_needs_no_other_file(
 ) -> None:
     for kind in figures.LAST:
         monkeypatch.setitem(figures.LAST, kind, 20)
-    monkeypatch.setattr(experiment, "run_experiment", lambda seed, tell: short)
+    monkeypatch.setattr(experiment, "run_experiment", lambda seed, report: short)
     answer = CliRunner().invoke(app, ["chapter2", "--out", str(tmp_path), "--json", str(tmp_path / "numbers.json")])
     assert answer.exit_code == 0, answer.output
     numbers = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))

@@ -83,12 +83,12 @@ def test_a_goal_shows_how_its_seeds_differ() -> None:
 
 
 @pytest.mark.parametrize(
-    ("hidden", "said"), [([[0, 0], [0, 0]], "quadratic"), ([[0, 0], [0, 2]], "0 to 2 hidden units"), ([[], []], "")]
+    ("hidden", "expected"), [([[0, 0], [0, 0]], "quadratic"), ([[0, 0], [0, 2]], "0 to 2 hidden units"), ([[], []], "")]
 )
-def test_a_row_is_named_by_what_was_fitted(hidden: list[list[int]], said: str) -> None:
+def test_a_row_is_named_by_what_was_fitted(hidden: list[list[int]], expected: str) -> None:
     name = fitted_name("NPHMM 3×3", [{"hidden": units} for units in hidden])
     assert name.startswith("NPHMM 3×3")
-    assert name.removeprefix("NPHMM 3×3").count(said) == 1 if said else name == "NPHMM 3×3"
+    assert name.removeprefix("NPHMM 3×3").count(expected) == 1 if expected else name == "NPHMM 3×3"
 
 
 def test_two_by_two_models_are_no_goal() -> None:

@@ -87,8 +87,8 @@ def test_something_is_said_beside_every_experiment_of_the_thesis():
     tracks = [Track(one) for one in results()]
     found = findings_of(tracks, summarised(tracks))
     wheres = " ".join(finding.where for finding in found)
-    told = ("table 6.1", "6.16", "6.7.1.2", "6.15", "6.17", "6.7.1.3", "6.7.1.4", "6.24", "6.27")
-    assert [where for where in told if where not in wheres] == []
+    expected = ("table 6.1", "6.16", "6.7.1.2", "6.15", "6.17", "6.7.1.3", "6.7.1.4", "6.24", "6.27")
+    assert [where for where in expected if where not in wheres] == []
     assert all(finding.verdict in ("yes", "in part", "no") for finding in found)
 
 

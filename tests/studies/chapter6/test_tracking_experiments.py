@@ -16,7 +16,7 @@ from sim.persons.actions import EYE, FAR_ORIGIN, far_place
 from sim.persons.clips import TRUE_CAMERAS, Clip, Truth, read_clip, write_clip
 from sim.persons.performances import KINDS, Act, kind_named
 from studies.chapter6 import experiments
-from studies.chapter6.experiments import ClipsMissingError, Piece, Selection, pieces, tracked_ways
+from studies.chapter6.experiments import ClipsMissingError, Piece, Selection, pieces, tracked_cases
 from studies.chapter6.measures import Track
 from studies.chapter6.report import write_results
 from studies.chapter6.vocabularies import ACTIONS, knowledge_of, on_far_plane
@@ -137,12 +137,12 @@ def test_keys_follow_from_images_and_arguments(root, tmp_path):
 
 
 def test_all_kinds_are_tracked_with_all_and_with_single_views():
-    ways = {kind.name: list(tracked_ways(kind, 5)) for kind in KINDS}
-    assert ways["pointing_50fps"] == [((1,), "matched"), ((1,), "simple")]
+    cases = {kind.name: list(tracked_cases(kind, 5)) for kind in KINDS}
+    assert cases["pointing_50fps"] == [((1,), "matched"), ((1,), "simple")]
     matched = [(0, 1, 2, 3), (0,), (1,), (2,), (3,), (1, 3)]
     for name in ("pouring", "box", "complex", "recorded"):
-        assert ways[name] == [(views, "matched") for views in matched]
-    assert ways["pointing"][6:] == [(views, "simple") for views in matched[:-1]]
+        assert cases[name] == [(views, "matched") for views in matched]
+    assert cases["pointing"][6:] == [(views, "simple") for views in matched[:-1]]
 
 
 def test_a_third_is_held_out_and_the_rest_is_for_tuning():

@@ -44,7 +44,7 @@ def test_rows_are_told_by_what_their_tests_said(tmp_path: Path) -> None:
         row("P5", "absent.py::test_x"),
     ]
     seen: list[tuple[int, int]] = []
-    results = {result.row.id: result for result in run_tests(rows, tmp_path, lambda *told: seen.append(told))}
+    results = {result.row.id: result for result in run_tests(rows, tmp_path, lambda *reported: seen.append(reported))}
     assert {name: result.outcome for name, result in results.items()} == {
         "P1": "passed",
         "P2": "failed",
@@ -92,6 +92,6 @@ def test_what_a_test_replaces_does_not_reach_its_report(tmp_path: Path) -> None:
 
 
 def test_a_test_that_no_longer_exists_is_missing_even_if_others_of_the_row_pass() -> None:
-    told = [{"test": "a.py::test_x", "outcome": "passed", "message": []}]
-    (result,) = judge([row("P1", "a.py::test_x", "a.py::test_gone")], told)
+    reported = [{"test": "a.py::test_x", "outcome": "passed", "message": []}]
+    (result,) = judge([row("P1", "a.py::test_x", "a.py::test_gone")], reported)
     assert (result.outcome, result.message) == ("missing", "there is no a.py::test_gone")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from paramove.phmm.synchronisation import synchronised
 from studies.__main__ import app
 from studies.imitation.experiment import (
     CENTRE,
-    THESIS_PLACES,
+    THESIS_TARGETS,
     Experiment,
     Setup,
     numbers_of,
@@ -33,7 +34,7 @@ from tests.motion.reaching import ROBOT_FOLDER, reaching_model, solver
 
 @cache
 def experiment() -> Experiment:
-    return run_experiment(Setup(ROBOT_FOLDER, seeds=(0,), repetitions=20, with_raster=False))
+    return run_experiment(Setup(ROBOT_FOLDER, seeds=(0,), repetitions=20, with_grid=False))
 
 
 @cache
@@ -49,18 +50,18 @@ def test_the_global_model_trained_again_gives_the_local_models() -> None:
     """References of the kind "global" are set up by the same global model as the corners."""
     model = reaching_model()
     references = References.of(model, seed=0, repetitions=4)
-    shown = reaching_grid_demonstrations(np.random.default_rng(0)).sequences[:10]
-    frames = [resample(sequence, model.resampled_frames or 200) for sequence in shown]
+    demonstrations = reaching_grid_demonstrations(np.random.default_rng(0)).sequences[:10]
+    frames = [resample(sequence, model.resampled_frames or 200) for sequence in demonstrations]
     assert references.everything is not None
     first = synchronised(references.everything, [frames], TrainingOptions(), 1)[0]
     np.testing.assert_allclose(first.means, model.means_[0], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("place", [place.name for place in THESIS_PLACES])
-def test_the_gripper_keeps_the_goals_of_the_thesis(place: str) -> None:
-    found = numbers()[place, "own"]
-    assert found["gripper"] < 8.0
-    assert found["gripper_at_target"] < 2.0
+@pytest.mark.parametrize("target", [target.name for target in THESIS_TARGETS])
+def test_the_gripper_keeps_the_goals_of_the_thesis(target: str) -> None:
+    errors = numbers()[target, "own"]
+    assert errors["gripper"] < 8.0
+    assert errors["gripper_at_target"] < 2.0
 
 
 def test_the_effective_error_of_the_elbow_is_about_that_of_the_thesis() -> None:
@@ -71,16 +72,16 @@ def test_the_effective_error_of_the_elbow_is_about_that_of_the_thesis() -> None:
 
 
 def test_an_elbow_interpolated_as_part_of_an_arm_is_nearer() -> None:
-    found = numbers()["centre", "own"]
-    assert found["elbow"] < 12.0
-    assert found["elbow_linear"] > 25.0
+    errors = numbers()["centre", "own"]
+    assert errors["elbow"] < 12.0
+    assert errors["elbow_linear"] > 25.0
 
 
 def test_synthesis_adds_little_to_the_imitation_error_that_no_mapping_avoids() -> None:
-    for place in THESIS_PLACES:
-        found = numbers()[place.name, "own"]
-        assert found["imitation_excess"] < 6.0
-        assert found["imitation"] < found["least_imitation"] + 6.0
+    for target in THESIS_TARGETS:
+        errors = numbers()[target.name, "own"]
+        assert errors["imitation_excess"] < 6.0
+        assert errors["imitation"] < errors["least_imitation"] + 6.0
 
 
 def test_the_closed_form_puts_the_reference_elbow_as_near_as_can_be() -> None:
@@ -99,7 +100,7 @@ def test_the_arm_keeps_out_of_the_reach_that_its_elbow_does_not_have() -> None:
     movement = experiment().of(CENTRE)[0].synthesised
     assert np.linalg.norm(movement.proposed.gripper, axis=1).min() < solver().reach[0]
     assert np.linalg.norm(movement.within_limits.gripper, axis=1).min() >= solver().reach[0]
-    uses = {(use.place.name, use.joint): use for use in limit_uses(experiment())}
+    uses = {(use.target.name, use.joint): use for use in limit_uses(experiment())}
     use = uses["centre", "right_elbow"]
     assert 5.0 < use.outside_deg < 20.0
     assert use.gripper_moved_mm > 10.0
@@ -107,10 +108,10 @@ def test_the_arm_keeps_out_of_the_reach_that_its_elbow_does_not_have() -> None:
 
 def test_every_missed_goal_has_a_reason() -> None:
     rows = compared(numbers_of(experiment()))
-    missed = {(one.row.words.split(",")[0].split()[0], one.row.place.name) for one in rows if one.met is False}
+    missed = {(one.row.text.split(",")[0].split()[0], one.row.target.name) for one in rows if one.met is False}
     sentences = why(experiment())
-    for word, place in missed:
-        assert any(word in sentence.lower() and place in sentence for sentence in sentences), (word, place)
+    for word, target in missed:
+        assert any(word in sentence.lower() and target in sentence for sentence in sentences), (word, target)
 
 
 def test_the_report_needs_no_other_file(tmp_path: Path) -> None:
@@ -139,6 +140,20 @@ def test_the_command_prints_the_thesis_beside_ours(tmp_path: Path, monkeypatch: 
     assert str(tmp_path) in done.output.replace("\n", "")
 
 
-def test_the_command_refuses_seeds_that_are_none() -> None:
+def test_the_old_option_works_with_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_grid = []
+
+    def run(setup: Setup, progress: Callable[[str], None]) -> Experiment:
+        with_grid.append(setup.with_grid)
+        return experiment()
+
+    monkeypatch.setattr("studies.imitation.experiment.run_experiment", run)
+    for option in ("--no-raster", "--no-grid"):
+        done = CliRunner().invoke(app, ["imitation", "--seeds", "0", option, "--report", str(tmp_path)])
+        assert ("--no-raster" in done.stderr and "--no-grid" in done.stderr) == (option == "--no-raster")
+    assert with_grid == [False, False]
+
+
+def test_the_command_rejects_seeds_that_are_none() -> None:
     done = CliRunner().invoke(app, ["imitation", "--seeds", "many"])
     assert done.exit_code == 2

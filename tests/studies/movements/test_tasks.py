@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramove.demonstrations.recorded_people import RecordingsError
-from studies.movements.tasks import Fold, corner_targets, raster_tasks, real_tasks
+from studies.movements.tasks import Fold, corner_targets, grid_tasks, real_tasks
 from tests.demonstrations.synthetic_recordings import write_table
 
 
@@ -77,8 +77,8 @@ def test_rejection_has_movements_of_other_kinds(tasks: dict[str, list[Fold]]) ->
     assert len(fold.others) == 2 * 2 * 2
 
 
-def test_raster_of_the_synthetic_demonstrator() -> None:
-    tasks = raster_tasks([0])
+def test_grid_of_the_synthetic_demonstrator() -> None:
+    tasks = grid_tasks([0])
     (fold,) = tasks["raster/reaching"]
     assert (len(fold.train), len(fold.test)) == (90, 140)
     assert fold.train.theta.min() == 0.0

@@ -18,8 +18,8 @@ LENS = [600.0, 0.0, 0.0, 0.0, 600.0, 0.0, 320.0, 240.0, 1.0]
 
 def write_lens(folder: Path) -> CalibratedCamera:
     """The file of the lens, and the camera that it makes."""
-    told = {"width": 640, "height": 480, "intrinsic_matrix": LENS}
-    (folder / seated_person.INTRINSICS).write_text(json.dumps(told), encoding="utf-8")
+    lens = {"width": 640, "height": 480, "intrinsic_matrix": LENS}
+    (folder / seated_person.INTRINSICS).write_text(json.dumps(lens), encoding="utf-8")
     return seated_person.camera(folder)
 
 

@@ -38,25 +38,25 @@ def replays(recording, models):
 
 
 def test_the_hand_is_followed(replays):
-    found = replays[0].found
+    found = replays[0].distances
     assert found.frames.tolist() == list(range(25))
     assert np.median(found.middle) < 0.5 * GOAL_PX
     assert np.median(found.middle) < np.median(found.tip), "the reference is the hand's middle"
 
 
 def test_what_is_said_comes_with_every_frame(replays):
-    for one in replays[0].said:
+    for one in replays[0].estimates:
         assert one.pose.shape == (9,)
         assert len(one.outline) > 50
         assert 0.0 <= one.progress <= 1.0
-    assert replays[0].said[-1].direction[0] == pytest.approx(0.8, abs=0.15)
+    assert replays[0].estimates[-1].direction[0] == pytest.approx(0.8, abs=0.15)
 
 
 def test_tracking_needs_no_reference(recording, models, replays, tmp_path):
     for name in ("color", "cam_params_realsense.json"):
         (tmp_path / name).symlink_to(recording / name)
-    said = replay.replayed(tmp_path, models=models)
-    np.testing.assert_array_equal([one.pose for one in said], [one.pose for one in replays[0].said])
+    estimates = replay.replayed(tmp_path, models=models)
+    np.testing.assert_array_equal([one.pose for one in estimates], [one.pose for one in replays[0].estimates])
 
 
 def test_the_page_shows_no_picture(replays, recording, tmp_path):
@@ -96,7 +96,7 @@ def test_the_real_recording_keeps_the_goal():
         folder = recording_folder(None)
     except InputError as error:
         pytest.skip(str(error))
-    found = run_all(folder, (0,), (Case(JUDGED.name),))[0].found.numbers()
+    found = run_all(folder, (0,), (Case(JUDGED.name),))[0].distances.numbers()
     medians = [found[name]["median_px"] for name in RANGES]
     resting = resting_numbers(folder)
     assert max(medians) <= GOAL_PX
