@@ -96,7 +96,7 @@ def handle(folder: Path, sleeping: bool) -> None:
                 "received": counter.messages,
                 "lost": counter.lost,
                 "duplicated": counter.repeated,
-                "refused": counter.refused.total(),
+                "refused": counter.rejected.total(),
                 "p50_us": sorted_ns[len(sorted_ns) // 2] * 1e-3,
                 "p99_us": sorted_ns[int(0.99 * len(sorted_ns))] * 1e-3,
                 "max_ms": sorted_ns[-1] * 1e-6,

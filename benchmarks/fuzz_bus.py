@@ -25,7 +25,7 @@ from paramove.bus import (
     SIZE,
     Envelope,
     RateBudget,
-    RefusedError,
+    RejectedError,
     SequenceCounter,
     pack,
     schema_hash,
@@ -130,7 +130,7 @@ class Fuzzer:
                 self._envelope(kind, content, other)
             else:
                 self._decoder(kind, mutate(content, other, self._generator))
-        except RefusedError as error:
+        except RejectedError as error:
             self.outcomes[error.reason.value] += 1
 
     def _envelope(self, kind: Any, content: bytes, other: bytes) -> None:

@@ -108,7 +108,7 @@ def loaded(folder: Path, seconds: float) -> dict[str, Any]:
     while publisher.recorder.poll() is None:
         publisher.bus.idle(0.05)
     last = publisher.bus.exchange.take([STATUS.name])[-1].message
-    on_the_bus = sum(count.lost + count.refused for count in last.received)
+    on_the_bus = sum(count.lost + count.rejected for count in last.received)
     lost = len(publisher.missing_s(publisher.file))
     publisher.close()
     return {"said": len(publisher.published_s), "lost": lost, "lost_on_the_bus": on_the_bus}

@@ -60,7 +60,7 @@ class Swing:
         reader = StreamReader(self.robot, self.robot.units.to_counts(self.robot.base_pose))
         for first in range(0, DURATION - TICK, TICK):
             if not reader.offer(self.batch(first, COVER)):
-                raise NotSmoothError(f"the undisturbed stream is rejected: {reader.refusal}")
+                raise NotSmoothError(f"the undisturbed stream is rejected: {reader.rejection}")
             self.begun.append(copy.copy(reader))
             for _ in range(TICK):
                 reader.play()
@@ -82,7 +82,7 @@ def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
     """One pattern: what the robot played until it rests, [N, J] counts, its past included, and what happened."""
     stage, counts = swing(), Counter[str]()
     reader = copy.copy(stage.begun[random.integers(len(stage.begun))])
-    reader.refused_batches = 0
+    reader.rejected_batches = 0
     frames = list(reader._played)
     waiting: list[StreamBatch] = []
     for _ in range(random.integers(1, 4)):
@@ -102,7 +102,7 @@ def run(random: np.random.Generator) -> tuple[Floats, Counter[str]]:
             reader.offer(batch)
         waiting.clear()
     frames += [reader.play() for _ in range(reader.depth)]
-    counts["refused"] += reader.refused_batches
+    counts["refused"] += reader.rejected_batches
     counts["under-run" if reader.next_index < DURATION else "played to its end"] += 1
     if not reader.at_rest:
         raise NotSmoothError("the robot is not at rest")

@@ -57,8 +57,8 @@ def api_page() -> str:
                 file = Path(inspect.getfile(importlib.import_module(thing.__module__))).relative_to(ROOT)
                 link = f"[{link}](../../{file})"
             described = ours or inspect.ismodule(thing)
-            sentence = first_sentence(thing) if described else f"`{inspect.formatannotation(thing):.120}`"
-            parts.append(f"| {link} | {sentence.replace('|', '&#124;')} |\n")
+            detail = first_sentence(thing) if described else f"`{inspect.formatannotation(thing):.120}`"
+            parts.append(f"| {link} | {detail.replace('|', '&#124;')} |\n")
     return "".join(parts)
 
 

@@ -26,9 +26,9 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes. An image that cannot be used is skipped and reported."""
     tracker = config.video_tracker(bus.run_folder)
     names, place = tracker.parameter_names, config.table_place
-    sentence = f"tracking {', '.join(names)} with {', '.join(tracker.cameras)}"
-    bus.ready(sentence)
-    reported = tracker.kind_of_trouble
+    detail = f"tracking {', '.join(names)} with {', '.join(tracker.cameras)}"
+    bus.ready(detail)
+    reported = tracker.problem_kind
     for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
             tracker.tick(event.now_ns)
@@ -41,11 +41,11 @@ def run(bus: Bus, config: Config) -> None:
                     bus.publish(topics.ACTION_OUTLINE, outline_message(estimate), at)
                     bus.publish(topics.ACTION_SCENE, scene_message(estimate, place), at)
             except FrameError as error:
-                tracker.cannot_see(camera, event.captured_ns, str(error))
+                tracker.add_unreadable(camera, event.captured_ns, str(error))
         trouble = tracker.trouble()
-        if tracker.kind_of_trouble != reported:
-            reported = tracker.kind_of_trouble
-            bus.degraded(trouble) if trouble else bus.ready(sentence)
+        if tracker.problem_kind != reported:
+            reported = tracker.problem_kind
+            bus.degraded(trouble) if trouble else bus.ready(detail)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ def run(bus: Bus, config: Config) -> None:
     handle: dict[topics.Topic, Any] = {topics.ARM_TRAJECTORY: driver.on_trajectory}
     handle |= {topics.WIRE_HOAP3_STATE: driver.on_robot_state}
     handle |= dict.fromkeys(topics.ARMINGS, driver.on_arm_request) | dict.fromkeys(topics.STOPS, driver.on_stop)
-    bus.ready(driver.sentence)
+    bus.ready(driver.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             handle[event.topic](event.message, event.captured_ns)
@@ -50,7 +50,7 @@ def run(bus: Bus, config: Config) -> None:
         for status in output.statuses:
             bus.publish(topics.ARM_TRAJECTORY_STATUS, status)
         bus.publish(topics.ARM_SAFETY, output.safety)
-        bus.ready(driver.sentence)
+        bus.ready(driver.detail)
 
 
 if __name__ == "__main__":

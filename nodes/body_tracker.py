@@ -25,8 +25,8 @@ def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes. An image that cannot be used is skipped and reported."""
     tracking = config.body_tracking(bus.run_folder)
     first = tracking.cameras["camera_1"]
-    sentence = f"looking for {', '.join(tracking.point_names)} with {', '.join(tracking.cameras)}"
-    bus.ready(sentence)
+    detail = f"looking for {', '.join(tracking.point_names)} with {', '.join(tracking.cameras)}"
+    bus.ready(detail)
     reported = ""
     for event in bus.events(*SUBSCRIBES, tick=True):
         if isinstance(event, Tick):
@@ -38,10 +38,10 @@ def run(bus: Bus, config: Config) -> None:
                     for topic, message in zip(PUBLISHES, messages, strict=True):
                         bus.publish(topic, message, pose.captured_ns)
             except FrameError as error:
-                tracking.cannot_see(camera, event.captured_ns, str(error))
+                tracking.add_unreadable(camera, event.captured_ns, str(error))
         if (trouble := tracking.trouble()) != reported:
             reported = trouble
-            bus.degraded(trouble) if trouble else bus.ready(sentence)
+            bus.degraded(trouble) if trouble else bus.ready(detail)
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes. An image that cannot be decoded is skipped."""
     tracker = ColourTracker(config.colours)
-    sentence = f"tracking {', '.join(colour.name for colour in config.colours)}"
-    bus.ready(sentence)
+    detail = f"tracking {', '.join(colour.name for colour in config.colours)}"
+    bus.ready(detail)
     well = True
     for received in bus.latest(topics.CAMERA_IMAGE):
         try:
@@ -33,7 +33,7 @@ def run(bus: Bus, config: Config) -> None:
         bus.publish(topics.OBJECTS_TRACKED, tracker.update(image, received.captured_ns), received.captured_ns)
         if not well:
             well = True
-            bus.ready(sentence)
+            bus.ready(detail)
 
 
 if __name__ == "__main__":

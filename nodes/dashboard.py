@@ -44,8 +44,8 @@ def run(bus: Bus, config: Config) -> None:
             button.look(event.now_ns)
             page.show(picture.changes(event.now_ns, button.section()), picture.image())
             if button.is_over(event.now_ns):
-                page.say_farewell(button.sentence)
-                bus.ended(button.sentence)
+                page.say_farewell(button.detail)
+                bus.ended(button.detail)
                 return
 
 

@@ -31,7 +31,7 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes."""
     operator = Operator(config.arms_at_start, config.arms_at_start and started_before(bus.run_folder, bus.node))
-    bus.ready(operator.sentence)
+    bus.ready(operator.detail)
     for received in bus.latest(topics.ARM_SAFETY):
         request = operator.update(received.message, bus.now_ns)
         if request is not None:

@@ -32,7 +32,7 @@ def run(bus: Bus, config: Config) -> None:
     reaching = ServoArmReaching(RobotDescription.load(config.robot), config.movement.trained())
     task = ReachTask(reaching, config.tasks, f"reach-{bus.now_ns}")
     handle = (task.on_joint_states, task.on_safety, task.on_trajectory_status)
-    bus.ready(task.sentence)
+    bus.ready(task.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             handle[SUBSCRIBES.index(event.topic)](event.message)
@@ -43,7 +43,7 @@ def run(bus: Bus, config: Config) -> None:
             bus.failed(task.failure)
         if task.finished or task.failure:
             return
-        bus.ready(task.sentence)
+        bus.ready(task.detail)
 
 
 if __name__ == "__main__":

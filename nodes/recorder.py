@@ -23,15 +23,15 @@ class Config(NodeConfig):
 def run(bus: Bus, config: Config) -> None:
     """Loop until the bus closes, then finish the file."""
     with Recorder(bus, bus.run_folder / config.file, "paramove recorder") as recording:
-        count, sentence = 0, f"recording to {recording.part_name}"
-        recording.tell(sentence)
+        count, detail = 0, f"recording to {recording.part_name}"
+        recording.tell(detail)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Received):
                 recording.keep(event)
                 count += 1
                 if count % REPORT_EVERY == 0:
-                    sentence = f"{count} messages recorded"
-            recording.tell(sentence)
+                    detail = f"{count} messages recorded"
+            recording.tell(detail)
 
 
 if __name__ == "__main__":

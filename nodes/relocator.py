@@ -35,7 +35,7 @@ def run(bus: Bus, config: Config) -> None:
             bus.failed(relocator.failure)
         if relocator.finished or relocator.failure:
             return
-        bus.ready(relocator.sentence)
+        bus.ready(relocator.detail)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def run(bus: Bus, config: Config) -> None:
             bus.failed(learner.failure)
         if learner.finished or learner.failure:
             return
-        bus.ready(learner.sentence)
+        bus.ready(learner.detail)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ def run(bus: Bus, config: Config) -> None:
         for event in bus.events(*SUBSCRIBES, tick=True):
             if not isinstance(event, Tick):
                 handle[event.topic](event.message, event.captured_ns)
-            bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.sentence)
+            bus.degraded(arm.trouble) if arm.trouble else bus.ready(arm.detail)
 
 
 def publish_all(bus: Bus, arm: DrivenArm) -> None:

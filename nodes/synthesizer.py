@@ -34,7 +34,7 @@ def run(bus: Bus, config: Config) -> None:
         topics.ARM_JOINT_STATES: synthesizer.on_joint_states,
         topics.ARM_TRAJECTORY_STATUS: synthesizer.on_trajectory_status,
     }
-    bus.ready(synthesizer.sentence)
+    bus.ready(synthesizer.detail)
     for event in bus.events(*SUBSCRIBES, tick=True):
         if not isinstance(event, Tick):
             handle[event.topic](event.message)
@@ -44,7 +44,7 @@ def run(bus: Bus, config: Config) -> None:
             bus.publish(topics.ARM_TRAJECTORY, trajectory)
         for status in output.statuses:
             bus.publish(topics.RELOCATION_STATUS, status)
-        bus.ready(synthesizer.sentence)
+        bus.ready(synthesizer.detail)
 
 
 if __name__ == "__main__":

@@ -43,13 +43,13 @@ def run(bus: Bus, config: Config) -> None:
     with EmulatedArm(
         robot, config.scene, link, control, config.posture_deg, config.seed, config.held, config.servo_rules_only
     ) as arm:
-        bus.ready(arm.sentence)
+        bus.ready(arm.detail)
         for event in bus.events(tick=True):
             if isinstance(event, Tick):
                 arm.emulator.check()
                 bus.publish(topics.TRUTH_STATE, arm.truth(event.now_ns))
                 if event.number % REPORT_TICKS == 0:
-                    bus.ready(arm.sentence)
+                    bus.ready(arm.detail)
 
 
 if __name__ == "__main__":

@@ -54,22 +54,22 @@ def run(bus: Bus, config: Config) -> None:
     judge = Judge(bus.run_folder / "truth.json")
     path = bus.run_folder / "truth.mcap"
     earlier = judge.recall(PartedRecording(path))
-    sentence = f"goes on after {earlier} recorded states" if earlier else "waits for the truth"
+    detail = f"goes on after {earlier} recorded states" if earlier else "waits for the truth"
     with contextlib.ExitStack() as ending:
         recording = ending.enter_context(Recorder(bus, path, "paramove judge")) if config.record else None
         report = bus.ready if recording is None else recording.tell
         ending.callback(judge.write)
-        report(sentence)
+        report(detail)
         for event in bus.events(*SUBSCRIBES, tick=True):
             if isinstance(event, Received):
                 if event.topic is topics.TRUTH_LAYOUT:
                     judge.begin(event.message)
                 elif event.topic is topics.TRUTH_STATE:
-                    sentence = judge.take(event.message) or sentence
+                    detail = judge.take(event.message) or detail
                 if recording is not None:
                     view = event.topic is topics.TRUTH_VIEW
                     recording.keep(event, compressed(event.message, config.jpeg_quality) if view else None)
-            report(sentence)
+            report(detail)
 
 
 class Judge:

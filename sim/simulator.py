@@ -110,10 +110,10 @@ def _loop(bus: Bus, config: Config, simulation: Simulation, say_more: Callable[[
         if not bus.settings.lockstep:
             due_s = _keep_pace(bus, due_s + 1 / (CAMERA_HZ * config.pace))
         if barrier.tick % (REPORT_S * CAMERA_HZ) == 0:
-            bus.ready(_sentence(simulation, wall_s))
+            bus.ready(_detail(simulation, wall_s))
     wall_s = time.perf_counter() - started_s
     barrier.close()
-    _log.info("%s", _sentence(simulation, wall_s))
+    _log.info("%s", _detail(simulation, wall_s))
     pairs = simulation.world.contacts.unwanted_pairs
     if pairs:
         _log.warning("unwanted contacts: %s", ", ".join(f"{name} ({count})" for name, count in sorted(pairs.items())))
@@ -139,7 +139,7 @@ def _say(bus: Bus, simulation: Simulation) -> None:
     bus.publish(topics.TRUTH_STATE, truth.state(simulation))
 
 
-def _sentence(simulation: Simulation, wall_s: float) -> str:
+def _detail(simulation: Simulation, wall_s: float) -> str:
     time_s = max(simulation.world.time_s, 1e-9)
     percent = 100 / max(wall_s, 1e-9)
     return (

@@ -25,7 +25,7 @@ from paramove.demonstrations import (
     Demonstrator,
     arc,
     body_points,
-    kept_away,
+    kept_clear,
     leaning,
     minimum_jerk,
     overreach,
@@ -97,7 +97,7 @@ def staged(
     leans = [leaning(place, person.lengths.upper_arm + lower + far) for place, far in zip(reached, reach, strict=True)]
     lean = _through(fractions, np.array([np.zeros(3), *leans, np.zeros(3)]))
     shoulder = RESTING_SHOULDER + posture + lean
-    effector = kept_away(_hand_path(stops, reached, fractions, person, unevenness, rng), shoulder, _nearest(reached))
+    effector = kept_clear(_hand_path(stops, reached, fractions, person, unevenness, rng), shoulder, _nearest(reached))
     usual = person.lengths.grasp
     along = _through(fractions, np.array([usual, *reach, usual]))
     shoulder = shoulder + overreach(effector - shoulder, person.lengths.upper_arm + lower + along)

@@ -82,7 +82,7 @@ class Follower:
             "deviation": round(target.deviation, 4),
         }
 
-    def found(self) -> dict[str, Any]:
+    def estimates(self) -> dict[str, Any]:
         """All estimates, one entry per frame; lengths in m."""
         estimates, names = self._estimates, self._knowledge.vocabulary.names
         pointed = [self._knowledge.pointed(one.targets[one.action], self.placement) for one in estimates]

@@ -48,7 +48,7 @@ class KillResult:
     ready_s: float | None = None
     end_s: float | None = None
     exit_code: int | None = None
-    sentence: str = ""
+    detail: str = ""
     step: firmware_log.LargestStep | None = None
     pace: float | None = None
     problems: list[str] = field(default_factory=list)
@@ -179,7 +179,7 @@ class KillRun:
             result.problems.append("never ready again")
         else:
             result.ready_s = (ready["monotonic_ns"] - struck_ns) * 1e-9
-            result.sentence = str(ready.get("sentence", ""))
+            result.detail = str(ready.get("sentence", ""))
 
     def _follow_end(self, run: LiveRun, result: KillResult, struck_ns: int) -> None:
         """The run must end by itself, with a message that names the node and what happened to it."""
@@ -189,23 +189,23 @@ class KillRun:
             return
         result.end_s = (time.monotonic_ns() - struck_ns) * 1e-9
         result.exit_code = run.process.returncode
-        result.sentence = run.last_sentence
+        result.detail = run.last_sentence
         if result.exit_code != exit_codes.FAILURE:
             result.problems.append(f"exit code {result.exit_code}, expected {exit_codes.FAILURE}")
         expected = [node, f"SIG{result.case.signal}"]
         expected += ["is back", "disarmed"] if result.case.expected is Expected.ENDS_BACK else []
-        missing = [word for word in expected if not re.search(rf"\b{word}\b", result.sentence)]
+        missing = [word for word in expected if not re.search(rf"\b{word}\b", result.detail)]
         if missing:
-            result.problems.append(f"the last message lacks {', '.join(missing)}: {result.sentence}")
+            result.problems.append(f"the last message lacks {', '.join(missing)}: {result.detail}")
 
     def _follow_launcher(self, run: LiveRun, result: KillResult, struck_ns: int) -> None:
         if result.case.signal == "KILL":
             self._until(run, lambda: not run.alive, END_S)
             result.exit_code = run.process.returncode
             _wait(lambda: "launcher" in run.last_sentence)
-            result.sentence = run.last_sentence
-            if "launcher" not in result.sentence:
-                result.problems.append(f"no message that the launcher was killed; last: {result.sentence}")
+            result.detail = run.last_sentence
+            if "launcher" not in result.detail:
+                result.problems.append(f"no message that the launcher was killed; last: {result.detail}")
             if not _wait(lambda: not left_over(run.domain, run.bus_folder.parent)):
                 result.problems.append("nodes outlive the launcher by more than 3 s")
             result.end_s = (time.monotonic_ns() - struck_ns) * 1e-9

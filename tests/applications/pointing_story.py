@@ -101,7 +101,7 @@ class PointingStory:
         return self.relocator.finished
 
     def run_to(self, state: str) -> None:
-        assert self.run(until=lambda: self.relocator.state == state), f"stopped at: {self.relocator.sentence}"
+        assert self.run(until=lambda: self.relocator.state == state), f"stopped at: {self.relocator.detail}"
 
     # What is seen
 
@@ -118,7 +118,7 @@ class PointingStory:
         self.hand = REST
 
     def safety(self, state: SafetyState.State, why: str = "") -> None:
-        message = SafetyState(state=state, faults=[SafetyFault(code="x", sentence=why)] if why else [])
+        message = SafetyState(state=state, faults=[SafetyFault(code="x", detail=why)] if why else [])
         self._hear(topics.ARM_SAFETY, message, self.relocator.on_safety)
 
     def _answer(self, how: tuple[Place, float] | None) -> None:
@@ -130,7 +130,7 @@ class PointingStory:
         message.captured.FromNanoseconds(self.now_ns)
         message.hand.x, message.hand.y = self.hand
         if self.trouble:
-            message.lost, message.degraded, message.sentence = self.lost, not self.lost, self.trouble
+            message.lost, message.degraded, message.detail = self.lost, not self.lost, self.trouble
         self._hear(topics.ACTION_ESTIMATE, message, self.relocator.on_estimate)
 
     # What the arm does
@@ -138,7 +138,7 @@ class PointingStory:
     def _do(self, goal: RelocationGoal) -> None:
         waiting = self.outcomes.get(goal.kind)
         state, reason = waiting.pop(0) if waiting else (RelocationStatus.STATE_SUCCEEDED, "")
-        if state == RelocationStatus.STATE_REFUSED:
+        if state == RelocationStatus.STATE_REJECTED:
             self._say(goal.id, state, reason)
             return
         self._say(goal.id, RelocationStatus.STATE_ACCEPTED)
@@ -158,4 +158,4 @@ class PointingStory:
         return [goal for goal in self.goals if goal.kind == kind]
 
     def sentences(self) -> str:
-        return "\n".join(speech.sentence for speech in self.speech)
+        return "\n".join(speech.text for speech in self.speech)

@@ -48,8 +48,8 @@ class ServoCell:
         self._answered: set[str] = set()
         self._number = 0
 
-    def disarm(self, state: SafetyState.State, sentence: str) -> None:
-        self.safety = SafetyState(state=state, faults=[SafetyFault(code="x", joint="joint2", sentence=sentence)])
+    def disarm(self, state: SafetyState.State, detail: str) -> None:
+        self.safety = SafetyState(state=state, faults=[SafetyFault(code="x", joint="joint2", detail=detail)])
 
     def tick(self, count: int = 1) -> ServoCell:
         for _ in range(count):
@@ -69,7 +69,7 @@ class ServoCell:
     def run(self, maximum: int = 400) -> ServoCell:
         """Until the tasks are done or have failed."""
         while not (self.task.finished or self.task.failure):
-            assert self._number < maximum, self.task.sentence
+            assert self._number < maximum, self.task.detail
             self.tick()
         return self
 

@@ -24,10 +24,10 @@ PLACES = {"yellow": (0.170, 0.05), "green": (0.180, -0.08), "blue": (0.175, -0.0
 OPTIONS = RuleLearnerOptions(
     ("yellow", "green", "blue"), CORNERS, (0.155, -0.02, -0.05), -0.098, Surface((0.10, 0.24), (-0.17, 0.13))
 )
-SUCCEEDED, FAILED, REFUSED = (
+SUCCEEDED, FAILED, REJECTED = (
     RelocationStatus.STATE_SUCCEEDED,
     RelocationStatus.STATE_FAILED,
-    RelocationStatus.STATE_REFUSED,
+    RelocationStatus.STATE_REJECTED,
 )
 Place = tuple[float, float]
 
@@ -109,7 +109,7 @@ class Story:
         return self.learner.finished
 
     def run_to(self, stage: ApplicationStage.Stage) -> None:
-        assert self.run(until=lambda: self.stages[-1].stage == stage), f"stopped at: {self.learner.sentence}"
+        assert self.run(until=lambda: self.stages[-1].stage == stage), f"stopped at: {self.learner.detail}"
 
     # What is seen
 
@@ -183,7 +183,7 @@ class Story:
         applying = self.stages[-1].stage == ApplicationStage.STAGE_APPLY
         if applying and goal.kind == RelocationGoal.KIND_RELOCATE and self.outcomes:
             state, reason, place = self.outcomes.pop(0)
-        if state == REFUSED:
+        if state == REJECTED:
             self._say(goal.id, state, reason, self.in_the_way.pop(0) if self.in_the_way else [])
             return
         target = (goal.to.x, goal.to.y)
@@ -222,7 +222,7 @@ class Story:
         ]
 
     def sentences(self) -> str:
-        return "\n".join(speech.sentence for speech in self.speech)
+        return "\n".join(speech.text for speech in self.speech)
 
     def relocations(self) -> list[RelocationGoal]:
         """Relocations of stage 3, each once."""

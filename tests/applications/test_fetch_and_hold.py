@@ -11,7 +11,7 @@ from paramove.applications.relocator_options import RelocatorOptions
 from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory
-from tests.motion.fake_driver import FAILED, OFFER, PLACE, REFUSED, SUCCEEDED, Cell, FakeDriver, goal
+from tests.motion.fake_driver import FAILED, OFFER, PLACE, REJECTED, SUCCEEDED, Cell, FakeDriver, goal
 from tests.motion.reaching import ARM, HOAP3, JOINTS, OPENINGS, at, checker, planner
 
 HOLD = (0.13, -0.12, -0.045)
@@ -62,7 +62,7 @@ def test_an_object_that_slips_on_the_way_is_noticed() -> None:
 def test_where_it_cannot_be_held_is_refused_before_the_arm_moves(more: dict, words: str) -> None:
     cell = Cell()
     last = cell.do(fetch(**more))
-    assert last.state == REFUSED
+    assert last.state == REJECTED
     assert words in last.reason
     assert cell.driver.heard == []
 

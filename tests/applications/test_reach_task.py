@@ -26,7 +26,7 @@ def test_does_all_tasks_in_order_and_tells() -> None:
     assert list(cell.sent[0].joints) == list(cell.plan.joints)
     first = cell.sent[1].points[0].position_rad
     np.testing.assert_allclose(first, cell.sent[0].points[-1].position_rad, rtol=0, atol=1e-12)
-    speech = [one.sentence for one in cell.speech]
+    speech = [one.text for one in cell.speech]
     assert speech[0].startswith("task 1 of 2, reach for (0.150, 0.050, 0.100) m")
     assert speech[1].startswith("task 2 of 2, pick up at (0.150, -0.050, 0.016) m and place at (0.120, 0.080, 0.016) m")
     assert speech[2] == "all 2 tasks are done"
@@ -41,18 +41,18 @@ def test_goes_back_to_the_base_pose_at_the_end() -> None:
 def test_begins_where_the_arm_rests_and_not_before() -> None:
     start = reaching("koch_v1_1").reach((0.12, -0.1, 0.12)).angles[-1]
     cell = ServoCell("koch_v1_1", start=start)
-    assert cell.task.sentence == "waiting for the arm's driver"
+    assert cell.task.detail == "waiting for the arm's driver"
     cell.disarm(SafetyState.STATE_DISARMED, "servo 3 does not answer")
     cell.tick(20)
     assert not cell.sent
-    assert cell.task.sentence == "waiting until a person arms the arm (paramove arm enable); servo 3 does not answer"
+    assert cell.task.detail == "waiting until a person arms the arm (paramove arm enable); servo 3 does not answer"
     for number in range(12):
         if number == 4:
             cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
         cell.angles = cell.angles + np.deg2rad(0.2)
         cell.tick()
     assert not cell.sent
-    assert cell.task.sentence == "waiting until the arm rests"
+    assert cell.task.detail == "waiting until the arm rests"
     rested = cell.angles
     cell.run()
     np.testing.assert_allclose(cell.sent[0].points[0].position_rad, rested, rtol=0, atol=1e-12)
@@ -67,7 +67,7 @@ def test_a_wait_that_takes_longer_is_said_aloud_and_again_for_another_reason() -
     cell.disarm(SafetyState.STATE_DISARMED, "joint 3 is far")
     cell.tick(60)
     wanted = "waiting until a person arms the arm (paramove arm enable); joint"
-    assert [one.sentence for one in cell.speech] == [f"{wanted} 2 is far", f"{wanted} 3 is far"]
+    assert [one.text for one in cell.speech] == [f"{wanted} 2 is far", f"{wanted} 3 is far"]
     cell.safety = SafetyState(state=SafetyState.STATE_ARMED)
     assert cell.run().task.finished
 
@@ -97,7 +97,7 @@ def test_a_joint_far_outside_its_range_ends_the_tasks_with_what_helps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("state", "word"), [(TrajectoryStatus.STATE_STOPPED, "stopped"), (TrajectoryStatus.STATE_REFUSED, "refused")]
+    ("state", "word"), [(TrajectoryStatus.STATE_STOPPED, "stopped"), (TrajectoryStatus.STATE_REJECTED, "refused")]
 )
 def test_what_the_driver_stops_or_refuses_ends_the_tasks_with_its_reason(
     state: TrajectoryStatus.State, word: str
@@ -108,7 +108,7 @@ def test_what_the_driver_stops_or_refuses_ends_the_tasks_with_its_reason(
     assert len(cell.sent) == 1
     expected = f"task 1 of 2, reach for (0.150, 0.050, 0.100) m: the arm's driver {word} the motion: joint joint2 is"
     assert cell.task.failure.startswith(expected)
-    assert cell.speech[-1].sentence == cell.task.failure
+    assert cell.speech[-1].text == cell.task.failure
     assert cell.speech[-1].request == Speech.REQUEST_HELP
     cell.tick(20)
     assert len(cell.sent) == 1
@@ -116,7 +116,7 @@ def test_what_the_driver_stops_or_refuses_ends_the_tasks_with_its_reason(
 
 def test_a_stale_trajectory_is_said_again_with_the_time_of_then() -> None:
     cell = ServoCell()
-    cell.answers, cell.code = (TrajectoryStatus.STATE_REFUSED,), "stale"
+    cell.answers, cell.code = (TrajectoryStatus.STATE_REJECTED,), "stale"
     while len(cell.sent) < 2:
         cell.tick()
     assert cell.sent[0].id == cell.sent[1].id
@@ -154,7 +154,7 @@ def test_messages_of_other_motions_and_joints_change_nothing() -> None:
     cell.tick(10)
     cell.task.on_trajectory_status(TrajectoryStatus(trajectory_id="x", state=TrajectoryStatus.STATE_SUCCEEDED))
     assert not cell.task.failure
-    assert cell.task.sentence.startswith("task 1 of 2")
+    assert cell.task.detail.startswith("task 1 of 2")
 
 
 def test_a_task_out_of_reach_is_refused_before_the_arm_moves() -> None:

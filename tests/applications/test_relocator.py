@@ -11,7 +11,7 @@ from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState
 from tests.applications.pointing_story import FETCH, PLACES, PUT, RESTS, PointingStory
 
-FAILED, REFUSED = RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED
+FAILED, REJECTED = RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED
 DEFAULT = RelocatorOptions()
 
 
@@ -49,7 +49,7 @@ def test_nothing_is_put_down_before_somebody_points():
     assert story.of(PUT) == []
     asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_POINT_AT_PLACE]
     assert len(asked) == 4
-    assert "I have not seen you point" in asked[-1].sentence
+    assert "I have not seen you point" in asked[-1].detail
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_place_that_is_of_no_use_is_asked_for_again_with_the_reason(place, cer
     assert places(story.of(PUT), "to") == [(0.13, -0.08)]
     asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_POINT_AT_PLACE]
     assert len(asked) == 2
-    assert asked[1].sentence.endswith("Please point at the place where I shall put it.")
+    assert asked[1].detail.endswith("Please point at the place where I shall put it.")
 
 
 def test_a_place_in_another_frame_is_not_taken_for_one_in_its_own():
@@ -147,7 +147,7 @@ def test_where_the_hand_is_not_known_the_arm_does_not_go(what):
 
 def test_a_place_that_the_arm_refuses_is_asked_for_again_and_the_object_stays_in_the_hand():
     story = PointingStory(places=1)
-    story.outcomes = {PUT: [(REFUSED, "the elbow would touch the table")]}
+    story.outcomes = {PUT: [(REJECTED, "the elbow would touch the table")]}
     assert story.run()
     assert "I cannot put it at (14.0, 3.0) cm: the elbow would touch the table. Please point at" in story.sentences()
     assert places(story.of(PUT), "to") == list(PLACES[:2])
@@ -168,9 +168,9 @@ def test_an_object_that_was_not_felt_is_tried_again_from_the_base_pose():
     ("kind", "outcomes", "words"),
     [
         (FETCH, [(FAILED, "felt nothing")] * 3, "I could not fetch it at (16.5, −2.0) cm: felt nothing"),
-        (FETCH, [(REFUSED, "out of reach")], "I could not fetch it at (16.5, −2.0) cm: out of reach"),
+        (FETCH, [(REJECTED, "out of reach")], "I could not fetch it at (16.5, −2.0) cm: out of reach"),
         (PUT, [(FAILED, "it slipped")], "I could not put it at (14.0, 3.0) cm: it slipped"),
-        (RESTS, [(REFUSED, "busy")], "I cannot bring my arm to rest: busy"),
+        (RESTS, [(REJECTED, "busy")], "I cannot bring my arm to rest: busy"),
     ],
 )
 def test_what_it_cannot_do_alone_it_asks_help_for_and_goes_on_from_the_start(kind, outcomes, words):
@@ -179,7 +179,7 @@ def test_what_it_cannot_do_alone_it_asks_help_for_and_goes_on_from_the_start(kin
     assert story.run()
     help_asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_HELP]
     assert len(help_asked) == 1
-    assert help_asked[0].sentence == f"{words}. Please stand it at (16.5, −2.0) cm."
+    assert help_asked[0].detail == f"{words}. Please stand it at (16.5, −2.0) cm."
     assert places(story.of(FETCH), "from")[-1] == DEFAULT.start
 
 

@@ -14,7 +14,7 @@ from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 from paramove.objects.homography import PlaneHomography
-from tests.applications.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REFUSED, SUCCEEDED, Story
+from tests.applications.story import CORNERS, FAILED, OPENINGS, OPTIONS, PLACES, REJECTED, SUCCEEDED, Story
 
 CALIBRATE, LEARN = ApplicationStage.STAGE_CALIBRATE, ApplicationStage.STAGE_LEARN
 APPLY, DONE = ApplicationStage.STAGE_APPLY, ApplicationStage.STAGE_DONE
@@ -31,7 +31,7 @@ def at_place(goal: RelocationGoal, which: str = "from") -> tuple[float, float]:
 
 def test_the_whole_story() -> None:
     story = Story()
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     stages = [stage.stage for stage in story.stages]
     assert sorted(set(stages)) == [CALIBRATE, LEARN, APPLY, DONE]
     assert stages == sorted(stages)
@@ -86,11 +86,11 @@ def test_rules_are_told_in_a_sentence_with_place_and_time() -> None:
     yellow = final.rules[2]
     assert (yellow.x, yellow.y) == OPENINGS["yellow"]
     seen_s = yellow.seen.ToNanoseconds() * 1e-9
-    assert yellow.sentence == f"yellow belongs to the opening at (13.5, −3.8) cm, seen going in at {seen_s:.1f} s"
+    assert yellow.detail == f"yellow belongs to the opening at (13.5, −3.8) cm, seen going in at {seen_s:.1f} s"
     assert re.fullmatch(
-        r"yellow belongs to the opening at \(13\.5, −3\.8\) cm, seen going in at \d+\.\d s", yellow.sentence
+        r"yellow belongs to the opening at \(13\.5, −3\.8\) cm, seen going in at \d+\.\d s", yellow.detail
     )
-    assert yellow.sentence in story.sentences()
+    assert yellow.detail in story.sentences()
     assert yellow.observations == 1
 
 
@@ -190,7 +190,7 @@ def test_it_asks_again_after_silence_for_the_object_that_is_missing() -> None:
 def test_nothing_felt_is_tried_again_and_counted() -> None:
     story = Story()
     story.outcomes = [(FAILED, "felt nothing in the hand", None)]
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     first, second, *_ = story.relocations()
     assert (first.object, first.attempt, second.object, second.attempt) == ("yellow", 1, "yellow", 2)
     assert at_place(second) == PLACES["yellow"]
@@ -213,7 +213,7 @@ def test_an_object_that_stands_elsewhere_afterwards_is_fetched_from_there() -> N
     story = Story()
     fell = (0.160, 0.01)
     story.outcomes = [(SUCCEEDED, "", fell)]
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     first, second, *_ = story.relocations()
     assert (first.object, second.object, second.attempt) == ("yellow", "yellow", 2)
     np.testing.assert_allclose(at_place(second), fell, rtol=0, atol=1e-9)
@@ -231,30 +231,30 @@ def test_an_object_that_never_moved_is_tried_again_though_the_arm_believes_it_do
 def test_after_three_failures_it_asks_for_help_and_goes_on_when_helped() -> None:
     story = Story()
     story.outcomes = [(FAILED, "felt nothing", None)] * 3
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     assert story.requests().count("HELP") == 1
     asked = next(speech for speech in story.speech if speech.request == Speech.REQUEST_HELP)
     assert asked.object == "yellow"
-    assert "I tried 3 times to put yellow away: felt nothing." in asked.sentence
+    assert "I tried 3 times to put yellow away: felt nothing." in asked.detail
     assert [goal.attempt for goal in story.relocations()] == [1, 2, 3, 1, 1, 1]
     assert (story.stages[-1].stage, story.stages[-1].retries) == (DONE, 2)
 
 
 def test_a_refusal_is_told_and_help_is_asked_for() -> None:
     story = Story()
-    story.outcomes = [(REFUSED, "the forearm would come within 2.0 mm of standing_0", None)]
-    assert story.run(), story.learner.sentence
+    story.outcomes = [(REJECTED, "the forearm would come within 2.0 mm of standing_0", None)]
+    assert story.run(), story.learner.detail
     asked = next(speech for speech in story.speech if speech.request == Speech.REQUEST_HELP)
-    assert "the forearm would come within 2.0 mm of standing_0." in asked.sentence
-    assert asked.sentence.startswith("I cannot reach yellow at (17.0, 5.0) cm")
+    assert "the forearm would come within 2.0 mm of standing_0." in asked.detail
+    assert asked.detail.startswith("I cannot reach yellow at (17.0, 5.0) cm")
     assert [goal.attempt for goal in story.relocations()] == [1, 1, 1, 1]
 
 
 def test_what_stands_in_the_way_is_put_away_first() -> None:
     story = Story()
-    story.outcomes = [(REFUSED, "the forearm would come within 2.0 mm of standing_1", None)]
+    story.outcomes = [(REJECTED, "the forearm would come within 2.0 mm of standing_1", None)]
     story.in_the_way = [[1]]
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     assert "blue stands in the way of yellow. Please point at blue first." in story.sentences()
     assert [goal.object for goal in story.relocations()][:2] == ["yellow", "blue"]
     assert "HELP" not in story.requests()
@@ -262,15 +262,15 @@ def test_what_stands_in_the_way_is_put_away_first() -> None:
 
 def test_help_is_asked_for_where_each_stands_in_the_way_of_the_other() -> None:
     story = Story()
-    story.outcomes = [(REFUSED, "too near to standing_1", None), (REFUSED, "too near to standing_0", None)]
+    story.outcomes = [(REJECTED, "too near to standing_1", None), (REJECTED, "too near to standing_0", None)]
     story.in_the_way = [[1], [0]]
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     assert story.requests().count("HELP") == 1
 
 
 def test_help_is_asked_for_again_when_nobody_comes() -> None:
     story = Story()
-    story.outcomes = [(REFUSED, "no way", None)]
+    story.outcomes = [(REJECTED, "no way", None)]
     story.answers[Speech.REQUEST_HELP] = lambda _: None
     story.run_to(APPLY)
     assert story.run(120.0, until=lambda: story.requests().count("HELP") >= 3)
@@ -367,7 +367,7 @@ def test_a_placed_object_that_is_not_seen_is_asked_for_anew() -> None:
     real, story.stand = story.stand, lambda *_: None
     story.run(until=lambda: "I do not see yellow at (13.5, −10.0) cm" in story.sentences())
     story.stand = real
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail
     assert story.requests().count("HAND_ME_AN_OBJECT") == 2
     assert len(story.calibrations) == 1
 
@@ -381,7 +381,7 @@ def test_where_it_stands_is_said_every_second_and_at_every_change() -> None:
 
 
 def safety(state: SafetyState.State, *sentences: str) -> SafetyState:
-    return SafetyState(state=state, faults=[SafetyFault(code="x", sentence=sentence) for sentence in sentences])
+    return SafetyState(state=state, faults=[SafetyFault(code="x", detail=detail) for detail in sentences])
 
 
 def test_a_goal_of_which_nothing_is_heard_is_asked_for_and_its_failure_recovered() -> None:
@@ -406,7 +406,7 @@ def test_a_goal_that_nobody_answers_is_given_up_and_the_failure_told() -> None:
     assert story.run(TIMEOUT_S + 5.0, until=lambda: story.goals[-1].kind == RelocationGoal.KIND_REST)
     story.deaf = 0
     assert story.run()
-    assert any("no status of goal" in speech.sentence and "30 s" in speech.sentence for speech in story.speech)
+    assert any("no status of goal" in speech.text and "30 s" in speech.text for speech in story.speech)
 
 
 def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
@@ -424,7 +424,7 @@ def test_an_arm_that_is_disarmed_ends_the_application_with_the_reason() -> None:
     story.run(OPTIONS.arming_timeout_s - 0.5)
     assert learner.failure == ""
     assert len(story.goals) == goals, "without an arm nothing is asked of it"
-    (reported,) = [speech.sentence for speech in story.speech if "cannot go on" in speech.sentence]
+    (reported,) = [speech.text for speech in story.speech if "cannot go on" in speech.text]
     story.run(1.0)
     assert learner.failure == (
         "the arm is no longer armed (hold): the robot ran out of rows after 7 of 9 rows and stops; arm again; "
@@ -461,17 +461,17 @@ def test_an_arm_that_was_never_armed_is_waited_for() -> None:
 
 
 @pytest.mark.parametrize(
-    ("refused", "words"),
+    ("rejected", "words"),
     [("OFFER_HAND", "I cannot hold my hand out: too far"), ("PLACE_HELD", "I cannot put yellow at (13.5, −10.0) cm")],
 )
-def test_a_refusal_while_calibrating_is_no_loop(refused: str, words: str) -> None:
+def test_a_refusal_while_calibrating_is_no_loop(rejected: str, words: str) -> None:
     """A person is asked for help, and the same is tried again only after a while."""
     story = Story()
     handle = story._hear
 
     def refusing(goal: RelocationGoal) -> None:
-        if goal.kind == RelocationGoal.Kind.Value(f"KIND_{refused}"):
-            story._say(goal.id, REFUSED, "too far")
+        if goal.kind == RelocationGoal.Kind.Value(f"KIND_{rejected}"):
+            story._say(goal.id, REJECTED, "too far")
         else:
             handle(goal)
 
@@ -480,6 +480,6 @@ def test_a_refusal_while_calibrating_is_no_loop(refused: str, words: str) -> Non
     story.run(60.0)
     assert words in story.sentences()
     assert 1 <= story.requests().count("HELP") <= 3
-    assert kinds(story).count(refused) <= 3
+    assert kinds(story).count(rejected) <= 3
     story._hear = handle
-    assert story.run(), story.learner.sentence
+    assert story.run(), story.learner.detail

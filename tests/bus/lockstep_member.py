@@ -39,13 +39,13 @@ def main(node: str, folder: str, log: str, seed: str, role: str) -> None:
         signal.signal(signal.SIGTERM, lambda *_: bus.stop())
         _compute(pace.uniform(0.0, 0.2))
         if role == "speech":
-            bus.publish(topics.SPEECH, Speech(sentence="said before the first tick"))
+            bus.publish(topics.SPEECH, Speech(text="said before the first tick"))
         bus.ready("in lockstep")
         for event in bus.events(tick=True):
             if isinstance(event, Tick):
                 written.write(f"tick {event.number} {event.now_ns}\n")
                 if role == "speech":
-                    bus.publish(topics.SPEECH, Speech(sentence=f"tick {event.number}"))
+                    bus.publish(topics.SPEECH, Speech(text=f"tick {event.number}"))
             else:
                 text = str(event.message).replace("\n", " ")
                 written.write(f"{event.topic.name} {event.sequence} {event.published_ns} {text}\n")

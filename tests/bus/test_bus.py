@@ -102,7 +102,7 @@ def test_status_is_said_at_once_and_carries_exact_counts(speaker: Bus, listener:
     speaker.ready("recognising")
     status = topics.status("recognizer")
     heard = next(item for item in listener.events(status) if item.message.state == NodeStatus.STATE_READY)
-    assert (heard.message.sentence, heard.message.pid) == ("recognising", os.getpid())
+    assert (heard.message.detail, heard.message.pid) == ("recognising", os.getpid())
     assert {count.topic: count.messages for count in heard.message.published}["gestures"] == 1
 
 

@@ -75,7 +75,7 @@ def test_a_good_peer_hears_every_message_and_one_line_tells_of_the_strangers(
     wait(lambda: "did not speak ZeroMQ" in caplog.text, publisher.foreign.look)
     publisher.foreign.look()
     assert publisher.foreign.count == count
-    assert (subscriber.counter.lost, subscriber.counter.refused.total(), subscriber.reopened) == (0, 0, 0)
+    assert (subscriber.counter.lost, subscriber.counter.rejected.total(), subscriber.reopened) == (0, 0, 0)
     assert len(caplog.records) == 1
     assert caplog.records[0].message.startswith("topic gestures: ")
     assert "only nodes and paramove's own commands may connect there" in caplog.text
@@ -139,7 +139,7 @@ def test_strangers_at_the_lockstep_socket_are_refused(folder: Path, caplog: pyte
             barrier._read_answers()
         assert barrier.advance(1) == []
         stranger.close(linger=0)
-    assert (barrier.refused, barrier.members) == (10, frozenset())
+    assert (barrier.rejected, barrier.members) == (10, frozenset())
     assert "lockstep: answer rejected (number 1): 2 frames, expected 3: sender, header, answer" in caplog.text
     assert "lockstep: answer rejected (number 10)" in caplog.text
     assert "ghost cannot join as process 4194305" in caplog.text

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramove.bus.envelope import MAGIC, SIZE, Envelope, Reason, RefusedError, pack, publisher_id, unpack
+from paramove.bus.envelope import MAGIC, SIZE, Envelope, Reason, RejectedError, pack, publisher_id, unpack
 from paramove.bus.schemas import schema_hash
 from paramove.msgs.clock_pb2 import Clock
 from paramove.msgs.gesture_pb2 import Gesture
@@ -34,14 +34,14 @@ def test_every_single_bit_flip_is_refused(envelope: Envelope, payload: bytes) ->
     for bit in range(8 * len(whole)):
         damaged = bytearray(whole)
         damaged[bit // 8] ^= 1 << bit % 8
-        with pytest.raises(RefusedError):
+        with pytest.raises(RejectedError):
             unpack(bytes(damaged[:SIZE]), bytes(damaged[SIZE:]), envelope.schema, 300)
 
 
 @settings(deadline=None, derandomize=True, max_examples=200)
 @given(st.binary(max_size=120), st.binary(max_size=50))
 def test_foreign_bytes_are_refused(header: bytes, payload: bytes) -> None:
-    with pytest.raises(RefusedError):
+    with pytest.raises(RejectedError):
         unpack(header, payload, CLOCK.schema, 300)
 
 
@@ -66,13 +66,13 @@ def _altered(index: int, value: int) -> bytes:
     ],
 )
 def test_the_first_failing_check_is_the_reason(header: bytes, payload: bytes, limit: int, reason: Reason) -> None:
-    with pytest.raises(RefusedError) as refused:
+    with pytest.raises(RejectedError) as rejected:
         unpack(header, payload, CLOCK.schema, limit)
-    assert refused.value.reason is reason
+    assert rejected.value.reason is reason
 
 
 def test_a_schema_mismatch_names_both_types() -> None:
-    with pytest.raises(RefusedError, match=r"paramove\.msgs\.Clock.*paramove\.msgs\.Gesture.*same installation"):
+    with pytest.raises(RejectedError, match=r"paramove\.msgs\.Clock.*paramove\.msgs\.Gesture.*same installation"):
         unpack(pack(CLOCK, b""), b"", schema_hash(Gesture), 9)
 
 

@@ -47,7 +47,7 @@ def test_beyond_the_budget_is_dropped_counted_and_attributed(
             )
     counter = subscriber.counter
     assert len(heard) == counter.messages == int(BURST + ALLOWANCE * 15 * 10 - 1e-3)
-    assert counter.refused == {Reason.BUDGET: said - len(heard)}
+    assert counter.rejected == {Reason.BUDGET: said - len(heard)}
     assert counter.lost == 0
     assert re.search(
         rf"topic objects/tracked: .*budget.*: pid {os.getpid()} \(colour_tracker\) publishes more than 18 a second "
@@ -83,10 +83,10 @@ def test_one_call_passes_over_no_more_than_two_hundred(kind: str, context: Conte
     counter = subscriber.counter
 
     def count() -> int:
-        before = counter.refused.total() + counter.repeated
+        before = counter.rejected.total() + counter.repeated
         subscriber.receive()
-        passed_over.append(counter.refused.total() + counter.repeated - before)
-        return counter.refused.total() + counter.repeated
+        passed_over.append(counter.rejected.total() + counter.repeated - before)
+        return counter.rejected.total() + counter.repeated
 
     wait(lambda: count() >= 900 - BURST)
     assert max(passed_over) <= 200
@@ -125,13 +125,13 @@ def test_a_listener_under_a_flood_still_has_ticks_other_messages_and_a_status(
         for event in bus.events(tick=True):
             ticks += isinstance(event, Tick)
             if isinstance(event, Tick):
-                quiet.publish(topics.SPEECH, topics.SPEECH.type(sentence=str(ticks)))
+                quiet.publish(topics.SPEECH, topics.SPEECH.type(text=str(ticks)))
             elif event.topic is topics.SPEECH:
                 sentences += 1
-                assert event.message.sentence == str(sentences)
+                assert event.message.text == str(sentences)
             if ticks >= 20 and sentences >= 15 and status.sequence >= said_before + 2:
                 break
         flooded = bus.exchange.subscribers[topic.name].counter
         flooder.kill()
-        assert flooded.messages + flooded.refused.total() > 1000
-        assert bool(flooded.refused[Reason.BUDGET]) == (topic is topics.OBJECTS_TRACKED)
+        assert flooded.messages + flooded.rejected.total() > 1000
+        assert bool(flooded.rejected[Reason.BUDGET]) == (topic is topics.OBJECTS_TRACKED)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from benchmarks.fuzz_bus import KINDS, Fuzzer, fuzz, memory_mib
 from paramove.bus import topics
-from paramove.bus.envelope import RefusedError
+from paramove.bus.envelope import RejectedError
 from paramove.bus.subscriber import Subscriber
 from tests.bus.conftest import RawPublisher, Wait
 
@@ -51,7 +51,7 @@ def test_any_payload_decodes_or_is_refused(kind: Any, payload: bytes) -> None:
     subscriber.topic = topics.Topic("x", kind, None, topics.Profile.QUEUE)
     try:
         message = subscriber._decode(payload)
-    except RefusedError:
+    except RejectedError:
         return
     assert type(kind.FromString(message.SerializeToString())) is kind
 
@@ -77,4 +77,4 @@ def test_a_subscriber_survives_a_thousand_inputs(context: zmq.Context[Any], fold
     speaker.epoch, speaker.sequence = 2**31, 0
     speaker.say(b"")
     wait(lambda: (heard := subscriber.receive()) and heard.payload == b"" and heard.sequence == 1)
-    assert subscriber.counter.refused.total() > 500
+    assert subscriber.counter.rejected.total() > 500

@@ -180,6 +180,6 @@ def test_without_lockstep_the_clock_is_said_and_nobody_is_waited_for(folder: Pat
         ticks = node.events(tick=True)
         assert next(ticks).number == 1
         assert node.now_ns == PERIOD_NS
-        node.publish(topics.SPEECH, Speech(sentence="hello"))
+        node.publish(topics.SPEECH, Speech(text="hello"))
         # The speaker answers the simulator's subscription only now, so the sentence itself may be missed.
         assert simulator.exchange.subscribers["speech"].counter.lost == 0

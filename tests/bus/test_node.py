@@ -64,26 +64,26 @@ def _say(bus: Bus, name: str, starts: int = 1) -> None:
 
 def test_a_node_that_fails_at_once_is_heard_to_say_why(start: Start, bus: Bus) -> None:
     process = start("{greeting: farewell}")
-    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == "nothing to greet with"
+    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).detail == "nothing to greet with"
     assert process.wait(60) == 66
 
 
 def test_a_node_hears_says_and_ends_on_a_signal(start: Start, bus: Bus) -> None:
     for starts, number in enumerate((signal.SIGTERM, signal.SIGINT), start=1):
         process = start("{greeting: good morning}")
-        assert _wait_for_state(bus, NodeStatus.STATE_READY).sentence == "good morning"
+        assert _wait_for_state(bus, NodeStatus.STATE_READY).detail == "good morning"
         _say(bus, "red", starts)
         heard = next(bus.events(topics.SPEECH))
-        assert (heard.message.sentence, heard.captured_ns) == ("red", 42)
+        assert (heard.message.text, heard.captured_ns) == ("red", 42)
         process.send_signal(number)
-        assert _wait_for_state(bus, NodeStatus.STATE_STOPPED).sentence == "stopped on request"
+        assert _wait_for_state(bus, NodeStatus.STATE_STOPPED).detail == "stopped on request"
         assert process.wait(60) == 0
 
 
 def test_an_exception_is_said_logged_and_ends_with_70(start: Start, bus: Bus) -> None:
     process = start()
     _say(bus, "trouble")
-    said = _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence
+    said = _wait_for_state(bus, NodeStatus.STATE_FAILED).detail
     assert said == "ValueError: found trouble (over gestures, sequence 1)"
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 70
@@ -97,7 +97,7 @@ def test_an_input_that_cannot_be_used_is_said_in_one_line_without_traceback(
 ) -> None:
     process = start()
     _say(bus, which)
-    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == f"{which}.npz cannot be used"
+    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).detail == f"{which}.npz cannot be used"
     _, errors = process.communicate(timeout=60)
     assert process.returncode == code
     assert "Traceback" not in errors
@@ -106,7 +106,7 @@ def test_an_input_that_cannot_be_used_is_said_in_one_line_without_traceback(
 def test_a_node_that_gives_up_ends_with_70_and_keeps_its_last_word(start: Start, bus: Bus) -> None:
     process = start()
     _say(bus, "given up")
-    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).sentence == "cannot go on"
+    assert _wait_for_state(bus, NodeStatus.STATE_FAILED).detail == "cannot go on"
     assert process.wait(60) == 70
 
 

@@ -204,7 +204,7 @@ def test_foreign_and_wrong_messages_are_counted_and_good_ones_still_heard(
     foreign.send_multipart([b"gestures\0"])
     foreign.send_multipart([b"gestures\0" + head.removeprefix(b"clock\0"), payload])
     for reason in (Reason.SIZE, Reason.FRAMES, Reason.SCHEMA):
-        wait(lambda reason=reason: subscriber.receive() is None and subscriber.counter.refused[reason] == 1)
+        wait(lambda reason=reason: subscriber.receive() is None and subscriber.counter.rejected[reason] == 1)
     assert not subscriber.welcomed
     assert "paramove.msgs.Clock" in caplog.text
 
@@ -234,7 +234,7 @@ def test_a_socket_gone_deaf_after_an_oversized_message_is_opened_anew_and_counte
     wait(subscriber.revive, subscriber.receive)
     wait(lambda: foreign.poll(0) and foreign.recv() == b"\x01gestures\0")
     foreign.send_multipart([b"gestures\0x", b"y"])
-    wait(lambda: subscriber.receive() is None and subscriber.counter.refused[Reason.SIZE] == 1)
-    assert (subscriber.counter.refused[Reason.CONNECTION], subscriber.reopened) == (1, 1)
+    wait(lambda: subscriber.receive() is None and subscriber.counter.rejected[Reason.SIZE] == 1)
+    assert (subscriber.counter.rejected[Reason.CONNECTION], subscriber.reopened) == (1, 1)
     assert not subscriber.revive()
     assert re.search("topic gestures: .*for good: a message above 65536 bytes, or no ZeroMQ", caplog.text)

@@ -21,9 +21,9 @@ def test_events_in_order_and_time_follows_them() -> None:
     seen = []
     for event in bus.events(topics.GESTURES, tick=True):
         seen.append((type(event).__name__, bus.now_ns))
-        bus.publish(topics.SPEECH, Speech(sentence=str(bus.now_ns)))
+        bus.publish(topics.SPEECH, Speech(text=str(bus.now_ns)))
     assert seen == [("Received", 3), ("Tick", 5), ("Received", 7), ("Tick", 10)]
-    assert bus.published[1] == Published(topics.SPEECH, Speech(sentence="5"), 5, 5)
+    assert bus.published[1] == Published(topics.SPEECH, Speech(text="5"), 5, 5)
     assert len(bus.published_on(topics.SPEECH)) == 4
     assert bus.published_on(topics.GESTURES) == []
 

@@ -48,7 +48,7 @@ def test_a_speaker_killed_again_and_again_is_replaced_and_no_loss_is_counted(
             )
             process.kill()
     counter = subscriber.counter
-    assert (counter.epochs, counter.lost, counter.repeated, counter.refused.total()) == (3, 0, 0, 0)
+    assert (counter.epochs, counter.lost, counter.repeated, counter.rejected.total()) == (3, 0, 0, 0)
     assert not caplog.records
 
 

@@ -72,5 +72,5 @@ def test_a_replaced_publisher_is_not_heard_again() -> None:
     counter.accept(_message(1, 5))
     counter.accept(_message(2, 1))
     assert counter.accept(_message(1, 6)) is Arrival.OUTDATED
-    assert counter.refused[Reason.EPOCH] == 1
+    assert counter.rejected[Reason.EPOCH] == 1
     assert counter.has_reached(1, 100)

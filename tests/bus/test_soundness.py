@@ -75,6 +75,6 @@ def test_what_is_unsound_is_refused_counted_and_told(
     for x in (math.nan, 1e300, 0.5):
         publisher.publish(Gesture(object="red", x=x), captured_ns=1, now_ns=2)
     assert wait(subscriber.receive).message.x == 0.5
-    assert subscriber.counter.refused[Reason.NUMBER] == 2
+    assert subscriber.counter.rejected[Reason.NUMBER] == 2
     assert subscriber.counter.lost == 0
     assert "topic gestures: message rejected (number, number 1): x is nan; finite numbers expected" in caplog.text

@@ -35,9 +35,9 @@ class Pair:
         self._wait = wait
         wait(self.speaker.subscribed)
 
-    def refused(self, reason: Reason, count: int = 1) -> None:
+    def rejected(self, reason: Reason, count: int = 1) -> None:
         """Waits until so many messages were refused for that reason; nothing may be heard meanwhile."""
-        counts = self.subscriber.counter.refused
+        counts = self.subscriber.counter.rejected
         self._wait(lambda: self.subscriber.receive() is None and counts[reason] >= count)
         assert counts[reason] == count
 
@@ -64,7 +64,7 @@ def test_random_bytes(gestures: Pair) -> None:
     for _ in range(300):
         payload = generator.randbytes(generator.randrange(200))
         gestures.speaker.socket.send_multipart([b"gestures\0" + generator.randbytes(56), payload])
-    gestures.refused(Reason.MAGIC, 300)
+    gestures.rejected(Reason.MAGIC, 300)
     assert gestures.hears_the_next(GOOD).message.object == "red"
 
 
@@ -78,8 +78,8 @@ def test_flipped_bits(gestures: Pair) -> None:
         gestures.speaker.socket.send_multipart([bytes(whole[: 9 + 56]), bytes(whole[9 + 56 :])])
     heard = gestures.hears_the_next(GOOD)
     assert heard.message.object == "red"
-    assert gestures.subscriber.counter.refused.total() == flips
-    assert gestures.subscriber.counter.refused[Reason.CRC] > flips / 2
+    assert gestures.subscriber.counter.rejected.total() == flips
+    assert gestures.subscriber.counter.rejected[Reason.CRC] > flips / 2
     assert gestures.subscriber.counter.messages == 1
 
 
@@ -87,12 +87,12 @@ def test_truncated_bytes(gestures: Pair, caplog: pytest.LogCaptureFixture) -> No
     for length in range(len(GOOD)):
         head, payload = gestures.speaker.frames(GOOD)
         gestures.speaker.socket.send_multipart([head, payload[:length]])
-    gestures.refused(Reason.LENGTH, len(GOOD))
+    gestures.rejected(Reason.LENGTH, len(GOOD))
     head, payload = gestures.speaker.frames(GOOD)
     gestures.speaker.socket.send_multipart([head[:-1], payload])
-    gestures.refused(Reason.SIZE)
+    gestures.rejected(Reason.SIZE)
     gestures.speaker.socket.send_multipart([head, payload, b""])
-    gestures.refused(Reason.FRAMES)
+    gestures.rejected(Reason.FRAMES)
     assert gestures.hears_the_next(GOOD)
     assert f"payload has 0 bytes, header says {len(GOOD)}, allowed are 65536" in caplog.text
     assert "header has 55 bytes, expected 56" in caplog.text
@@ -101,7 +101,7 @@ def test_truncated_bytes(gestures: Pair, caplog: pytest.LogCaptureFixture) -> No
 
 def test_another_type(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
     gestures.speaker.say(b"", schema=schema_hash(Clock))
-    gestures.refused(Reason.SCHEMA)
+    gestures.rejected(Reason.SCHEMA)
     assert re.search(
         r"topic gestures: .*\(paramove\.msgs\.Clock\), the topic carries .*\(paramove\.msgs\.Gesture\); correct",
         caplog.text,
@@ -110,7 +110,7 @@ def test_another_type(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
 
 def test_another_generation_of_the_type(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
     gestures.speaker.say(b"", schema=hash_of("paramove.msgs.Gesture", 2))
-    gestures.refused(Reason.SCHEMA)
+    gestures.rejected(Reason.SCHEMA)
     pair = r"\(paramove\.msgs\.Gesture of generation 2\), the topic carries .*\(paramove\.msgs\.Gesture\)"
     assert re.search(pair, caplog.text)
     assert "run every process from the same installation" in caplog.text
@@ -119,14 +119,14 @@ def test_another_generation_of_the_type(gestures: Pair, caplog: pytest.LogCaptur
 def test_another_version_of_the_envelope(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
     head, payload = gestures.speaker.frames(GOOD)
     gestures.speaker.socket.send_multipart([head[:11] + b"\x07" + head[12:], payload])
-    gestures.refused(Reason.VERSION)
+    gestures.rejected(Reason.VERSION)
     assert "envelope version is 7, this program reads version 1" in caplog.text
 
 
 def test_a_flood_of_refused_messages_fills_no_log(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
     for _ in range(900):
         gestures.speaker.socket.send_multipart([b"gestures\0", b""])
-    gestures.refused(Reason.SIZE, 900)
+    gestures.rejected(Reason.SIZE, 900)
     assert [record.message.split(":")[1] for record in caplog.records] == [
         " message rejected (size, number 1)",
         " message rejected (size, number 10)",
@@ -143,7 +143,7 @@ def _nested_groups(depth: int) -> bytes:
 def test_a_nesting_bomb_is_no_message(topic: Topic, context: Context, folder: Path, wait: Wait) -> None:
     pair = Pair(context, folder, topic, wait)
     pair.speaker.say(_nested_groups(topic.max_bytes // 2 if topic.max_bytes < 2**20 else 10_000))
-    pair.refused(Reason.DECODE)
+    pair.rejected(Reason.DECODE)
     assert pair.subscriber.counter.messages == 0
     pair.hears_the_next()
 
@@ -156,7 +156,7 @@ def test_a_claim_of_two_gigabytes_within_the_payload_allocates_nothing(
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for number in range(1, 16):
         pair.speaker.say(bytes([number << 3 | 2]) + b"\xff\xff\xff\xff\x07" + b"x" * 100)
-    pair.refused(Reason.DECODE, 15)
+    pair.rejected(Reason.DECODE, 15)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 50_000
     pair.hears_the_next()
 
@@ -169,7 +169,7 @@ def test_a_million_elements_are_refused_before_they_are_decoded(
     monkeypatch.setattr(Subscriber, "_decode", lambda *_: pytest.fail("was decoded"))
     pair.speaker.say(b"\x1a\x00" * 10**6)
     wait(pair.subscriber.revive, pair.subscriber.receive)
-    assert pair.subscriber.counter.refused == {Reason.CONNECTION: 1}
+    assert pair.subscriber.counter.rejected == {Reason.CONNECTION: 1}
     monkeypatch.undo()
     wait(pair.speaker.subscribed)
     pair.hears_the_next()
@@ -179,7 +179,7 @@ def test_a_length_beyond_the_frame_is_refused(gestures: Pair) -> None:
     """The header's own claim of 4 GB."""
     head, payload = gestures.speaker.frames(GOOD)
     gestures.speaker.socket.send_multipart([head[:-8] + b"\xff\xff\xff\xff" + head[-4:], payload])
-    gestures.refused(Reason.LENGTH)
+    gestures.rejected(Reason.LENGTH)
 
 
 def test_two_speakers_seen_on_the_wire_raise_an_alarm(gestures: Pair, caplog: pytest.LogCaptureFixture) -> None:
@@ -188,7 +188,7 @@ def test_two_speakers_seen_on_the_wire_raise_an_alarm(gestures: Pair, caplog: py
     assert gestures.hears_the_next(GOOD)
     gestures.speaker.epoch = 1
     gestures.speaker.say(GOOD)
-    gestures.refused(Reason.EPOCH)
+    gestures.rejected(Reason.EPOCH)
     assert re.search("two publishers: epoch 1 still publishes after epoch 2 .* End the other process", caplog.text)
     gestures.speaker.epoch = 2
     assert gestures.hears_the_next(GOOD)

@@ -30,7 +30,7 @@ def run(bus: Bus, config: Config) -> None:
         if heard.message.object == "given up":
             bus.failed("cannot go on")
             return
-        bus.publish(topics.SPEECH, Speech(sentence=heard.message.object), captured_ns=heard.captured_ns)
+        bus.publish(topics.SPEECH, Speech(text=heard.message.object), captured_ns=heard.captured_ns)
 
 
 if __name__ == "__main__":

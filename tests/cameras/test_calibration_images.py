@@ -61,7 +61,7 @@ def test_a_live_camera_says_what_to_do(pictures, monkeypatch):
     live = LiveImages("camera0", frames, said.append)
     found = live.held()
     assert len(found.views) == 4
-    assert [sentence for sentence in said if "view" in sentence] == [f"camera0: view {n} of 4" for n in range(1, 5)]
+    assert [detail for detail in said if "view" in detail] == [f"camera0: view {n} of 4" for n in range(1, 5)]
     lying = live.table()
     assert len(lying.views) >= 5
     for one in lying.views:
@@ -72,7 +72,7 @@ def test_a_live_camera_says_what_to_do(pictures, monkeypatch):
 def test_waiting_ends(pictures, monkeypatch):
     monkeypatch.setattr(calibration_images, "TIMEOUT_S", 2.0)
     nothing = pictures[5]
-    live = LiveImages("camera0", timed(itertools.repeat(nothing)), lambda sentence: None)
+    live = LiveImages("camera0", timed(itertools.repeat(nothing)), lambda detail: None)
     with pytest.raises(CalibrationError, match="no new view of the board for 2 s, 0 of 15 taken: more light"):
         live.held()
     with pytest.raises(CalibrationError, match="the board on the table was not detected lying still for 2 s"):
@@ -82,6 +82,6 @@ def test_waiting_ends(pictures, monkeypatch):
 def test_a_board_in_motion_is_not_on_the_table(pictures, monkeypatch):
     monkeypatch.setattr(calibration_images, "TIMEOUT_S", 3.0)
     moving = itertools.cycle([picture for picture in pictures[:4] for _ in range(4)])
-    live = LiveImages("camera0", timed(moving), lambda sentence: None)
+    live = LiveImages("camera0", timed(moving), lambda detail: None)
     with pytest.raises(CalibrationError, match="was not detected lying still for 3 s"):
         live.table()

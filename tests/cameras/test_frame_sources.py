@@ -179,9 +179,9 @@ def _video(path: Path, frames: int) -> Path:
 
 
 def test_a_video_without_frames_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SourceError, match="holds no frame") as refusal:
+    with pytest.raises(SourceError, match="holds no frame") as rejection:
         FileFrames(_video(tmp_path / "clip.avi", 0))
-    assert refusal.value.exit_code == 78
+    assert rejection.value.exit_code == 78
 
 
 def test_a_video_cut_anywhere_is_refused_or_ends_early(tmp_path: Path) -> None:
@@ -205,9 +205,9 @@ def _play(source: FileFrames) -> None:
 
 @pytest.mark.parametrize(("name", "told", "code"), [("none.avi", "no video file", 66), (".", "found a folder", 78)])
 def test_a_missing_video_says_what_is_there(tmp_path: Path, name: str, told: str, code: int) -> None:
-    with pytest.raises(SourceError, match=told) as refusal:
+    with pytest.raises(SourceError, match=told) as rejection:
         open_source(f"file:{tmp_path / name}", 480, 360)
-    assert refusal.value.exit_code == code
+    assert rejection.value.exit_code == code
 
 
 def test_a_device_without_rights_names_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

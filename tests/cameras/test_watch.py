@@ -37,7 +37,7 @@ def test_a_wrong_size_is_told_until_a_right_one_comes():
     assert watch.troubles() == [
         "camera_1 gives 160 x 60 px, calibrated are 160 x 120 px: set its resolution or calibrate it again"
     ]
-    watch.refuse("camera_1", 1, "no picture")
+    watch.reject("camera_1", 1, "no picture")
     assert watch.troubles() == ["camera_1: no picture"]
     assert watch.accepts("camera_1", 2, GOOD)
     assert watch.troubles() == []

@@ -21,7 +21,7 @@ def good(*arguments):
     return done.stdout
 
 
-def refused(code, *arguments):
+def rejected(code, *arguments):
     done = run(*arguments)
     assert (done.exit_code, done.stdout) == (code, ""), done.output
     assert "Traceback" not in done.stderr
@@ -63,7 +63,7 @@ def test_list(folder):
 
 
 def test_list_of_nothing(tmp_path):
-    assert "make one with `paramove demos import`" in refused(66, "list", tmp_path)
+    assert "make one with `paramove demos import`" in rejected(66, "list", tmp_path)
 
 
 def test_show(folder):
@@ -81,9 +81,9 @@ def test_show(folder):
 
 def test_show_tells_what_is_wrong(folder):
     (folder / "P2.mcap").unlink()
-    said = refused(78, "show", folder)
+    said = rejected(78, "show", folder)
     assert "labels.yaml:9:6: there is no recording P2.mcap" in said
-    assert "there is no" in refused(66, "show", folder / "nothing")
+    assert "there is no" in rejected(66, "show", folder / "nothing")
 
 
 @pytest.mark.parametrize(("name", "magic"), [("a.png", b"\x89PNG"), ("a.svg", b"<?xml"), ("a.html", b"<!doctype html")])
@@ -94,11 +94,11 @@ def test_plot(folder, tmp_path, name, magic):
 
 def test_plot_of_what_is_not_there(folder, tmp_path):
     out = ("--output", tmp_path / "a.png")
-    assert "there is no point 'thumb'" in refused(78, "plot", folder, *out, "--point", "thumb")
-    assert "no movement with action waving" in refused(78, "plot", folder, *out, "--action", "waving")
-    assert "there is no parameter 'height'" in refused(78, "plot", folder, *out, "--colour-by", "height")
-    assert "pictures end in .png" in refused(78, "plot", folder, "--output", tmp_path / "a.gif")
-    assert "No such file or directory" in refused(77, "plot", folder, "--output", tmp_path / "no" / "a.png")
+    assert "there is no point 'thumb'" in rejected(78, "plot", folder, *out, "--point", "thumb")
+    assert "no movement with action waving" in rejected(78, "plot", folder, *out, "--action", "waving")
+    assert "there is no parameter 'height'" in rejected(78, "plot", folder, *out, "--colour-by", "height")
+    assert "pictures end in .png" in rejected(78, "plot", folder, "--output", tmp_path / "a.gif")
+    assert "No such file or directory" in rejected(77, "plot", folder, "--output", tmp_path / "no" / "a.png")
     assert not (tmp_path / "a.png").exists()
 
 
@@ -107,9 +107,9 @@ def test_split(folder):
     assert [line.rpartition(": ")[2] for line in text.splitlines()] == ["6 movements", "6 movements"]
     parts = [DemonstrationSet.load(folder.with_name(f"reach_{part}")) for part in ("train", "test")]
     assert sorted(part.subjects for part in parts) == [("P1",), ("P2",)]
-    assert "holds a demonstration set already" in refused(78, "split", folder)
+    assert "holds a demonstration set already" in rejected(78, "split", folder)
     train = folder.with_name("again")
-    assert "reach_test holds" in refused(78, "split", folder, "--train", train)
+    assert "reach_test holds" in rejected(78, "split", folder, "--train", train)
     assert not train.exists()
 
 
@@ -121,8 +121,8 @@ def test_synthesize(tmp_path):
     found = DemonstrationSet.load(folder)
     assert len(found) == 16
     assert found.actions == ("pointing", "reaching")
-    assert "holds a demonstration set already" in refused(78, "synthesize", folder, *small)
-    assert "reaching.mcap exists" in refused(78, "synthesize", folder, *small, "--add")
+    assert "holds a demonstration set already" in rejected(78, "synthesize", folder, *small)
+    assert "reaching.mcap exists" in rejected(78, "synthesize", folder, *small, "--add")
     assert len(found.demonstrations("reaching").sequences) == 8
 
 
@@ -150,7 +150,7 @@ def test_import_and_label_afterwards(csv, tmp_path):
         file.write("  # Anna looked away\n")
     good("label", folder, "--recording", "take.mcap", "--action", "pointing", "--start", 0.2, "--end", 1.5)
     assert "# Anna looked away" in (folder / "labels.yaml").read_text()
-    said = refused(78, "label", folder, "--recording", "take.mcap", "--action", "x", "--start", 1, "--end", 9)
+    said = rejected(78, "label", folder, "--recording", "take.mcap", "--action", "x", "--start", 1, "--end", 9)
     assert "the recording covers 0 to 1.8 s" in said
 
 
@@ -167,7 +167,7 @@ def test_import_refuses_lost_points_with_the_remedy(csv, tmp_path):
         lines[number] = ",".join([*cells[:4], "", "", "", *cells[7:]])
     csv.write_text("\n".join(lines))
     arguments = ("import", csv, "--to", tmp_path / "set", "--unit", "mm", "--action", "reaching")
-    said = refused(78, *arguments)
+    said = rejected(78, *arguments)
     assert "shoulder in frames 29-38 (0.2 s)" in said
     assert "--skip-refused imports the rest, --max-gap fills longer losses" in said
     assert not (tmp_path / "set").exists()
@@ -177,10 +177,10 @@ def test_import_refuses_lost_points_with_the_remedy(csv, tmp_path):
 
 def test_wrong_arguments_of_import(csv, tmp_path):
     to = ("--to", tmp_path / "set")
-    assert "does not define its unit; give --unit" in refused(78, "import", csv, *to)
-    assert "there is no file" in refused(66, "import", tmp_path / "no.c3d", *to)
-    assert "axes 'up'" in refused(78, "import", csv, *to, "--unit", "mm", "--axes", "up")
-    assert "has no point 'RFIN' for index" in refused(78, "import", csv, *to, "--unit", "mm", "--point", "index=RFIN")
+    assert "does not define its unit; give --unit" in rejected(78, "import", csv, *to)
+    assert "there is no file" in rejected(66, "import", tmp_path / "no.c3d", *to)
+    assert "axes 'up'" in rejected(78, "import", csv, *to, "--unit", "mm", "--axes", "up")
+    assert "has no point 'RFIN' for index" in rejected(78, "import", csv, *to, "--unit", "mm", "--point", "index=RFIN")
     for wrong in (["--theta", "a,b"], ["--point", "index"], ["--find", "index"], ["--unit", "inch"]):
         assert run("import", csv, *to, "--unit", "mm", *wrong).exit_code == 2
     assert run("label", tmp_path, "--recording", "a", "--action", "x").exit_code == 2

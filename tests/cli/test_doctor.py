@@ -72,10 +72,10 @@ def test_what_is_mended_is_looked_at_again(emulator, here):
 
 
 def test_what_cannot_be_mended_is_told(emulator, here, monkeypatch):
-    def refuse(*_):
+    def reject(*_):
         raise OSError("no mode of low latency")
 
-    monkeypatch.setattr("paramove.diagnosis.serial_ports._hasten", refuse)
+    monkeypatch.setattr("paramove.diagnosis.serial_ports._hasten", reject)
     done = call("doctor", "--only", "serial", "--by-id", here / "by-id", "--fix", "--yes")
     assert "usb latency: not fixed: no mode of low latency" in done.output
 

@@ -16,7 +16,7 @@ def good(*arguments):
     return done.stdout
 
 
-def refused(code, *arguments):
+def rejected(code, *arguments):
     done = call("models", *arguments)
     assert (done.exit_code, done.stdout) == (code, ""), done.output
     assert "Traceback" not in done.stderr
@@ -34,9 +34,9 @@ def test_list(trained):
 
 
 def test_list_of_nothing_and_of_damage(tmp_path, trained):
-    assert "`paramove train` makes one" in refused(66, "list", tmp_path)
+    assert "`paramove train` makes one" in rejected(66, "list", tmp_path)
     np.savez(tmp_path / "recording.npz", positions=np.zeros(3))
-    assert "`paramove train` makes one" in refused(66, "list", tmp_path)
+    assert "`paramove train` makes one" in rejected(66, "list", tmp_path)
     (tmp_path / "bad.npz").write_bytes(trained.model.read_bytes()[:2000])
     assert "bad.npz: expected a model file" in " ".join(call("models", "list", tmp_path).stderr.split())
 
@@ -69,8 +69,8 @@ def test_show_tells_what_was_left_out_of_this_very_file(trained, tmp_path):
 
 
 def test_show_of_a_folder_with_several(trained, tmp_path):
-    assert "give one model file" in refused(78, "show", trained.models)
-    assert "there is no model file" in refused(66, "show", tmp_path / "none.npz")
+    assert "give one model file" in rejected(78, "show", trained.models)
+    assert "there is no model file" in rejected(66, "show", tmp_path / "none.npz")
 
 
 @pytest.mark.parametrize("ending", ["png", "html"])
@@ -82,7 +82,7 @@ def test_plot(trained, tmp_path, ending):
             assert len(picture.convert("L").getcolors()) > 100
     else:
         assert "data:image/png;base64," in file.read_text()
-    assert "did you mean 'wrist'?" in refused(78, "plot", trained.model, "--point", "wrst")
+    assert "did you mean 'wrist'?" in rejected(78, "plot", trained.model, "--point", "wrst")
 
 
 def test_compare(trained, tmp_path):
@@ -102,8 +102,8 @@ def test_compare(trained, tmp_path):
 
 
 def test_compare_refuses_what_cannot_be_compared(trained, tmp_path):
-    assert "at least two" in refused(2, "compare", trained.model)
+    assert "at least two" in rejected(2, "compare", trained.model)
     other = tmp_path / "other.npz"
     quick = ("--states", 10, "--frames", 50, "--leave-out", "none", "--parameters", "target_y")
     assert call("train", trained.table, "--out", other, *quick).exit_code == 0
-    assert "differ in points or parameters" in refused(78, "compare", trained.model, other)
+    assert "differ in points or parameters" in rejected(78, "compare", trained.model, other)

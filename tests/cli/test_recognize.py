@@ -18,7 +18,7 @@ def good(*arguments):
     return done.stdout
 
 
-def refused(code, *arguments):
+def rejected(code, *arguments):
     done = call(*arguments)
     assert (done.exit_code, done.stdout) == (code, ""), done.output
     assert "Traceback" not in done.stderr
@@ -74,13 +74,13 @@ def test_models_one_by_one_compete_too(trained, tmp_path):
     found = json.loads(good("recognize", trained.table, *files, "--json"))
     assert found["confusion"]["reaching"]["reaching"] > 24
     twice = ("--model", trained.model, "--model", trained.models / "reaching.model.npz")
-    assert "both models of 'reaching'" in refused(78, "recognize", trained.table, *twice)
+    assert "both models of 'reaching'" in rejected(78, "recognize", trained.table, *twice)
 
 
 def test_models_of_different_kinds_do_not_compete(trained, tmp_path):
     more = ("--action", "pointing", "--residuals", "independent", "--leave-out", "none")
     good("train", trained.both, "--out", tmp_path / "pointing.npz", *more)
-    said = refused(78, "recognize", trained.table, "--model", trained.model, "--model", tmp_path / "pointing.npz")
+    said = rejected(78, "recognize", trained.table, "--model", trained.model, "--model", tmp_path / "pointing.npz")
     assert "all with correlated residuals, or all with the same states" in said
 
 
@@ -91,7 +91,7 @@ def test_beginnings(trained, tmp_path):
     asked = ("--model", trained.models, "--unit", "m", "--unfinished", "--json")
     (found,) = json.loads(good("recognize", tmp_path / "0.csv", *asked))["movements"]
     assert found["most_probable_action"] in found["posterior"]
-    assert "a beginning has at least" in refused(78, "recognize", tmp_path / "1.csv", *asked)
+    assert "a beginning has at least" in rejected(78, "recognize", tmp_path / "1.csv", *asked)
 
 
 def test_a_strange_movement_is_none_of_the_known(trained, tmp_path):
@@ -122,18 +122,18 @@ def test_seen_from_the_person(trained, tmp_path):
     assert np.mean([one["action"] == "reaching" for one in found["movements"]]) > 0.9
     made = tmp_path / "made.mcap"
     good("synthesize", tmp_path / "body.npz", "--theta", "0.3,0.1", "--out", made)
-    said = refused(78, "recognize", made, "--model", trained.model)
+    said = rejected(78, "recognize", made, "--model", trained.model)
     assert "in the frame 'body', those of the model in 'demonstrator_table'" in said
 
 
 def test_refusals_of_recognize(trained, made, tmp_path):
     model = ("--model", trained.model)
-    assert "there is no file" in refused(66, "recognize", tmp_path / "none.csv", *model)
-    assert "there is no model file" in refused(66, "recognize", made / "made.npz", "--model", tmp_path / "none.npz")
-    assert "there is no model in" in refused(66, "recognize", made / "made.npz", "--model", tmp_path / "..")
-    assert "expected m, cm or mm" in refused(2, "recognize", made / "made.csv", *model, "--unit", "ft")
+    assert "there is no file" in rejected(66, "recognize", tmp_path / "none.csv", *model)
+    assert "there is no model file" in rejected(66, "recognize", made / "made.npz", "--model", tmp_path / "none.npz")
+    assert "there is no model in" in rejected(66, "recognize", made / "made.npz", "--model", tmp_path / "..")
+    assert "expected m, cm or mm" in rejected(2, "recognize", made / "made.csv", *model, "--unit", "ft")
     (tmp_path / "few.csv").write_text("time,wrist_x,wrist_y,wrist_z\n0,1,1,1\n0.1,1,1,1\n")
-    said = refused(78, "recognize", tmp_path / "few.csv", *model, "--unit", "m")
+    said = rejected(78, "recognize", tmp_path / "few.csv", *model, "--unit", "m")
     assert "missing are sternum" in said
     assert "--mapping" in said
 
@@ -149,7 +149,7 @@ def test_synthesized_recording(trained, made):
     assert poses.frame == "demonstrator_table"
     assert poses.point_names[-1] == "thumb"
     np.testing.assert_allclose(np.median(np.diff(poses.time)), 1 / 60, rtol=0, atol=1e-3)
-    assert "recordings are never overwritten" in refused(
+    assert "recordings are never overwritten" in rejected(
         2, "synthesize", trained.model, "--theta", THETA, "--out", made / "made.mcap"
     )
 
@@ -168,8 +168,8 @@ def test_theta_outside_is_told(trained, tmp_path):
 
 
 def test_refusals_of_synthesize(trained, tmp_path):
-    said = refused(78, "synthesize", trained.model, "--theta", "0.1")
+    said = rejected(78, "synthesize", trained.model, "--theta", "0.1")
     assert "theta has 2 components (target_x, m: -0.07 to 0.23" in said
-    assert "expected numbers" in refused(2, "synthesize", trained.model, "--theta", "a,b")
-    assert "end in .csv, .npz, .mcap" in refused(2, "synthesize", trained.model, "--theta", THETA, "--out", "a.txt")
-    assert "there is no model file" in refused(66, "synthesize", tmp_path / "none.npz", "--theta", THETA)
+    assert "expected numbers" in rejected(2, "synthesize", trained.model, "--theta", "a,b")
+    assert "end in .csv, .npz, .mcap" in rejected(2, "synthesize", trained.model, "--theta", THETA, "--out", "a.txt")
+    assert "there is no model file" in rejected(66, "synthesize", tmp_path / "none.npz", "--theta", THETA)

@@ -18,7 +18,7 @@ def good(*arguments):
     return done
 
 
-def refused(code, *arguments):
+def rejected(code, *arguments):
     done = call("train", *arguments)
     assert (done.exit_code, done.stdout) == (code, ""), done.output
     assert "Traceback" not in done.stderr
@@ -102,26 +102,26 @@ def test_seen_from_the_person(trained, tmp_path):
 
 
 def test_refusals(trained, tmp_path):
-    assert "make one with `paramove demos import`" in refused(66, tmp_path)
-    assert "there are the actions reaching" in refused(78, trained.table, "--action", "waving")
-    assert "did you mean 'target_x'?" in refused(78, trained.table, "--parameters", "targetx")
-    assert "choose one with --action" in refused(2, trained.both, "--out", tmp_path / "a.npz")
-    assert "fewer than 20 states" in refused(78, trained.table, "--frames", 10)
-    assert "there is only one subject: nothing can be left out" in refused(
+    assert "make one with `paramove demos import`" in rejected(66, tmp_path)
+    assert "there are the actions reaching" in rejected(78, trained.table, "--action", "waving")
+    assert "did you mean 'target_x'?" in rejected(78, trained.table, "--parameters", "targetx")
+    assert "choose one with --action" in rejected(2, trained.both, "--out", tmp_path / "a.npz")
+    assert "fewer than 20 states" in rejected(78, trained.table, "--frames", 10)
+    assert "there is only one subject: nothing can be left out" in rejected(
         78, trained.table, "--leave-out", "subject", "--out", tmp_path / "a.npz", *QUICK
     )
 
 
 def test_one_theta_teaches_no_dependence(tmp_path):
     assert call("demos", "synthesize", tmp_path / "one", "--columns", 1, "--rows", 1).exit_code == 0
-    said = refused(78, tmp_path / "one", "--out", tmp_path / "a.npz")
+    said = rejected(78, tmp_path / "one", "--out", tmp_path / "a.npz")
     assert "all 4 movements have the same parameters" in said
     assert not (tmp_path / "a.npz").exists()
 
 
 def test_points_are_named(tmp_path):
     a_set(subjects=("P1",), repetitions=1).write(tmp_path / "set")  # its shoulder never moves
-    said = refused(78, tmp_path / "set", "--out", tmp_path / "a.npz", *QUICK)
+    said = rejected(78, tmp_path / "set", "--out", tmp_path / "a.npz", *QUICK)
     assert "dimension" not in said
     assert "sternum_x has the value" in said
 
@@ -131,7 +131,7 @@ def test_an_interrupted_training_leaves_nothing(trained, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(QuadraticPHMM, "fit", interrupted)
-    assert "nothing was written" in refused(130, trained.table, "--out", tmp_path / "a.npz")
+    assert "nothing was written" in rejected(130, trained.table, "--out", tmp_path / "a.npz")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -140,5 +140,5 @@ def test_an_interrupted_check_leaves_the_model(trained, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("paramove.training.training.leave_out", interrupted)
-    assert "but not how well it does" in refused(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
+    assert "but not how well it does" in rejected(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
     assert np.isfinite(ParametricHMM.load(tmp_path / "a.npz").state_means([0.1, 0.0])).all()

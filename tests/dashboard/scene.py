@@ -54,14 +54,14 @@ def tracked() -> TrackedObjects:
     return message
 
 
-def status(node: str, state: NodeStatus.State = NodeStatus.STATE_READY, sentence: str = "", **more: Any) -> NodeStatus:
+def status(node: str, state: NodeStatus.State = NodeStatus.STATE_READY, detail: str = "", **more: Any) -> NodeStatus:
     """What a node says of itself."""
-    return NodeStatus(node=node, state=state, sentence=sentence, **{"pid": 7, **more})
+    return NodeStatus(node=node, state=state, detail=detail, **{"pid": 7, **more})
 
 
 def safety(state: SafetyState.State = SafetyState.STATE_ARMED, *faults: tuple[str, str]) -> SafetyState:
     """The gate's word; faults as code and sentence."""
-    return SafetyState(state=state, faults=[SafetyFault(code=code, sentence=sentence) for code, sentence in faults])
+    return SafetyState(state=state, faults=[SafetyFault(code=code, detail=detail) for code, detail in faults])
 
 
 def goal() -> RelocationGoal:
@@ -92,7 +92,7 @@ def messages() -> list[tuple[Topic, Any]]:
         (topics.GESTURES, Gesture(kind=Gesture.KIND_VANISHED, object="blue", located=True, x=0.13, y=0.072)),
         (topics.GESTURES, Gesture(kind=Gesture.KIND_POINTED_AT, object="green", located=True)),
         (topics.APPLICATION_STAGE, ApplicationStage(stage=ApplicationStage.STAGE_APPLY, step="relocating", grasps=5)),
-        (topics.SPEECH, Speech(sentence=SENTENCE)),
+        (topics.SPEECH, Speech(text=SENTENCE)),
         (topics.RELOCATION_GOAL, goal()),
         (
             topics.RELOCATION_STATUS,
@@ -100,7 +100,7 @@ def messages() -> list[tuple[Topic, Any]]:
         ),
         (topics.ARM_JOINT_STATES, joints),
         (topics.ARM_SAFETY, safety()),
-        (topics.status("camera"), status("camera", sentence="frames from topic:camera/image_raw")),
+        (topics.status("camera"), status("camera", detail="frames from topic:camera/image_raw")),
         (
             topics.status("recognizer"),
             status(

@@ -44,13 +44,13 @@ TARGETS = ["/", "/?token=a-token", "/page.js", "/live?key=a-key", "/nothing"]
 @pytest.mark.parametrize("host", HOSTS)
 def test_a_foreign_host_name_is_refused_on_every_route(host: str, target: str) -> None:
     found = judged(target, ("Host", host), COOKIE, ORIGIN)
-    assert (found.kind, found.status) == (Kind.REFUSED, http.HTTPStatus.FORBIDDEN)
+    assert (found.kind, found.status) == (Kind.REJECTED, http.HTTPStatus.FORBIDDEN)
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_no_host_and_two_hosts_are_refused(target: str) -> None:
-    assert judged(target, COOKIE, ORIGIN).kind is Kind.REFUSED
-    assert judged(target, HOST, HOST, COOKIE, ORIGIN).kind is Kind.REFUSED
+    assert judged(target, COOKIE, ORIGIN).kind is Kind.REJECTED
+    assert judged(target, HOST, HOST, COOKIE, ORIGIN).kind is Kind.REJECTED
 
 
 ORIGINS = ["http://evil.example", f"https://127.0.0.1:{PORT}", "http://127.0.0.1", "http://127.0.0.1:4712", "null", ""]
@@ -60,12 +60,12 @@ ORIGINS += [f"http://127.0.0.1:{PORT}/", f"http://127.0.0.1:{PORT}.evil.example"
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_a_foreign_origin_gets_no_socket(origin: str) -> None:
     found = judged("/live?key=a-key", HOST, COOKIE, ("Origin", origin))
-    assert (found.kind, found.status) == (Kind.REFUSED, http.HTTPStatus.FORBIDDEN)
+    assert (found.kind, found.status) == (Kind.REJECTED, http.HTTPStatus.FORBIDDEN)
 
 
 def test_a_missing_or_second_origin_gets_no_socket() -> None:
-    assert judged("/live?key=a-key", HOST, COOKIE).kind is Kind.REFUSED
-    assert judged("/live?key=a-key", HOST, COOKIE, ORIGIN, ("origin", "http://evil.example")).kind is Kind.REFUSED
+    assert judged("/live?key=a-key", HOST, COOKIE).kind is Kind.REJECTED
+    assert judged("/live?key=a-key", HOST, COOKIE, ORIGIN, ("origin", "http://evil.example")).kind is Kind.REJECTED
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ COOKIES = [
 @pytest.mark.parametrize("cookie", COOKIES)
 def test_without_a_session_everything_is_refused_alike(cookie: str, target: str) -> None:
     found = judged(target, HOST, ORIGIN, ("Cookie", cookie))
-    assert (found.kind, found.status) == (Kind.REFUSED, http.HTTPStatus.FORBIDDEN)
+    assert (found.kind, found.status) == (Kind.REJECTED, http.HTTPStatus.FORBIDDEN)
 
 
 FOREIGN_COOKIES = [
@@ -156,8 +156,8 @@ TEXT = st.text(st.characters(min_codepoint=0, max_codepoint=255), max_size=60)
 @given(method=TEXT, target=TEXT, headers=st.lists(st.tuples(TEXT, TEXT), max_size=6))
 def test_no_request_without_a_secret_gets_anything(method: str, target: str, headers: list[tuple[str, str]]) -> None:
     for more in ([], [HOST], [HOST, ORIGIN]):
-        assert ACCESS.judge("GET", target, [*headers, *more]).kind is Kind.REFUSED
-        assert ACCESS.judge(method, target, [*headers, *more]).kind is Kind.REFUSED
+        assert ACCESS.judge("GET", target, [*headers, *more]).kind is Kind.REJECTED
+        assert ACCESS.judge(method, target, [*headers, *more]).kind is Kind.REJECTED
 
 
 def test_a_refusal_repeats_nothing_of_the_request() -> None:
@@ -168,8 +168,8 @@ def test_a_refusal_repeats_nothing_of_the_request() -> None:
         judged(f"/?token={payload}", HOST),
         judged("/", HOST, COOKIE, method=payload),
     ):
-        assert found.kind is Kind.REFUSED
-        assert payload not in found.sentence
+        assert found.kind is Kind.REJECTED
+        assert payload not in found.detail
 
 
 def test_secrets_are_not_shown_by_accident() -> None:

@@ -262,8 +262,8 @@ def test_names_and_sentences_are_text_whatever_they_hold(run: Run, browser: Brow
         (topics.RELOCATION_GOAL, goal),
         (topics.RELOCATION_STATUS, failed),
         (topics.ARM_SAFETY, scene.safety(SafetyState.STATE_HOLD, ("jump", payload))),
-        (topics.status("camera"), scene.status(payload, sentence=payload)),
-        (topics.SPEECH, Speech(sentence=payload)),
+        (topics.status("camera"), scene.status(payload, detail=payload)),
+        (topics.SPEECH, Speech(text=payload)),
     )
     browser.until(
         f"document.getElementById('sentence').textContent.length > 5 "
@@ -288,7 +288,7 @@ def test_a_lost_connection_is_told_and_comes_back(run: Run, browser: Browser) ->
     browser.click("#stop")
     browser.until("document.getElementById('alert').textContent.includes('NOT confirmed')", "no stop is pretended")
     run.comes_back()
-    run.publish((topics.SPEECH, Speech(sentence="Here I am again.")))
+    run.publish((topics.SPEECH, Speech(text="Here I am again.")))
     browser.until("document.getElementById('sentence').textContent === 'Here I am again.'", "it goes on by itself")
 
 

@@ -27,9 +27,9 @@ def pressed(page: PageServer) -> bool:
 
 
 def status_of_socket(visitor: Visitor, **options: object) -> int:
-    with pytest.raises(InvalidStatus) as refused, visitor.socket(**options):
+    with pytest.raises(InvalidStatus) as rejected, visitor.socket(**options):
         pass
-    return refused.value.response.status_code
+    return rejected.value.response.status_code
 
 
 def until_closed(live: ClientConnection) -> tuple[list[str | bytes], int]:

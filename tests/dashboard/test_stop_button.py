@@ -27,7 +27,7 @@ class Rig:
         return pressed
 
     def gate(self, state: SafetyState.State, code: str | None, at_ns: int) -> None:
-        faults = [SafetyFault(code=code, sentence=SENTENCE)] if code else []
+        faults = [SafetyFault(code=code, detail=SENTENCE)] if code else []
         self.button.handle(Received(topics.ARM_SAFETY, SafetyState(state=state, faults=faults), at_ns, at_ns, 1))
 
 

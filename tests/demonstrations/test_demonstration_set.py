@@ -93,20 +93,20 @@ def test_what_is_not_there_is_told_with_what_is():
 
 
 @pytest.mark.parametrize(
-    ("change", "sentence"),
+    ("change", "detail"),
     [
         ({"point_names": ("a", "b", "c", "d", "e")}, r"point names \(a, b, c, d, e\), but \(sternum"),
         ({"frame": "laboratory"}, "frame 'laboratory', but 'body'"),
         ({"parameter_names": ("u", "v", "w")}, r"parameter names \(u, v, w\), but \(target_x"),
     ],
 )
-def test_movements_that_differ_are_no_set(change, sentence):
-    with pytest.raises(DemonstrationError, match=sentence):
+def test_movements_that_differ_are_no_set(change, detail):
+    with pytest.raises(DemonstrationError, match=detail):
         DemonstrationSet((movement(), replace(movement(source="b.mcap, 1 to 2 s"), **change)))
 
 
 @pytest.mark.parametrize(
-    ("change", "sentence"),
+    ("change", "detail"),
     [
         ({"time": np.zeros(1), "positions": np.zeros((1, 5, 3))}, "1 frame; a movement has at least 2"),
         ({"time": np.array([0.0, 0.0]), "positions": np.zeros((2, 5, 3))}, "times do not begin at 0 and increase"),
@@ -115,8 +115,8 @@ def test_movements_that_differ_are_no_set(change, sentence):
         ({"theta": np.array([0.0, np.nan, 0.0])}, "theta is not finite"),
     ],
 )
-def test_what_is_no_movement_is_refused_with_its_source(change, sentence):
-    with pytest.raises(DemonstrationError, match=r"labels.yaml:7: a.mcap, 0 to 1 s: " + sentence):
+def test_what_is_no_movement_is_refused_with_its_source(change, detail):
+    with pytest.raises(DemonstrationError, match=r"labels.yaml:7: a.mcap, 0 to 1 s: " + detail):
         replace(movement(source="labels.yaml:7: a.mcap, 0 to 1 s"), **change)
 
 

@@ -60,7 +60,7 @@ def test_labels_are_made_and_added(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("changes", "detail"),
     [
         ({"end": 9.0}, "a.mcap, 0.4 to 9 s: the recording covers 0 to 3.62 s"),
         ({"end": 0.405}, "1 frames; a movement has at least 2"),
@@ -68,9 +68,9 @@ def test_labels_are_made_and_added(tmp_path):
         ({"recording": "b.mcap"}, "there is no recording"),
     ],
 )
-def test_what_is_not_in_the_recording_is_not_labelled(tmp_path, changes, sentence):
+def test_what_is_not_in_the_recording_is_not_labelled(tmp_path, changes, detail):
     folder = a_recording(tmp_path / "set")
-    with pytest.raises(DemonstrationError, match=sentence):
+    with pytest.raises(DemonstrationError, match=detail):
         label(folder, [segment(), segment(**changes)])
     assert not (folder / "labels.yaml").exists()
 

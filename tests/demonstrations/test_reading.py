@@ -31,7 +31,7 @@ def labelled(folder, *segments, head=""):
     return folder
 
 
-def refused(folder):
+def rejected(folder):
     with pytest.raises(LabelsError) as wrong:
         DemonstrationSet.load(folder)
     assert wrong.value.exit_code == 78
@@ -47,7 +47,7 @@ def test_start_and_end_are_the_first_and_last_frame(tmp_path):
 
 def test_every_fault_of_a_set_is_told_at_once_with_its_line(tmp_path):
     record(tmp_path)
-    said = refused(
+    said = rejected(
         labelled(tmp_path, ("a.mcap", 0.5, 0.9), ("b.mcap", 0, 1), ("a.mcap", 1, 9), ("a.mcap", 0.501, 0.519))
     )
     path = tmp_path / "labels.yaml"
@@ -62,14 +62,14 @@ def test_every_fault_of_a_set_is_told_at_once_with_its_line(tmp_path):
 
 def test_one_frame_is_no_movement(tmp_path):
     record(tmp_path)
-    assert "holds 1 frame of 91" in refused(labelled(tmp_path, ("a.mcap", 0.495, 0.505)))
+    assert "holds 1 frame of 91" in rejected(labelled(tmp_path, ("a.mcap", 0.495, 0.505)))
 
 
 def test_recordings_with_other_points_or_frames_are_told_with_the_remedy(tmp_path):
     positions = record(tmp_path)
     record(tmp_path, "b.mcap", positions[:, :4], POINTS[:4])
     both = labelled(tmp_path, ("a.mcap", 0, 1), ("b.mcap", 0, 1))
-    said = refused(both)
+    said = rejected(both)
     assert "labels.yaml:3:6: b.mcap has the points sternum, shoulder, elbow, wrist; a.mcap has" in said
     assert "choose with `points` in labels.yaml what all have" in said
     labelled(tmp_path, ("a.mcap", 0, 1), ("b.mcap", 0, 1), head="points: [wrist, shoulder]\n")
@@ -101,7 +101,7 @@ def test_a_long_loss_is_refused_with_its_frames(tmp_path):
     positions[40:48, 3] = np.nan
     positions[80:, 4] = np.nan
     record(tmp_path, "a.mcap", positions)
-    said = refused(labelled(tmp_path, ("a.mcap", 0.5, 1.5), ("a.mcap", 0, 1.8), ("a.mcap", 1.0, 1.5)))
+    said = rejected(labelled(tmp_path, ("a.mcap", 0.5, 1.5), ("a.mcap", 0, 1.8), ("a.mcap", 1.0, 1.5)))
     first, second = said.splitlines()
     assert "labels.yaml:2:5: a.mcap, 0.5 to 1.5 s: lost for longer than max_gap (0.1 s): wrist in frames 40-47" in first
     assert "wrist in frames 40-47 (0.16 s); index in frames 80-90 (it is not valid on both sides)" in second
@@ -122,19 +122,19 @@ def test_numbers_that_are_not_finite_count_as_lost(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "sentence"),
+    ("content", "detail"),
     [(b"no recording", "is no MCAP recording"), (b"\x89MCAP0\r\n", "holds no pose on human/arm_pose that can be read")],
 )
-def test_files_that_hold_no_poses(tmp_path, content, sentence):
+def test_files_that_hold_no_poses(tmp_path, content, detail):
     (tmp_path / "a.mcap").write_bytes(content)
-    assert sentence in refused(labelled(tmp_path, ("a.mcap", 0, 1)))
+    assert detail in rejected(labelled(tmp_path, ("a.mcap", 0, 1)))
 
 
 def test_times_that_go_back_are_told(tmp_path):
     time, _ = reach((0.4, 0.1, -0.1))
     time[30] = time[20]
     record(tmp_path, time=time)
-    assert "pose 30 was captured at 0.400000 s, not after pose 29" in refused(labelled(tmp_path, ("a.mcap", 0, 1)))
+    assert "pose 30 was captured at 0.400000 s, not after pose 29" in rejected(labelled(tmp_path, ("a.mcap", 0, 1)))
 
 
 def test_a_recording_that_was_never_finished_is_read(tmp_path):
@@ -154,7 +154,7 @@ def test_a_recording_of_the_live_recorder_can_be_labelled_and_read(tmp_path):
     with RecordingWriter(tmp_path / "run.mcap", "paramove recorder") as writer:
         for number in range(100):
             at = 5 * NS + number * 20_000_000
-            writer.write("speech", Speech(sentence="hello"), at, at, number)
+            writer.write("speech", Speech(text="hello"), at, at, number)
             pose = ArmPose(frame="body")
             pose.captured.FromNanoseconds(at)
             pose.points.add(name="index", x=0.01 * number, y=0.0, z=1.0)

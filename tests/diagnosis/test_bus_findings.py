@@ -10,7 +10,7 @@ import pytest
 from paramove.diagnosis.bus_findings import bus_findings, servo_findings
 from paramove.diagnosis.finding import Level
 from paramove.robots.dynamixel.bus.packets import Instruction, PacketReader
-from paramove.robots.dynamixel.bus.scan import FoundServo
+from paramove.robots.dynamixel.bus.scan import DetectedServo
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250, XM430_W350
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
 from paramove.robots.dynamixel.emulated.emulator import DynamixelEmulator
@@ -81,7 +81,7 @@ def test_servos_are_only_asked(wrong):
 
 def test_every_servo_is_listed_with_what_it_tells(findings):
     (two,) = about(findings, "servo 2", Level.OK)
-    assert two.sentence == "xl330_m288, firmware 46, 1000000 bit/s, 9.0 V, 30 °C"
+    assert two.detail == "xl330_m288, firmware 46, 1000000 bit/s, 9.0 V, 30 °C"
     assert two.facts["voltage"] == 9.0
     listed = [one.facts["id"] for one in findings if "id" in one.facts]
     assert sorted(listed) == [1, 2, 3, 4, 5]
@@ -90,36 +90,36 @@ def test_every_servo_is_listed_with_what_it_tells(findings):
 def test_rates_at_which_nobody_answered_are_not_told_as_found(tmp_path):
     with DynamixelEmulator([EmulatedServo(XL430_W250, 1, FAST)], tmp_path / "usb"):
         found = bus_findings(tmp_path / "usb", [57600, FAST], PATIENT_S)
-    assert found[0].sentence == f"usb: 1 servo found at {FAST} bit/s"
+    assert found[0].detail == f"usb: 1 servo found at {FAST} bit/s"
 
 
 def test_a_double_id_is_told(findings):
     (one,) = about(findings, "servo 1", Level.PROBLEM)
-    assert one.sentence == "answers with damaged bytes: probably two servos have this ID; else a cable is bad"
+    assert one.detail == "answers with damaged bytes: probably two servos have this ID; else a cable is bad"
     assert "connect one of them alone" in one.remedy[0]
     assert "set ID of servo 1 to one that no other servo has" in one.remedy[1]
 
 
 def test_a_voltage_outside_of_the_limits_is_told(findings):
     two, _ = about(findings, "servo 2", Level.PROBLEM)
-    assert two.sentence == "measures 9.0 V, its limits are 3.5 to 7.0 V"
+    assert two.detail == "measures 9.0 V, its limits are 3.5 to 7.0 V"
     assert "5 V" in two.remedy[0]
 
 
 def test_errors_are_told_in_words(findings):
     (four,) = about(findings, "servo 4", Level.PROBLEM)
-    assert four.sentence == "has stopped: overheated, overloaded (Hardware Error Status 0x24)"
+    assert four.detail == "has stopped: overheated, overloaded (Hardware Error Status 0x24)"
 
 
 def test_heat_is_told(findings):
     five, error = about(findings, "servo 5", Level.PROBLEM)
-    assert "overheated" in error.sentence
-    assert five.sentence == "is 75 °C hot, its limit is 72 °C"
+    assert "overheated" in error.detail
+    assert five.detail == "is 75 °C hot, its limit is 72 °C"
 
 
 def test_different_rates_are_told(findings):
     (bus,) = about(findings, "bus", Level.PROBLEM)
-    assert "(3 at 57600 bit/s; 1, 2, 4, 5 at 1000000 bit/s)" in bus.sentence
+    assert "(3 at 57600 bit/s; 1, 2, 4, 5 at 1000000 bit/s)" in bus.detail
 
 
 def run(line):
@@ -150,8 +150,8 @@ def test_damaged_answers_are_told(tmp_path):
     with DynamixelEmulator([EmulatedServo(XL430_W250, 7, FAST)], tmp_path / "usb") as emulator:
         emulator.faults.damaged = 1.0
         bus, _, seven = bus_findings(tmp_path / "usb", [FAST], PATIENT_S, range(6, 9))
-    assert (bus.level, "damaged" in bus.sentence) == (Level.PROBLEM, True)
-    assert (seven.subject, "a cable is bad" in seven.sentence) == ("servo 7", True)
+    assert (bus.level, "damaged" in bus.detail) == (Level.PROBLEM, True)
+    assert (seven.subject, "a cable is bad" in seven.detail) == ("servo 7", True)
 
 
 def test_an_echo_is_no_answer(tmp_path):
@@ -165,7 +165,7 @@ def test_a_bus_without_servos_but_with_an_echo_is_told_with_what_to_look_at(tmp_
     with DynamixelEmulator([], tmp_path / "usb") as emulator:
         emulator.faults.echo = True
         (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
-    assert (finding.level, "no servo answers" in finding.sentence) == (Level.WARNING, True)
+    assert (finding.level, "no servo answers" in finding.detail) == (Level.WARNING, True)
     assert "supply" in finding.remedy[0]
 
 
@@ -173,43 +173,46 @@ def test_another_device_is_told(tmp_path):
     with DynamixelEmulator([], tmp_path / "usb") as emulator:
         emulator.bus.receive = lambda *_: [(0.0, b"$GPGGA,120000.0,,,,,0,0,,,M,,M,,*47\r\n")]
         (finding,) = bus_findings(tmp_path / "usb", [FAST], PATIENT_S)
-    assert (finding.level, "another device" in finding.sentence) == (Level.WARNING, True)
+    assert (finding.level, "another device" in finding.detail) == (Level.WARNING, True)
 
 
 def test_a_port_that_cannot_be_opened_is_told(tmp_path):
     (finding,) = bus_findings(tmp_path / "usb", [FAST])
     assert finding.level is Level.PROBLEM
-    assert "no serial port" in finding.sentence
+    assert "no serial port" in finding.detail
 
 
 def test_a_rate_that_the_adapter_does_not_have_is_passed_over(tmp_path, monkeypatch):
     set_rate = ServoPort.setBaudRate
 
-    def refuse(port, rate):
+    def reject(port, rate):
         if rate == 4_500_000:
             raise ValueError("Failed to set custom baud rate")
         return set_rate(port, rate)
 
-    monkeypatch.setattr(ServoPort, "setBaudRate", refuse)
+    monkeypatch.setattr(ServoPort, "setBaudRate", reject)
     with DynamixelEmulator([], tmp_path / "usb"):
         (finding,) = bus_findings(tmp_path / "usb", [FAST, 4_500_000], PATIENT_S)
-    assert finding.sentence == f"usb: no servo answers at {FAST} bit/s"
+    assert finding.detail == f"usb: no servo answers at {FAST} bit/s"
 
 
 @pytest.mark.parametrize(
-    ("servo", "sentence"),
+    ("servo", "detail"),
     [
-        (FoundServo(1, "xl430_w250", 1060, 45, FAST, failed=1, values={"Torque Enable": 0}), "failed in 1 of 3 reads"),
-        (FoundServo(1, "xl430_w250", 1060, 45, FAST, failed=3), "Status Return Level"),
-        (FoundServo(1, "", 9, 45, FAST), "model 9 has no table"),
-        (FoundServo(1, "x", 8, 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
-        (FoundServo(1, "x", 8, 45, FAST, values={"Hardware Error Status": 0x80}), "unknown error, bit 7"),
+        (
+            DetectedServo(1, "xl430_w250", 1060, 45, FAST, failed=1, values={"Torque Enable": 0}),
+            "failed in 1 of 3 reads",
+        ),
+        (DetectedServo(1, "xl430_w250", 1060, 45, FAST, failed=3), "Status Return Level"),
+        (DetectedServo(1, "", 9, 45, FAST), "model 9 has no table"),
+        (DetectedServo(1, "x", 8, 45, FAST, values={"Temperature Limit": 72, "Present Temperature": 62}), "62 °C hot"),
+        (DetectedServo(1, "x", 8, 45, FAST, values={"Hardware Error Status": 0x80}), "unknown error, bit 7"),
     ],
 )
-def test_what_else_can_be_wrong(tmp_path, servo, sentence):
-    assert sentence in servo_findings(tmp_path / "usb", servo)[1].sentence
+def test_what_else_can_be_wrong(tmp_path, servo, detail):
+    assert detail in servo_findings(tmp_path / "usb", servo)[1].detail
 
 
 def test_registers_of_a_model_without_table_are_left_to_other_programs(tmp_path):
-    twice = FoundServo(1, "xl320", 350, 45, FAST, at_once=2)
+    twice = DetectedServo(1, "xl320", 350, 45, FAST, at_once=2)
     assert "Wizard" in servo_findings(tmp_path / "usb", twice)[1].remedy[-1]

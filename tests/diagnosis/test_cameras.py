@@ -24,7 +24,7 @@ def test_devices_that_give_images_are_named(machine):
     found = list(camera_findings(machine))
     assert [one.facts["device"].rpartition("/")[2] for one in found] == ["video0", "video10"]
     assert all(one.level is Level.OK for one in found)
-    assert found[0].sentence.startswith("Webcam C270: ")
+    assert found[0].detail.startswith("Webcam C270: ")
 
 
 def test_no_camera_is_a_warning(tmp_path):

@@ -35,7 +35,7 @@ def test_what_draws_is_named():
 def test_the_other_library_is_offered_where_it_draws():
     finding = found({"egl": "no libEGL"}, "egl")
     assert finding.level is Level.PROBLEM
-    assert "no libEGL" in finding.sentence
+    assert "no libEGL" in finding.detail
     assert finding.remedy == ("export MUJOCO_GL=osmesa",)
 
 

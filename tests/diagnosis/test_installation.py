@@ -43,7 +43,7 @@ def installed(tmp_path):
 )
 def test_python_is_one_of_those_that_are_allowed(version, level):
     finding = python_finding(">=3.11,<3.14", version)
-    assert (finding.level, version in finding.sentence) == (level, True)
+    assert (finding.level, version in finding.detail) == (level, True)
     assert bool(finding.remedy) == (level is Level.PROBLEM)
 
 
@@ -54,14 +54,14 @@ def test_another_platform_is_told():
 
 def test_packages_in_their_ranges_are_well(installed):
     finding = packages_finding(REQUIRED, installed(numba="0.68.1", opencv_contrib_python_headless="4.14.0.94"))
-    assert (finding.level, finding.sentence) == (Level.OK, "all 2 required packages are installed")
+    assert (finding.level, finding.detail) == (Level.OK, "all 2 required packages are installed")
 
 
 def test_packages_outside_of_their_ranges_and_missing_ones_are_named_with_the_command(installed):
     finding = packages_finding(REQUIRED, installed(opencv_contrib_python_headless="5.0.0.93"))
     assert finding.level is Level.PROBLEM
-    assert "numba is missing, numba>=0.63 is needed" in finding.sentence
-    assert "is 5.0.0.93" in finding.sentence
+    assert "numba is missing, numba>=0.63 is needed" in finding.detail
+    assert "is 5.0.0.93" in finding.detail
     assert finding.remedy[0].endswith("-m pip install 'numba>=0.63' 'Opencv_Contrib.Python-headless<5,>=4.12'")
 
 
@@ -70,7 +70,7 @@ def test_what_an_interrupted_pip_left_is_passed_over_and_paramove_must_be_there(
     found = installed(numba="0.68.1")
     monkeypatch.setattr("paramove.diagnosis.installation.distributions", lambda: found)
     (finding,) = installation_findings(Machine())
-    assert (finding.level, finding.sentence) == (Level.PROBLEM, "paramove itself is not installed")
+    assert (finding.level, finding.detail) == (Level.PROBLEM, "paramove itself is not installed")
     assert len(found) == 2
 
 
@@ -89,7 +89,7 @@ def test_two_packages_that_hold_cv2_are_told_and_mended(installed, monkeypatch):
 
 def test_one_package_that_holds_cv2_is_well(installed):
     finding = opencv_finding(installed(opencv_contrib_python_headless="4.14"), VERSION)
-    assert (finding.level, finding.sentence) == (Level.OK, f"cv2 4.14.0 of {OPENCV}")
+    assert (finding.level, finding.detail) == (Level.OK, f"cv2 4.14.0 of {OPENCV}")
 
 
 @pytest.mark.parametrize(
@@ -99,5 +99,5 @@ def test_one_package_that_holds_cv2_is_well(installed):
 def test_a_broken_cv2_is_told_with_its_reason(installed, script, reason):
     finding = opencv_finding(installed(opencv_contrib_python_headless="4.14"), script)
     assert finding.level is Level.PROBLEM
-    assert reason in finding.sentence
+    assert reason in finding.detail
     assert "--force-reinstall" in finding.remedy[0]

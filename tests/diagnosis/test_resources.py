@@ -29,7 +29,7 @@ def test_a_folder_that_can_be_made_is_well(tmp_path):
 def test_a_file_in_the_place_of_a_folder_is_told(tmp_path):
     (tmp_path / "cache").touch()
     finding = folder_finding("cache", tmp_path / "cache" / "models")
-    assert (finding.level, "is no folder" in finding.sentence) == (Level.PROBLEM, True)
+    assert (finding.level, "is no folder" in finding.detail) == (Level.PROBLEM, True)
 
 
 @needs_root
@@ -57,14 +57,14 @@ def test_a_runtime_folder_that_is_too_long_for_sockets_is_told(tmp_path, monkeyp
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(long))
     finding = sockets_finding()
     assert finding.level is Level.PROBLEM
-    assert "too long" in finding.sentence
+    assert "too long" in finding.detail
     assert "export XDG_RUNTIME_DIR=/tmp/" in finding.remedy[0]
 
 
 def test_a_runtime_folder_that_is_a_link_is_told(tmp_path, monkeypatch, short_folder):
     (short_folder / "paramove").symlink_to(tmp_path)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_folder))
-    assert "no folder of this user" in sockets_finding().sentence
+    assert "no folder of this user" in sockets_finding().detail
 
 
 def test_a_name_that_no_domain_has_is_told(monkeypatch):
@@ -100,7 +100,7 @@ def test_too_few_open_files_are_told(limit, level):
 
 def test_a_variable_in_the_way_is_told(monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/no/such/folder")
-    assert any("XDG_RUNTIME_DIR" in one.sentence for one in environment_findings(ROOT) if one.level is Level.WARNING)
+    assert any("XDG_RUNTIME_DIR" in one.detail for one in environment_findings(ROOT) if one.level is Level.WARNING)
 
 
 def test_outside_of_a_clone_runs_lie_where_one_is(tmp_path):

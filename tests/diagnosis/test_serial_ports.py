@@ -41,7 +41,7 @@ def machine(open_folder, port):
 
 def test_a_free_port_is_listed_with_its_latency(machine, port):
     free, latency = serial_findings(machine)
-    assert (free.level, free.sentence) == (Level.OK, f"{LINK}: {port} is free")
+    assert (free.level, free.detail) == (Level.OK, f"{LINK}: {port} is free")
     assert (latency.level, latency.facts["latency_ms"]) == (Level.WARNING, 16)
     assert latency.remedy[0].startswith("echo 1 | ")
     assert latency.remedy[0].endswith(f"/{port.name}/latency_timer")
@@ -69,10 +69,10 @@ def test_a_port_that_another_program_has_open_is_not_asked(machine, port, starte
     program, _ = started(HOLD, str(port))
     held = next(iter(serial_findings(machine)))
     assert (held.level, held.remedy) == (Level.PROBLEM, (f"end it in its terminal, or: kill {program.pid}",))
-    assert f"{port} is in use by pid {program.pid} (python" in held.sentence
+    assert f"{port} is in use by pid {program.pid} (python" in held.detail
     assert usable_ports(machine) == []
     (finding,) = servos_findings(machine)
-    assert (finding.level, "no serial port is free" in finding.sentence) == (Level.WARNING, True)
+    assert (finding.level, "no serial port is free" in finding.detail) == (Level.WARNING, True)
 
 
 def test_ports_without_such_a_name_are_listed_unless_a_folder_is_given(machine, port):
@@ -87,7 +87,7 @@ def test_ports_without_such_a_name_are_listed_unless_a_folder_is_given(machine, 
 
 def test_a_link_that_leads_nowhere_is_told(machine):
     (machine.by_id / "usb-gone").symlink_to("/dev/pts/no_such")
-    assert "does not exist" in list(serial_findings(machine))[-1].sentence
+    assert "does not exist" in list(serial_findings(machine))[-1].detail
 
 
 def test_no_port_is_a_warning(tmp_path):

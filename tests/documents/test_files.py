@@ -42,10 +42,10 @@ def test_what_is_no_file_of_that_kind_is_told(
 ) -> None:
     path = tmp_path / "map.txt"
     make(path)
-    with pytest.raises(MapError) as refusal:
+    with pytest.raises(MapError) as rejection:
         read_text(path, "map", MapError, 2**20, "draw one")
-    assert told.format(path=path) in str(refusal.value)
-    assert refusal.value.missing is missing
+    assert told.format(path=path) in str(rejection.value)
+    assert rejection.value.missing is missing
 
 
 def test_a_file_that_may_not_be_read_comes_with_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

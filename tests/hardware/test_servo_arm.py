@@ -27,7 +27,7 @@ def test_every_servo_of_the_description_answers_as_the_model_that_it_is(robot, p
 
 
 def test_nothing_keeps_it_from_being_armed(arm):
-    assert [fault.sentence for fault in arm.check() if fault.code != "bus_slow"] == []
+    assert [fault.detail for fault in arm.check() if fault.code != "bus_slow"] == []
 
 
 def test_no_answer_is_lost_and_the_positions_are_those_of_an_arm_at_rest(robot, port, arm):

@@ -21,10 +21,10 @@ from tests.motion.reaching import ARM, GRASP_Z, HOAP3, JOINTS, OPENINGS, checker
 
 PERIOD_NS = 66_666_667
 HELD_OPENING = 0.43  # at which the fingers stop on an object
-SUCCEEDED, FAILED, REFUSED = (
+SUCCEEDED, FAILED, REJECTED = (
     RelocationStatus.STATE_SUCCEEDED,
     RelocationStatus.STATE_FAILED,
-    RelocationStatus.STATE_REFUSED,
+    RelocationStatus.STATE_REJECTED,
 )
 PLACE = (0.177, -0.02)
 OFFER = (0.155, -0.02, -0.05)
@@ -120,10 +120,10 @@ class FakeDriver:
         )
         if self.stale:
             self.stale -= 1
-            yield self._status(TrajectoryStatus.STATE_REFUSED, "age 1.5 s, allowed up to 1 s", "stale")
+            yield self._status(TrajectoryStatus.STATE_REJECTED, "age 1.5 s, allowed up to 1 s", "stale")
             self.playing = None
         elif self._number == self.refuses:
-            yield self._status(TrajectoryStatus.STATE_REFUSED, "not armed")
+            yield self._status(TrajectoryStatus.STATE_REJECTED, "not armed")
             self.playing = None
         else:
             yield self._status(TrajectoryStatus.STATE_ACCEPTED)
@@ -223,7 +223,7 @@ class Cell:
         """Sends the goal and ticks until its last status, which is returned."""
         self._heard(topics.RELOCATION_GOAL, wanted)
         self.synthesizer.on_goal(wanted)
-        last = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED)
+        last = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
         for _ in range(timeout_ticks):
             self.tick()
             ended = [status for status in self.statuses if status.goal_id == wanted.id and status.state in last]

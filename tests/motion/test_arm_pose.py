@@ -123,15 +123,15 @@ def refusal_of(pose: Pose) -> str:
 def test_refuses_only_what_no_turn_makes_possible() -> None:
     grid = np.deg2rad(np.arange(-180.0, 180.0, 0.5))
     draw = np.random.default_rng(3)
-    refused = 0
+    rejected = 0
     for _ in range(40):
         gripper = draw.uniform([0.06, -0.15, -0.18], [0.22, 0.18, 0.10])
         pose = (draw.uniform([-0.03, -0.10, -0.12], [0.10, 0.02, 0.02]), gripper, draw.normal(size=3))
         reason = refusal_of(pose)
         if "limit" in reason:
             assert not keeps_limits(pose, grid).any()
-        refused += bool(reason)
-    assert 5 < refused < 35
+        rejected += bool(reason)
+    assert 5 < rejected < 35
 
 
 def test_a_sequence_is_turned_to_one_side() -> None:

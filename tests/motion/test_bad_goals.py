@@ -39,7 +39,7 @@ OTHERS = [(0.17, 0.06), (0.18, -0.09)]
 def test_places_that_cannot_be_reached_are_refused(source, target, avoid, reason: str) -> None:
     cell = Cell()
     last = cell.do(goal(RELOCATE, source=source, target=target, avoid=list(avoid)), timeout_ticks=30)
-    assert last.state == RelocationStatus.STATE_REFUSED
+    assert last.state == RelocationStatus.STATE_REJECTED
     assert re.search(reason, last.reason), last.reason
     assert "\n" not in last.reason
     assert cell.driver.heard == []

@@ -18,7 +18,7 @@ from tests.motion.fake_driver import (
     FAILED,
     OFFER,
     PERIOD_NS,
-    REFUSED,
+    REJECTED,
     SUCCEEDED,
     Cell,
     FakeDriver,
@@ -54,7 +54,7 @@ def test_before_any_joint_is_heard_a_goal_waits() -> None:
     cell.restart()
     cell.synthesizer.on_goal(relocate())
     assert cell.synthesizer.tick(PERIOD_NS).trajectories == ()
-    assert "waits until the arm rests" in cell.synthesizer.sentence
+    assert "waits until the arm rests" in cell.synthesizer.detail
     assert cell.do(relocate()).state == SUCCEEDED
 
 
@@ -75,7 +75,7 @@ def test_restarted_away_from_the_base_pose_it_asks_for_rest_and_brings_the_arm_h
     for again in (relocate("one"), goal(RelocationGoal.KIND_OFFER_HAND, "two", source=OFFER)):
         last = cell.do(again)
         assert (last.state, last.reason) == (
-            REFUSED,
+            REJECTED,
             "the arm is not at its base pose; send a goal of kind REST first",
         )
     assert cell.do(rest()).state == SUCCEEDED
@@ -186,7 +186,7 @@ def test_joints_that_are_missing_or_not_finite_are_not_taken_for_a_pose(joints: 
     cell.synthesizer.on_joint_states(JointStates(joints=joints))
     cell.synthesizer.on_goal(rest())
     assert cell.synthesizer.tick(PERIOD_NS).statuses == ()
-    assert "waits until the arm rests" in cell.synthesizer.sentence
+    assert "waits until the arm rests" in cell.synthesizer.detail
     assert cell.do(rest()).state == SUCCEEDED
 
 
@@ -214,7 +214,7 @@ def test_a_status_with_a_time_that_is_no_number_is_passed_over() -> None:
 def test_empty_and_impossible_goals_are_refused_and_the_arm_stays(wanted: RelocationGoal, words: str) -> None:
     cell = Cell()
     last = cell.do(wanted)
-    assert last.state == REFUSED
+    assert last.state == REJECTED
     assert re.search(words, last.reason), last.reason
     assert cell.driver.heard == []
 

@@ -69,13 +69,13 @@ def test_what_a_robot_cannot_use_is_refused_with_the_remedy(tmp_path: Path, chan
     model = InterpolativePHMM.load(path)
     change(model)
     model.save(path)
-    with pytest.raises(ModelFileError, match=words) as refusal:
+    with pytest.raises(ModelFileError, match=words) as rejection:
         load_reaching_model(path)
-    sentence = str(refusal.value)
-    assert sentence.startswith(f"{path}: ")
-    assert "Remedy: train it again: leave out the node's parameter movement.file" in sentence
-    assert "\n" not in sentence
-    assert not refusal.value.missing
+    detail = str(rejection.value)
+    assert detail.startswith(f"{path}: ")
+    assert "Remedy: train it again: leave out the node's parameter movement.file" in detail
+    assert "\n" not in detail
+    assert not rejection.value.missing
 
 
 def test_the_trained_model_is_of_use(tmp_path: Path) -> None:
@@ -85,9 +85,9 @@ def test_the_trained_model_is_of_use(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_comes_with_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(ModelFileError, match=r"there is no model file .* Remedy: train it again") as refusal:
+    with pytest.raises(ModelFileError, match=r"there is no model file .* Remedy: train it again") as rejection:
         load_reaching_model(tmp_path / "none.npz")
-    assert refusal.value.missing
+    assert rejection.value.missing
 
 
 def test_a_damaged_cache_is_trained_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,9 +127,9 @@ def test_a_model_of_touching_that_does_not_suit(tmp_path: Path, changes: dict[st
     model = PolynomialPHMM.load(path)
     model.description = replace(model.description or MovementDescription(), **changes)
     model.save(path)
-    with pytest.raises(ModelFileError, match=words) as refusal:
+    with pytest.raises(ModelFileError, match=words) as rejection:
         load_reaching_model(path)
-    assert "Remedy: train it again" in str(refusal.value)
+    assert "Remedy: train it again" in str(rejection.value)
 
 
 def test_a_model_of_other_parameters_is_refused(tmp_path: Path) -> None:

@@ -87,9 +87,9 @@ def test_recordings_of_something_else_are_refused(recorded: Path, monkeypatch: p
     monkeypatch.setattr(recorded_reaching, "ACTIONS", ("juggling",))
     with pytest.raises(
         ModelFileError, match=r"table_reach has the actions .*; found \['juggling'\]. Remedy"
-    ) as refusal:
+    ) as rejection:
         people_model(NAME, None)
-    assert not refusal.value.missing
+    assert not rejection.value.missing
 
 
 needs_people = pytest.mark.skipif(not DATA.is_dir(), reason=f"needs the recordings of people in {DATA} (PARAMOVE_DATA)")

@@ -152,9 +152,11 @@ def test_the_way_has_the_arch_and_the_progress_of_the_person(name: str) -> None:
 @pytest.mark.parametrize("target", [(0.6, 0.0, 0.1), (0.0, 0.55, 0.05), (0.1, 0.0, 0.8)])
 def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name: str, target: tuple) -> None:
     plan = reaching(name)
-    with pytest.raises(OutOfReachError, match=r"cannot be reached.*nearest position that can be reached is") as refusal:
+    with pytest.raises(
+        OutOfReachError, match=r"cannot be reached.*nearest position that can be reached is"
+    ) as rejection:
         plan.reach(target)
-    nearest = refusal.value.position
+    nearest = rejection.value.position
     assert nearest is not None
     assert np.linalg.norm(nearest - target) < np.linalg.norm(target)
     np.testing.assert_allclose(plan.reach(nearest).gripper[-1], nearest, rtol=0, atol=1e-6)
@@ -162,10 +164,10 @@ def test_a_target_out_of_reach_is_refused_with_a_place_that_can_be_reached(name:
 
 @each_arm
 def test_below_the_table_nothing_is_reached(name: str) -> None:
-    with pytest.raises(OutOfReachError, match="the hand would touch the table or the arm itself") as refusal:
+    with pytest.raises(OutOfReachError, match="the hand would touch the table or the arm itself") as rejection:
         reaching(name).pick_and_place((0.15, 0.0, 0.002), (0.15, 0.05, GRASP_Z))
-    assert refusal.value.position is not None
-    assert refusal.value.position[2] > 0.005
+    assert rejection.value.position is not None
+    assert rejection.value.position[2] > 0.005
 
 
 @each_arm

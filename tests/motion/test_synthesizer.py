@@ -16,7 +16,7 @@ from tests.motion.fake_driver import (
     OFFER,
     PERIOD_NS,
     PLACE,
-    REFUSED,
+    REJECTED,
     SUCCEEDED,
     Cell,
     FakeDriver,
@@ -59,7 +59,7 @@ def test_says_whether_the_places_lie_within_the_training() -> None:
     ]
     assert {(status.from_hull, status.to_hull) for status in cell.statuses} == {tuple(expected)}
     far = cell.do(relocate("far", source=(0.30, 0.0)))
-    assert (far.state, far.from_hull) == (REFUSED, outside)
+    assert (far.state, far.from_hull) == (REJECTED, outside)
     offered = cell.do(goal(RelocationGoal.KIND_OFFER_HAND, "offer", source=OFFER))
     assert offered.to_hull == RelocationStatus.HULL_UNSPECIFIED
 
@@ -99,7 +99,7 @@ def test_another_goal_meanwhile_is_refused_as_busy() -> None:
     cell.synthesizer.on_goal(relocate("second"))
     cell.tick()
     assert cell.statuses[-1].goal_id == "second"
-    assert cell.statuses[-1].state == REFUSED
+    assert cell.statuses[-1].state == REJECTED
     assert "busy with goal first" in cell.statuses[-1].reason
     assert len(cell.driver.heard) == 1
 
@@ -138,7 +138,7 @@ def test_an_object_that_slips_on_the_way_is_noticed() -> None:
 def test_what_is_not_clear_or_not_reachable_is_refused_before_the_arm_moves(changes: dict, words: str) -> None:
     cell = Cell()
     last = cell.do(relocate(**changes))
-    assert last.state == REFUSED
+    assert last.state == REJECTED
     assert re.search(words, last.reason), last.reason
     assert cell.driver.heard == []
     assert cell.do(relocate("other")).state == SUCCEEDED
@@ -161,7 +161,7 @@ def test_an_open_hand_that_waits_holds_nothing() -> None:
     cell.do(goal(RelocationGoal.KIND_OFFER_HAND, "offer", source=OFFER))
     assert not cell.synthesizer.holding
     last = cell.do(goal(RelocationGoal.KIND_PLACE_HELD, "put", target=(0.19, -0.10)))
-    assert (last.state, last.reason) == (REFUSED, "nothing is held; take an object first")
+    assert (last.state, last.reason) == (REJECTED, "nothing is held; take an object first")
 
 
 def test_objects_beside_the_way_are_kept_clear_of() -> None:
@@ -214,7 +214,7 @@ def test_a_relocation_from_a_waiting_hand_is_refused() -> None:
     cell = Cell()
     cell.do(goal(RelocationGoal.KIND_OFFER_HAND, "offer", source=OFFER))
     last = cell.do(relocate("too soon"))
-    assert last.state == REFUSED
+    assert last.state == REJECTED
     assert "send a goal of kind REST first" in last.reason
 
 

@@ -117,7 +117,7 @@ def test_a_schema_changed_only_in_ways_that_both_sides_survive_or_got_a_new_gene
 
 
 @pytest.mark.parametrize(
-    ("change", "sentence"),
+    ("change", "detail"),
     [
         (lambda field: setattr(field, "number", 99), "number 2 is gone and not reserved"),
         (lambda field: setattr(field, "name", "beat"), "number 2 was ('tick'"),
@@ -125,14 +125,14 @@ def test_a_schema_changed_only_in_ways_that_both_sides_survive_or_got_a_new_gene
         (lambda field: setattr(field, "label", field.LABEL_REPEATED), "number 2 was ('tick'"),
     ],
 )
-def test_an_incompatible_change_is_found(change: Any, sentence: str) -> None:
+def test_an_incompatible_change_is_found(change: Any, detail: str) -> None:
     schemas = present_schemas()
     (clock,) = [
         message for file in schemas.file for message in file.message_type if f"{file.package}.{message.name}" == NAME
     ]
     change(next(field for field in clock.field if field.name == "tick"))
     changed = classes_of(schemas)[NAME]
-    assert sentence in "\n".join(incompatible(PRESENT[NAME].DESCRIPTOR, changed.DESCRIPTOR))
+    assert detail in "\n".join(incompatible(PRESENT[NAME].DESCRIPTOR, changed.DESCRIPTOR))
 
 
 NAME = "paramove.msgs.Clock"

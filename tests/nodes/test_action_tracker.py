@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nodes import action_tracker
-from paramove.action_space.messages import TablePlace
+from paramove.action_space.messages import TablePose
 from paramove.bus import topics
 from paramove.bus.recorded import RecordedBus
 from paramove.bus.subscriber import Received
@@ -63,7 +63,7 @@ def test_places_are_told_in_the_frame_that_is_asked_for(config):
     images = list(drawn(poses[:6], camera(1)))
     said = {}
     for name, place in (("table", {}), ("right_shoulder", {"x": 0.2, "y": -0.1, "z": -0.3, "yaw": np.pi / 2})):
-        placed = config.model_copy(update={"table_place": TablePlace(frame=name, **place)})
+        placed = config.model_copy(update={"table_place": TablePose(frame=name, **place)})
         bus = RecordedBus(heard(images, times[:6]))
         action_tracker.run(bus, placed)
         said[name] = [one.message for one in bus.published if one.topic is topics.ACTION_ESTIMATE]

@@ -53,7 +53,7 @@ def test_says_joints_and_safety_once_a_tick() -> None:
 def test_a_disarmed_driver_refuses_trajectories_and_streams_nothing() -> None:
     bus = replayed(20, {10: [(topics.ARM_TRAJECTORY, trajectory("one", {"right_elbow": -60.0}, 1.0))]})
     (status,) = (said.message for said in bus.published_on(topics.ARM_TRAJECTORY_STATUS))
-    assert status.state == TrajectoryStatus.STATE_REFUSED
+    assert status.state == TrajectoryStatus.STATE_REJECTED
     assert "disarmed" in status.reason
     assert bus.published_on(topics.WIRE_HOAP3_STREAM) == []
 

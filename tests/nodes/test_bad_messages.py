@@ -173,7 +173,7 @@ def of_body_tracker() -> list[Event]:
 def of_rule_learner() -> list[Event]:
     story = Story("goal-0")
     assert story.run()
-    safety = SafetyState(state=SafetyState.STATE_ARMED, faults=[SafetyFault(code="jump", joint="j", sentence="s")])
+    safety = SafetyState(state=SafetyState.STATE_ARMED, faults=[SafetyFault(code="jump", joint="j", detail="s")])
     events: list[Event] = list(story.events)
     for place in range(0, len(events), 50):
         if isinstance(events[place], Tick):
@@ -223,7 +223,7 @@ def of_arm_driver() -> list[Event]:
 
 
 def of_operator() -> list[Event]:
-    fault = SafetyFault(code="jump", joint="j", sentence="s")
+    fault = SafetyFault(code="jump", joint="j", detail="s")
     states = [SafetyState.STATE_DISCONNECTED, SafetyState.STATE_DISARMED, SafetyState.STATE_ARMED] * 10
     return timed((topics.ARM_SAFETY, SafetyState(state=state, faults=[fault])) for state in states)
 

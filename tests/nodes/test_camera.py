@@ -140,9 +140,9 @@ def test_the_end_of_a_file_that_is_cut_off_is_told(tmp_path: Path) -> None:
 
 
 def test_a_source_that_is_not_there_ends_the_node_without_restart() -> None:
-    with pytest.raises(InputError) as refusal:
+    with pytest.raises(InputError) as rejection:
         camera.run(bus_with_ticks(1), camera.Config(source="device:/dev/no-such-camera"))
-    assert refusal.value.exit_code == 66
+    assert rejection.value.exit_code == 66
 
 
 def _video(folder: Path, frames: int) -> Path:

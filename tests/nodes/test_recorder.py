@@ -24,7 +24,7 @@ from tests.supervision.conftest import until
 ROOT = Path(__file__).parents[2]
 HEARD = [
     Received(topics.GESTURES, Gesture(object="blue"), 100, 110, 1),
-    Received(topics.SPEECH, Speech(sentence="hello"), 90, 120, 1),
+    Received(topics.SPEECH, Speech(text="hello"), 90, 120, 1),
     Received(topics.GESTURES, Gesture(object="green"), 130, 140, 2),
 ]
 
@@ -47,7 +47,7 @@ def test_tells_now_and_then_how_much_it_has(tmp_path: Path) -> None:
     many = [Received(topics.SPEECH, Speech(), n, n, n) for n in range(2 * recorder.REPORT_EVERY + 5)]
     bus = RecordedBus(many, run_folder=tmp_path)
     recorder.run(bus, recorder.Config(file="other.mcap"))
-    assert [sentence for _, sentence in bus.states] == [
+    assert [detail for _, detail in bus.states] == [
         "recording to other.mcap",
         "1500 messages recorded",
         "3000 messages recorded",

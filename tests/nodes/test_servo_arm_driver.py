@@ -19,7 +19,7 @@ from paramove.bus.bus import Bus
 from paramove.bus.settings import BusSettings
 from paramove.msgs.joint_trajectory_pb2 import TrajectoryStatus
 from paramove.msgs.safety_state_pb2 import SafetyState, StopRequest
-from paramove.operator.terminal_arming import arm_by_word
+from paramove.operator.terminal_arming import request_arming
 from paramove.operator.terminal_stop import stop_arm
 from paramove.robots.description import RobotDescription
 from paramove.robots.dynamixel.emulated.arm import emulated_servos
@@ -118,7 +118,7 @@ def run():
             run = Run(folder, emulator, bus)
             try:
                 run.waits_for("DISARMED")
-                assert arm_by_word(folder, True, PATIENT_S).state == SafetyState.STATE_ARMED
+                assert request_arming(folder, True, PATIENT_S).state == SafetyState.STATE_ARMED
                 yield run
             finally:
                 made[0].stop()
@@ -153,18 +153,18 @@ def pressed_at_a_terminal(run: Run) -> str:
 )
 def test_a_stop_by_a_topic_is_latched_and_its_source_may_end(run: Run, press) -> None:
     with run.moved_by_a_program("one"):
-        sentence = press(run)
+        detail = press(run)
         run.waits_for("HOLD")  # who pressed is gone, the program still asks
-        assert [(fault.code, fault.sentence) for fault in run.safety.faults] == [("person_stop", sentence)]
+        assert [(fault.code, fault.detail) for fault in run.safety.faults] == [("person_stop", detail)]
         stopped = [one for one in run.statuses if one.state == TrajectoryStatus.STATE_STOPPED]
-        assert stopped[0].reason == sentence
+        assert stopped[0].reason == detail
         rested = run.goals()
         assert rested != list(ROBOT.units.to_counts(there()))
         said = len(run.statuses)
         run.hears_until(lambda: len(run.statuses) > said + 5)
         assert run.goals() == rested
         assert run.safety.state == SafetyState.STATE_HOLD
-    while (found := arm_by_word(run.folder, True, PATIENT_S)).state != SafetyState.STATE_ARMED:
+    while (found := request_arming(run.folder, True, PATIENT_S)).state != SafetyState.STATE_ARMED:
         assert {fault.code for fault in found.faults} <= {"arming_slow", "arming_stale"}  # a busy machine
     assert run.goals() == rested
 

@@ -31,14 +31,14 @@ def test_replays_a_relocation(config: synthesizer.Config) -> None:
     bus = RecordedBus(cell.events)
     synthesizer.run(bus, config)
     assert bus.states[0] == ("starting", "training or reading the reaching movement")
-    assert [sentence for sentence, _ in itertools.groupby(sentence for _, sentence in bus.states[1:])][:3] == [
+    assert [detail for detail, _ in itertools.groupby(detail for _, detail in bus.states[1:])][:3] == [
         "waiting for a goal",
         "goal g: begins",
         "goal g: approach",
     ]
     statuses = [said.message for said in bus.published_on(topics.RELOCATION_STATUS)]
     assert statuses == cell.statuses
-    assert statuses[-1].state == RelocationStatus.STATE_REFUSED
+    assert statuses[-1].state == RelocationStatus.STATE_REJECTED
     trajectories = [said.message for said in bus.published_on(topics.ARM_TRAJECTORY)]
     assert [one.id for one in trajectories] == [one.id for one in cell.driver.heard] == ["g/1", "g/2"]
     for one, other in zip(trajectories, cell.driver.heard, strict=True):
@@ -76,13 +76,13 @@ def test_a_bad_model_file_ends_the_node_with_the_remedy(config: synthesizer.Conf
     path = config.movement.file
     assert path is not None
     path.write_bytes(path.read_bytes()[:5000])
-    with pytest.raises(InputError, match=r"reaching.npz: expected a model file .* Remedy: train it again") as refusal:
+    with pytest.raises(InputError, match=r"reaching.npz: expected a model file .* Remedy: train it again") as rejection:
         synthesizer.run(RecordedBus(), config)
-    assert refusal.value.exit_code == 78
+    assert rejection.value.exit_code == 78
     path.unlink()
-    with pytest.raises(InputError, match=r"there is no model file .*Remedy") as refusal:
+    with pytest.raises(InputError, match=r"there is no model file .*Remedy") as rejection:
         synthesizer.run(RecordedBus(), config)
-    assert refusal.value.exit_code == 66
+    assert rejection.value.exit_code == 66
 
 
 def test_recordings_of_people_that_are_not_there_end_the_node_with_the_remedy(
@@ -91,6 +91,6 @@ def test_recordings_of_people_that_are_not_there_end_the_node_with_the_remedy(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("PARAMOVE_DATA", str(tmp_path / "none"))
     config = synthesizer.Config.model_validate({"robot": ROBOT_FOLDER, "movement": {"model": "table_reach"}})
-    with pytest.raises(InputError, match=r"trained from recorded people: .*Remedy: put the data set") as refusal:
+    with pytest.raises(InputError, match=r"trained from recorded people: .*Remedy: put the data set") as rejection:
         synthesizer.run(RecordedBus(), config)
-    assert refusal.value.exit_code == 66
+    assert rejection.value.exit_code == 66

@@ -52,8 +52,8 @@ def test_after_anything_but_waiting_it_never_arms_even_if_it_had_asked_for_nothi
 def test_started_anew_it_arms_no_more() -> None:
     operator = Operator(arms_at_start=True, restarted=True)
     assert operator.update(said(SafetyState.STATE_DISARMED), 0) is None
-    assert operator.sentence.startswith("does not arm: it was started before in this run")
-    assert Operator(arms_at_start=False, restarted=True).sentence == "does not arm"
+    assert operator.detail.startswith("does not arm: it was started before in this run")
+    assert Operator(arms_at_start=False, restarted=True).detail == "does not arm"
 
 
 def test_a_real_robot_is_for_a_person_to_arm() -> None:

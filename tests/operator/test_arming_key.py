@@ -7,7 +7,7 @@ from paramove.operator.arming_key import ANSWER_TIMEOUT_S, PRESS_VALID_S, Arming
 
 
 def gate(state, *sentences):
-    faults = [SafetyFault(code=sentence, sentence=sentence) for sentence in sentences]
+    faults = [SafetyFault(code=detail, detail=detail) for detail in sentences]
     return SafetyState(state=getattr(SafetyState, f"STATE_{state}"), faults=faults)
 
 
@@ -23,16 +23,16 @@ def test_a_gate_that_hears_is_told_once_and_its_answer_is_shown(state):
     key.press(1.0)
     assert [key.tick(1.0), key.tick(1.1)] == [True, False]
     key.handle(gate(state, "stopped by a person"))
-    assert key.sentence == "checking the servos"
+    assert key.detail == "checking the servos"
     key.handle(gate("ARMED"))
-    assert (key.sentence, key.state, key.tick(9.0)) == ("armed", "armed", False)
+    assert (key.detail, key.state, key.tick(9.0)) == ("armed", "armed", False)
 
 
 def test_pressed_while_the_arm_stops_it_is_heard_once_the_arm_rests():
     key = hearing("STOPPING", "stopped by a person")
     key.press(1.0)
     assert not key.tick(1.0)
-    assert key.sentence == "the arm is still stopping: it is armed once it rests"
+    assert key.detail == "the arm is still stopping: it is armed once it rests"
     key.handle(gate("HOLD", "stopped by a person"))
     assert key.tick(1.0 + PRESS_VALID_S)
 
@@ -41,7 +41,7 @@ def test_nobody_is_armed_by_a_key_that_was_pressed_long_ago():
     key = hearing("STOPPING", "stopped by a person")
     key.press(1.0)
     assert not key.tick(1.1 + PRESS_VALID_S)
-    assert key.sentence == "not armed: the arm has not come to rest within 1 s; press a again once it does"
+    assert key.detail == "not armed: the arm has not come to rest within 1 s; press a again once it does"
     key.handle(gate("HOLD", "stopped by a person"))
     assert not key.tick(2.5)
 
@@ -83,7 +83,7 @@ def test_a_gate_that_does_not_hear_is_told_at_once(state, sentences, told):
     key = hearing(state, *sentences)
     key.press(1.0)
     assert not key.tick(1.0)
-    assert key.sentence == told
+    assert key.detail == told
 
 
 def test_a_refusal_is_told_with_every_reason():
@@ -91,7 +91,7 @@ def test_a_refusal_is_told_with_every_reason():
     key.press(1.0)
     assert key.tick(1.0)
     key.handle(gate("HOLD", "servo 12 is silent", "servo 13 is hot"))
-    assert key.sentence == "not armed: servo 12 is silent; servo 13 is hot"
+    assert key.detail == "not armed: servo 12 is silent; servo 13 is hot"
 
 
 @pytest.mark.parametrize(
@@ -104,10 +104,10 @@ def test_the_same_refusal_again_and_no_answer_at_all_are_told_after_a_while(sent
     assert key.tick(1.0)
     key.handle(gate("DISARMED", *sentences))
     key.tick(1.1 + ANSWER_TIMEOUT_S)
-    assert key.sentence == told
+    assert key.detail == told
 
 
 def test_why_the_gate_has_stopped_the_arm_is_told_without_a_key():
     key = hearing("ARMED")
     key.handle(gate("HOLD", "servo 12 is hot"))
-    assert key.sentence == "servo 12 is hot"
+    assert key.detail == "servo 12 is hot"

@@ -55,7 +55,7 @@ def test_a_step_of_a_driver_that_is_gone_is_waited_for_no_longer(jogging):
     jogging.tick(int(1e9 * (duration_s + OVERDUE_S)))
     assert jogging.is_moving
     jogging.tick(int(1e9 * (duration_s + OVERDUE_S)) + 1)
-    assert "was it restarted?" in jogging.sentence
+    assert "was it restarted?" in jogging.detail
     assert jogging.step(1, 0).points[0].position_rad[0] == pytest.approx(0.1)
 
 
@@ -81,8 +81,8 @@ def test_steps_add_up_although_the_joint_sags(jogging):
 
 def test_after_a_refusal_it_begins_where_the_joint_is(jogging):
     message = jogging.step(1, 0)
-    jogging.handle_status(told(message, TrajectoryStatus.STATE_REFUSED, "trajectory refused (joint_limit)"))
-    assert jogging.sentence == "trajectory refused (joint_limit)"
+    jogging.handle_status(told(message, TrajectoryStatus.STATE_REJECTED, "trajectory refused (joint_limit)"))
+    assert jogging.detail == "trajectory refused (joint_limit)"
     jogging.handle_states(states({"pan": 0.3, "lift": -0.2}))
     assert jogging.step(-1, 0).points[0].position_rad[0] == pytest.approx(0.3)
 

@@ -14,10 +14,10 @@ from paramove.bus.bus import Bus
 from paramove.bus.endpoint import TopicTakenError
 from paramove.bus.settings import BusSettings
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
-from paramove.operator.terminal_arming import arm_by_word
+from paramove.operator.terminal_arming import request_arming
 
-FAULT = SafetyFault(code="not_calibrated", sentence="this one is not calibrated")
-OTHER = SafetyFault(code="person_stop", sentence="stopped from the page by a person")
+FAULT = SafetyFault(code="not_calibrated", detail="this one is not calibrated")
+OTHER = SafetyFault(code="person_stop", detail="stopped from the page by a person")
 
 
 @pytest.fixture
@@ -64,30 +64,30 @@ def state(name, *faults):
 )
 def test_it_waits_until_the_gate_is_as_asked(folder, armed, before, answers):
     with gate(folder, before, *answers) as heard:
-        assert arm_by_word(folder, armed, 10.0) == answers[-1]
+        assert request_arming(folder, armed, 10.0) == answers[-1]
     assert heard == [(armed, "terminal")]
 
 
 def test_a_refusal_is_an_answer(folder):
     with gate(folder, state("HOLD", OTHER), state("HOLD", OTHER), state("HOLD", FAULT)) as heard:
-        assert arm_by_word(folder, True, 10.0) == state("HOLD", FAULT)
+        assert request_arming(folder, True, 10.0) == state("HOLD", FAULT)
     assert heard == [(True, "terminal")]
 
 
 def test_what_is_as_wanted_hears_no_word(folder):
     with gate(folder, state("ARMED")) as heard:
-        assert arm_by_word(folder, True, 10.0) == state("ARMED")
+        assert request_arming(folder, True, 10.0) == state("ARMED")
     assert heard == []
 
 
 def test_a_word_that_changes_nothing_is_said_once(folder):
     with gate(folder, state("HOLD", FAULT)) as heard:
-        assert arm_by_word(folder, True, 0.3) == state("HOLD", FAULT)
+        assert request_arming(folder, True, 0.3) == state("HOLD", FAULT)
     assert heard == [(True, "terminal")]
 
 
 def test_without_a_gate_there_is_no_answer(folder):
-    assert arm_by_word(folder, True, 0.1) is None
+    assert request_arming(folder, True, 0.1) is None
 
 
 def test_an_operator_that_arms_already_is_told(folder):
@@ -95,4 +95,4 @@ def test_an_operator_that_arms_already_is_told(folder):
         Bus("operator", BusSettings(folder=folder), (), (topics.OPERATOR_ARM,)),
         pytest.raises(TopicTakenError, match="operator"),
     ):
-        arm_by_word(folder, True, 0.1)
+        request_arming(folder, True, 0.1)

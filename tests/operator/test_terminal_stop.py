@@ -37,9 +37,7 @@ def gate(folder, answers=True):
             for event in bus.events(*topics.STOPS):
                 heard.append((event.topic.name, event.message.source))
                 if answers:
-                    fault = SafetyFault(
-                        code=PERSON_STOP, sentence=f"stopped from the {event.message.source} by a person"
-                    )
+                    fault = SafetyFault(code=PERSON_STOP, detail=f"stopped from the {event.message.source} by a person")
                     bus.publish(topics.ARM_SAFETY, SafetyState(state=SafetyState.STATE_STOPPING, faults=[fault]))
 
     thread = threading.Thread(target=drive)
@@ -54,7 +52,7 @@ def test_the_gate_answers(folder):
     with gate(folder) as heard:
         answer = stop_arm(folder, "terminal", 10.0)
     assert answer.state == SafetyState.STATE_STOPPING
-    assert answer.faults[0].sentence == "stopped from the terminal by a person"
+    assert answer.faults[0].detail == "stopped from the terminal by a person"
     assert {source for _, source in heard} == {"terminal"}
 
 

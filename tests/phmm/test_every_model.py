@@ -137,20 +137,20 @@ def test_files_that_do_not_fit_are_refused(
         arrays = {name: stored[name] for name in stored.files}
     broken = tmp_path / "broken.npz"
 
-    def refused(message: str) -> None:
+    def rejected(message: str) -> None:
         with pytest.raises(ModelFileError, match=message):
             ParametricHMM.load(broken)
 
     broken.write_bytes(content[: len(content) // 2])
-    refused("cut off or damaged")
+    rejected("cut off or damaged")
     np.savez(broken, **{**arrays, "format_version": np.array(99)})
-    refused("expected format version 1, found 99")
+    rejected("expected format version 1, found 99")
     np.savez(broken, **{**arrays, "learned_durations": np.full_like(arrays["learned_durations"], np.nan)})
-    refused("expected finite numbers in 'durations', found NaN")
+    rejected("expected finite numbers in 'durations', found NaN")
     np.savez(broken, **{name: value for name, value in arrays.items() if name != "learned_covariances"})
-    refused("expected an array 'covariances'")
+    rejected("expected an array 'covariances'")
     np.savez(broken, **{**arrays, "learned_covariances": arrays["learned_covariances"][..., :2]})
-    refused("expected covariances of shape")
+    rejected("expected covariances of shape")
     other = InterpolativePHMM if kind is not InterpolativePHMM else LinearPHMM
     with pytest.raises(ModelFileError, match=f"found a {kind.__name__}"):
         other.load(file)

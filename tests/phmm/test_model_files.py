@@ -41,14 +41,14 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def refused(path: Path) -> str:
+def rejected(path: Path) -> str:
     """The sentence with which a file is refused."""
-    with pytest.raises(ModelFileError) as refusal:
+    with pytest.raises(ModelFileError) as rejection:
         ParametricHMM.load(path)
-    sentence = str(refusal.value)
-    assert str(path) in sentence
-    assert "\n" not in sentence
-    return sentence
+    detail = str(rejection.value)
+    assert str(path) in detail
+    assert "\n" not in detail
+    return detail
 
 
 def same(one: ParametricHMM, other: ParametricHMM) -> bool:
@@ -58,14 +58,14 @@ def same(one: ParametricHMM, other: ParametricHMM) -> bool:
 
 
 def test_a_missing_file_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(ModelFileError, match=r"there is no model file .*none\.npz") as refusal:
+    with pytest.raises(ModelFileError, match=r"there is no model file .*none\.npz") as rejection:
         ParametricHMM.load(tmp_path / "none.npz")
-    assert refusal.value.missing
-    assert refusal.value.exit_code == 66
+    assert rejection.value.missing
+    assert rejection.value.exit_code == 66
 
 
 def test_a_folder_is_refused(tmp_path: Path) -> None:
-    assert "found a folder" in refused(tmp_path)
+    assert "found a folder" in rejected(tmp_path)
 
 
 def test_a_file_without_rights_is_refused_with_the_remedy(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,13 +73,13 @@ def test_a_file_without_rights_is_refused_with_the_remedy(file: Path, monkeypatc
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(zipfile, "ZipFile", denied)  # root may read everything
-    assert "chmod u+r" in refused(file)
+    assert "chmod u+r" in rejected(file)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"not a model", b"\x80\x04]", b"\x93NUMPY\x01\x00", bytes(10_000)])
 def test_something_else_is_refused(file: Path, content: bytes) -> None:
     file.write_bytes(content)
-    assert f"expected a model file (.npz), found {len(content)} bytes" in refused(file)
+    assert f"expected a model file (.npz), found {len(content)} bytes" in rejected(file)
 
 
 def test_a_cut_file_is_refused_wherever_it_is_cut(file: Path) -> None:
@@ -87,7 +87,7 @@ def test_a_cut_file_is_refused_wherever_it_is_cut(file: Path) -> None:
     cuts = {len(whole) * k // 50 for k in range(50)} | set(range(128)) | set(range(len(whole) - 64, len(whole)))
     for cut in sorted(cuts):
         file.write_bytes(whole[:cut])
-        assert "cut off or damaged" in refused(file), cut
+        assert "cut off or damaged" in rejected(file), cut
 
 
 def test_a_flipped_bit_is_refused_or_changes_nothing(file: Path) -> None:
@@ -182,7 +182,7 @@ WRONG: Mapping[str, tuple[Callable[[Path], Content], str]] = {
 def test_content_that_does_not_fit_is_named(file: Path, case: str) -> None:
     change, words = WRONG[case]
     np.savez(file, allow_pickle=False, **{**_content(file), **change(file)})
-    assert re.search(words, refused(file))
+    assert re.search(words, rejected(file))
 
 
 @pytest.mark.parametrize(
@@ -192,12 +192,12 @@ def test_a_missing_array_is_named(file: Path, name: str) -> None:
     content = _content(file)
     del content[name]
     np.savez(file, allow_pickle=False, **content)
-    assert name.removeprefix("learned_") in refused(file)
+    assert name.removeprefix("learned_") in rejected(file)
 
 
 def test_another_programs_arrays_are_no_model(file: Path) -> None:
     np.savez(file, images=np.zeros(3), labels=np.ones(3))
-    assert "which has format_version and header; found images, labels" in refused(file)
+    assert "which has format_version and header; found images, labels" in rejected(file)
 
 
 def _npy(header: str, data: bytes = b"", version: bytes = b"\x01\x00") -> bytes:
@@ -227,22 +227,22 @@ def test_pickles_are_never_opened(file: Path, tmp_path: Path) -> None:
     for name in ("learned_means", "header", "extra"):
         small_model().save(file)
         np.savez(file, **{**_content(file), name: np.array([Marker(marker)], dtype=object)})
-        assert "found pickled objects" in refused(file)
+        assert "found pickled objects" in rejected(file)
     file.write_bytes(Marker(marker).__reduce__.__name__.encode())
-    refused(file)
+    rejected(file)
     assert not marker.exists()
 
 
 def test_sizes_are_checked_before_memory_is_taken(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     huge = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000, 1000), }"
     _replaced(file, "learned_means.npy", _npy(huge, bytes(1000)))
-    assert "claims 8000000000000 bytes of numbers in 1128" in refused(file)
+    assert "claims 8000000000000 bytes of numbers in 1128" in rejected(file)
     small_model().save(file)
     zeros = "{'descr': '<f8', 'fortran_order': False, 'shape': (400000,), }"
     _replaced(file, "learned_means.npy", _npy(zeros, bytes(3_200_000)), zipfile.ZIP_DEFLATED)
     assert file.stat().st_size < 20_000
     monkeypatch.setattr(storage, "MAX_BYTES", 2**20)
-    assert "expected at most 500 arrays of 1 MB together, found 10 of 3 MB" in refused(file)
+    assert "expected at most 500 arrays of 1 MB together, found 10 of 3 MB" in rejected(file)
 
 
 @pytest.mark.parametrize(
@@ -258,7 +258,7 @@ def test_sizes_are_checked_before_memory_is_taken(file: Path, monkeypatch: pytes
 )
 def test_a_damaged_array_is_refused(file: Path, member: bytes) -> None:
     _replaced(file, "learned_means.npy", member)
-    assert "cut off or damaged" in refused(file)
+    assert "cut off or damaged" in rejected(file)
 
 
 def test_a_save_that_is_cut_short_leaves_the_old_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

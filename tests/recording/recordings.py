@@ -21,7 +21,7 @@ def messages(count: int):
             gesture.captured.FromNanoseconds(at)
             yield "gestures", gesture, at, at + 1000, n
         else:
-            yield "speech", Speech(sentence=f"sentence {n} " + "x" * (n % 97)), at, at + 2000, n
+            yield "speech", Speech(text=f"sentence {n} " + "x" * (n % 97)), at, at + 2000, n
 
 
 def write(path: Path, count: int) -> list[tuple]:

@@ -11,7 +11,7 @@ def write(path: Path, numbers, killed=False):
     """Messages number n, said at n seconds; what is `killed` is left as its writer's death would leave it."""
     recording = RecordingWriter(next_part(path), "a test")
     for n in numbers:
-        recording.write("speech", Speech(sentence=f"number {n}"), n * 10**9, n * 10**9, n)
+        recording.write("speech", Speech(text=f"number {n}"), n * 10**9, n * 10**9, n)
     if killed:
         recording._file.close()
     else:

@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[2]
 
 def speech(number: int, size: int = 0) -> Received:
     """A message that cannot be compressed."""
-    return Received(topics.SPEECH, Speech(sentence=os.urandom(size // 2).hex()), number, number, number)
+    return Received(topics.SPEECH, Speech(text=os.urandom(size // 2).hex()), number, number, number)
 
 
 def numbers_in(path: Path) -> list[int]:

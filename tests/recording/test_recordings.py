@@ -125,7 +125,7 @@ def test_an_unfinished_recording_is_never_written_over_either(tmp_path: Path) ->
 def test_it_bears_the_ending_part_until_it_is_finished(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     recording = RecordingWriter(path, "a test")
-    recording.write("speech", Speech(sentence="hello"), 1, 1, 1)
+    recording.write("speech", Speech(text="hello"), 1, 1, 1)
     assert [file.name for file in tmp_path.iterdir()] == ["run.mcap.part"]
     recording.close()
     recording.close()
@@ -137,7 +137,7 @@ def test_an_error_while_recording_still_finishes_the_file(tmp_path: Path) -> Non
 
     def fails() -> None:
         with RecordingWriter(path, "a test") as recording:
-            recording.write("speech", Speech(sentence="hello"), 1, 1, 1)
+            recording.write("speech", Speech(text="hello"), 1, 1, 1)
             raise RuntimeError("something else")
 
     with pytest.raises(RuntimeError, match="something else"):

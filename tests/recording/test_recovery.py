@@ -190,22 +190,22 @@ def test_where_it_goes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "sentence"),
+    ("content", "detail"),
     [(b"", "is empty"), (b"\x89MCAP0\r\n", "no readable message"), (b"text\n" * 99, "no readable message")],
 )
-def test_what_holds_nothing_is_refused_and_nothing_is_written(tmp_path: Path, content: bytes, sentence: str) -> None:
+def test_what_holds_nothing_is_refused_and_nothing_is_written(tmp_path: Path, content: bytes, detail: str) -> None:
     source = tmp_path / "run.mcap.part"
     source.write_bytes(content)
-    with pytest.raises(RecoveryError, match=sentence) as refused:
+    with pytest.raises(RecoveryError, match=detail) as rejected:
         recover(source)
-    assert refused.value.exit_code == 78
+    assert rejected.value.exit_code == 78
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap.part"]
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecoveryError, match=r"there is no recording .*run\.mcap") as refused:
+    with pytest.raises(RecoveryError, match=r"there is no recording .*run\.mcap") as rejected:
         recover(tmp_path / "run.mcap")
-    assert refused.value.exit_code == 66
+    assert rejected.value.exit_code == 66
 
 
 def test_whatever_happens_to_a_file_nothing_foreign_is_kept(tmp_path: Path) -> None:

@@ -165,11 +165,11 @@ def test_the_firmware_of_hoap3_refuses_a_robot_of_servos() -> None:
 def test_a_file_without_a_robot_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robot.yaml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(DescriptionError) as refusal:
+    with pytest.raises(DescriptionError) as rejection:
         RobotDescription.load(path)
-    assert str(path) in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-    assert refusal.value.exit_code == 78
+    assert str(path) in str(rejection.value)
+    assert "\n" not in str(rejection.value)
+    assert rejection.value.exit_code == 78
 
 
 def test_a_file_of_other_bytes_is_refused(tmp_path: Path) -> None:
@@ -179,16 +179,16 @@ def test_a_file_of_other_bytes_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"no robot description .*; name the folder that holds") as refusal:
+    with pytest.raises(DescriptionError, match=r"no robot description .*; name the folder that holds") as rejection:
         RobotDescription.load(tmp_path / "robot.yaml")
-    assert refusal.value.exit_code == 66
+    assert rejection.value.exit_code == 66
 
 
 def test_a_missing_model_file_is_named(tmp_path: Path) -> None:
     shutil.copy(ROBOT_DESCRIPTION / "robot.yaml", tmp_path)
-    with pytest.raises(DescriptionError, match=r"the model file .*hoap3\.xml does not exist") as refusal:
+    with pytest.raises(DescriptionError, match=r"the model file .*hoap3\.xml does not exist") as rejection:
         RobotDescription.load(tmp_path)
-    assert refusal.value.missing
+    assert rejection.value.missing
 
 
 def test_the_limits_are_those_of_the_description() -> None:

@@ -92,9 +92,9 @@ def test_a_point_too_far_away_is_refused_with_a_reachable_one(robot: RobotDescri
     arm = arm_of(robot)
     with pytest.raises(
         OutOfReachError, match=r"wrist .* its links reach 0\.\d+ to .*first reachable point is \(0\."
-    ) as refusal:
+    ) as rejection:
         arm.joint_angles((0.60, 0.0, 0.20), 0.0)
-    nearer = refusal.value.position
+    nearer = rejection.value.position
     assert nearer is not None
     assert 0.25 < nearer[0] < 0.45
     pitch = arm.nearest_pitch(nearer, 0.0)
@@ -104,28 +104,28 @@ def test_a_point_too_far_away_is_refused_with_a_reachable_one(robot: RobotDescri
 def test_a_joint_at_its_limit_is_named_with_the_nearest_pitch() -> None:
     arm = arm_of(OPEN_MANIPULATOR_X)
     position = (0.20, 0.0, 0.15)
-    with pytest.raises(OutOfReachError, match=r"joint\d would have to turn to .* its range is") as refusal:
+    with pytest.raises(OutOfReachError, match=r"joint\d would have to turn to .* its range is") as rejection:
         arm.joint_angles(position, np.deg2rad(-110))
-    assert refusal.value.pitch is not None
-    assert f"nearest reachable pitch there is {np.rad2deg(refusal.value.pitch):.1f} deg" in str(refusal.value)
-    arm.joint_angles(position, refusal.value.pitch)
+    assert rejection.value.pitch is not None
+    assert f"nearest reachable pitch there is {np.rad2deg(rejection.value.pitch):.1f} deg" in str(rejection.value)
+    arm.joint_angles(position, rejection.value.pitch)
 
 
 @each_arm
 def test_the_nearest_pitch_is_reachable_and_no_nearer_one_is(robot: RobotDescription) -> None:
     arm = arm_of(robot)
     rng = np.random.default_rng(6)
-    refused = 0
+    rejected = 0
     for angles in postures(arm, 25):
         position, wanted = arm.forward(angles).position, rng.uniform(-np.pi, np.pi)
         pitch = arm.nearest_pitch(position, wanted)
         arm.joint_angles(position, pitch)
         away = np.remainder(pitch - wanted + np.pi, 2 * np.pi) - np.pi
         for part in np.linspace(0.0, 0.99, 6) if abs(away) > 1e-5 else ():
-            refused += 1
+            rejected += 1
             with pytest.raises(OutOfReachError):
                 arm.joint_angles(position, wanted + part * away)
-    assert refused > 50
+    assert rejected > 50
 
 
 def test_a_reachable_pitch_is_its_own_nearest() -> None:
@@ -146,17 +146,17 @@ def test_a_point_beside_the_yaw_axis_is_refused_where_the_arm_lies_further_out()
 
 def test_nothing_is_proposed_where_no_point_on_the_way_is_reachable() -> None:
     arm = replace(arm_of(OPEN_MANIPULATOR_X), upper=np.array([-2.5, 0.1, 1.3, 1.9]), lower=np.full(4, -2.7))
-    with pytest.raises(OutOfReachError, match="so is every point between it and the shoulder") as refusal:
+    with pytest.raises(OutOfReachError, match="so is every point between it and the shoulder") as rejection:
         arm.joint_angles((0.0, 0.2, 0.1), 0.5)
-    assert refusal.value.pitch is None
-    assert refusal.value.position is None
+    assert rejection.value.pitch is None
+    assert rejection.value.position is None
 
 
 @pytest.mark.parametrize("position", [(0.1, 0.0), (0.1, np.nan, 0.1), [(0.1, 0.0, 0.1)]])
 def test_what_is_no_position_is_refused(position: object) -> None:
-    with pytest.raises(ValueError, match=r"shape|finite") as refusal:
+    with pytest.raises(ValueError, match=r"shape|finite") as rejection:
         arm_of(KOCH).joint_angles(position, 0.0)
-    assert not isinstance(refusal.value, OutOfReachError)
+    assert not isinstance(rejection.value, OutOfReachError)
 
 
 def test_wrong_numbers_of_angles_are_refused() -> None:

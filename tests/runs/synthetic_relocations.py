@@ -8,7 +8,7 @@ import numpy as np
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.ImageAnnotations_pb2 import ImageAnnotations
 
-from paramove.action_space.messages import TablePlace
+from paramove.action_space.messages import TablePose
 from paramove.bus import topics
 from paramove.cameras.frames import Frame, encode
 from paramove.msgs.gesture_pb2 import Gesture
@@ -20,7 +20,7 @@ from paramove.recording.writer import RecordingWriter
 PERIOD_NS = 66_666_667
 EVERY_S = 10.0
 SHOULDER = np.array([-0.035, -0.11, 0.125])
-TABLE = TablePlace(frame="right_shoulder", x=0.15, y=-0.1, z=-0.134, yaw=2.4)
+TABLE = TablePose(frame="right_shoulder", x=0.15, y=-0.1, z=-0.134, yaw=2.4)
 LYING = (0.7071068, 0.0, 0.0, 0.7071068)
 SUCCEEDED = RelocationStatus.STATE_SUCCEEDED
 
@@ -47,7 +47,7 @@ class Put:
 
 GOOD = Put()
 """Recognised 5 mm beside, put 1 mm beside that, 5.657 mm in all."""
-REFUSED = replace(GOOD, state=RelocationStatus.STATE_REFUSED)
+REJECTED = replace(GOOD, state=RelocationStatus.STATE_REJECTED)
 
 
 def write_run(folder, puts, done=True, with_table=True, view=False):
@@ -77,7 +77,7 @@ def _said(number, put):
     goal = RelocationGoal(id=f"g-{number}", kind=RelocationGoal.KIND_PLACE_HELD, object="yellow")
     goal.to.CopyFrom(Position(x=put.recognised[0], y=put.recognised[1], z=-0.098))
     status = RelocationStatus(goal_id=goal.id, state=put.state, reason="it slipped" if put.state != SUCCEEDED else "")
-    asks = Speech(request=Speech.REQUEST_POINT_AT_PLACE, sentence="Please point.")
+    asks = Speech(request=Speech.REQUEST_POINT_AT_PLACE, text="Please point.")
     moments = (
         (topics.SPEECH, 1.0, asks),
         (topics.GESTURES, 3.0, gesture),

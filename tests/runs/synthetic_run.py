@@ -126,14 +126,14 @@ class SyntheticRun:
         yield from self._regular(after_end)
         yield from self._goal()
         yield topics.CALIBRATION_PLANE, _ns(1.0), self._calibration()
-        rule = Rule(object="yellow", x=0.135, y=-0.093, observations=1, sentence="yellow belongs there")
+        rule = Rule(object="yellow", x=0.135, y=-0.093, observations=1, text="yellow belongs there")
         yield topics.RULES, _ns(1.5), Rules(frame="right_shoulder", rules=[rule])
         for time_s, kind, x in ((1.6, Gesture.KIND_RESTED, 0.151), (1.8, Gesture.KIND_VANISHED, 0.3)):
             gesture = Gesture(kind=kind, object="yellow", located=True, x=x, y=0.0, frame="right_shoulder")
             gesture.captured.FromNanoseconds(_ns(time_s))
             yield topics.GESTURES, _ns(time_s), gesture
-        for time_s, sentence in ((0.0, "I begin."), (END_S, "Thank you!")):
-            yield topics.SPEECH, _ns(time_s), Speech(sentence=sentence)
+        for time_s, detail in ((0.0, "I begin."), (END_S, "Thank you!")):
+            yield topics.SPEECH, _ns(time_s), Speech(text=detail)
         stages = ((0.0, "CALIBRATE"), (1.0, "LEARN"), (1.9, "APPLY"), (END_S, "DONE"))
         for time_s, name in stages:
             stage = ApplicationStage(stage=ApplicationStage.Stage.Value(f"STAGE_{name}"))

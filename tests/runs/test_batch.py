@@ -44,8 +44,8 @@ def test_totals_and_enough():
     assert table_of(results).row_count == 10
 
 
-def hull(tried, succeeded, refused=0):
-    counts = {"tried": tried, "succeeded": succeeded, "refused": refused}
+def hull(tried, succeeded, rejected=0):
+    counts = {"tried": tried, "succeeded": succeeded, "refused": rejected}
     return {"from": {"inside": counts, "outside": {"tried": 3, "succeeded": 3, "refused": 0}}}
 
 
@@ -54,7 +54,7 @@ def test_relocations_within_and_outside_the_training_are_told_apart():
         result(0, training_hull=hull(2, 2)),
         result(1, training_hull=hull(3, 2)),
         result(2, training_hull=hull(0, 0)),
-        result(3, training_hull=hull(1, 1, refused=1)),
+        result(3, training_hull=hull(1, 1, rejected=1)),
         result(4),  # of an earlier release
     ]
     inside = totals_of(results)["training_hull.from"]["inside"]

@@ -30,10 +30,10 @@ def test_where_the_robot_is_emulated_it_arms_once() -> None:
 def test_any_other_robot_is_for_a_person_to_arm(no_program: str | None) -> None:
     arm = SmallArm()
     assert asks(arm, no_program) == (State.DISARMED, ("arming_program",))
-    sentence = arm.core.faults[0].sentence
-    assert sentence.startswith("operator is a program")
-    assert (no_program or Inputs.no_program) in sentence
-    assert "paramove arm enable" in sentence
+    detail = arm.core.faults[0].detail
+    assert detail.startswith("operator is a program")
+    assert (no_program or Inputs.no_program) in detail
+    assert "paramove arm enable" in detail
     assert arm.arm(no_program=no_program or "")[1:] == (State.ARMED, ())
 
 
@@ -97,5 +97,5 @@ def test_after_any_stop_or_fault_only_a_person_arms(touch) -> None:
         state, faults = asks(arm)
         assert state is State.DISARMED
         assert "arming_program" in faults
-    assert "armed, stopped or at fault before" in arm.core.faults[-1].sentence
+    assert "armed, stopped or at fault before" in arm.core.faults[-1].detail
     assert arm.arm()[1:] == (State.ARMED, ())

@@ -199,7 +199,7 @@ class ArmingMachine(RuleBasedStateMachine):
         failing |= set() if word.by_person or (self.emulated and not self.touched) else {"arming_program"}
         assert failing <= set(faults)
         assert faults
-        assert all(fault.sentence for fault in self.arm.core.faults)
+        assert all(fault.detail for fault in self.arm.core.faults)
 
     def expect_a_movement_that_may_be(self, targets: Targets, before: State, state: State) -> None:
         assert before is State.ARMED

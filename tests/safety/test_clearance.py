@@ -94,13 +94,13 @@ def test_exactly_as_fast_as_allowed_passes() -> None:
 def test_millimetres_are_thousandths_of_metres(distance: float, said: str) -> None:
     found = fault([distance], 0.5, limits_at(0.02))
     assert found is not None
-    assert said in found.sentence
+    assert said in found.detail
 
 
 def test_the_sentence_names_the_two_the_place_and_what_is_allowed() -> None:
     found = fault([0.0141, 0.0120, 0.0105, 0.0100], 0.0141)
     assert found is not None
-    assert found.sentence == (
+    assert found.detail == (
         "hand and torso come within 12.0 mm at row 1, at 105 mm/s, allowed 35 mm/s there, and below 5 mm only slowly "
         "apart"
     )
@@ -108,7 +108,7 @@ def test_the_sentence_names_the_two_the_place_and_what_is_allowed() -> None:
     rows[:, 0] = [0.3, 0.3, 0.3, 0.01]
     stop = clearance_fault(Gap(), rows[0], rows, SLOW, 3)
     assert stop is not None
-    assert "10.0 mm in the stop after these rows, at" in stop.sentence
+    assert "10.0 mm in the stop after these rows, at" in stop.detail
     last = clearance_fault(Gap(), rows[0], rows, SLOW, 4)
     assert last is not None
-    assert "at row 3" in last.sentence
+    assert "at row 3" in last.detail

@@ -126,7 +126,7 @@ def test_a_violation_stops_and_is_latched(fields: dict, code: str) -> None:
     targets, state, faults = core.step(now, Inputs(measured(now), proposal=bad))
     assert state in (State.STOPPING, State.HOLD)  # at once in HOLD where nothing had been sent
     assert [fault.code for fault in faults] == [code]
-    assert "allowed" in faults[0].sentence or "needed" in faults[0].sentence
+    assert "allowed" in faults[0].detail or "needed" in faults[0].detail
     if targets is not None:
         assert targets.ramp_rows == len(targets.rows)
     later = now + 600 * MS

@@ -47,8 +47,8 @@ def test_the_pose_may_lie_half_a_degree_outside_the_mechanical_range(offset: flo
     _, state, faults = arm.arm()
     assert (state is State.ARMED) is arms
     if not arms:
-        sentence = arm.core.faults[0].sentence
-        assert sentence == (
+        detail = arm.core.faults[0].detail
+        assert detail == (
             "joint shoulder is measured at 115.14 deg, allowed -114.59 to 114.59 deg; move it inside by hand"
         )
         assert faults == ("arming_pose_outside", "arming_pose_outside")
@@ -92,7 +92,7 @@ def test_what_the_checks_take_does_not_make_a_word_old(age_ms: int, checks_ms: i
     assert (arm.core.state is State.ARMED) == (told == ())
     if "arming_slow" in told:
         assert (arm.core.faults[-1].code, arm.core.faults[-1].joint) == ("arming_slow", "")
-        assert f"took {checks_ms} ms, allowed 3000 ms" in arm.core.faults[-1].sentence
+        assert f"took {checks_ms} ms, allowed 3000 ms" in arm.core.faults[-1].detail
     assert arm.arm()[1] is State.ARMED
 
 
@@ -152,7 +152,7 @@ def test_arm_words_that_come_too_often_do_not_arm_but_those_that_disarm_are_hear
             State.ARMED if k % 2 == 0 else State.DISARMED
         )
     assert arm.arm()[1:] == (State.DISARMED, ("arming_rate",))
-    assert "6 within 250 ms" in arm.core.faults[0].sentence
+    assert "6 within 250 ms" in arm.core.faults[0].detail
     arm.step(ms=300)
     assert arm.arm()[1] is State.ARMED
     for _ in range(10):
@@ -176,7 +176,7 @@ def test_a_report_that_cannot_be_true_stops_the_arm(fields: dict) -> None:
     robot = replace(arm.measured(), captured_ns=arm.now + 10 * MS, **fields)
     _, state, faults = arm.step(measured=robot, proposal=arm.proposal)
     assert (state, faults) == (State.STOPPING, ("report",))
-    assert "allowed" in arm.core.faults[0].sentence
+    assert "allowed" in arm.core.faults[0].detail
 
 
 def test_a_report_from_before_the_stream_is_not_taken_for_a_place_in_it() -> None:
@@ -196,7 +196,7 @@ def test_time_that_goes_back_stops_the_arm() -> None:
     _, state, faults = arm.step(ms=0, proposal=arm.proposal)
     assert (state, faults) == (State.STOPPING, ("clock",))
     assert arm.core.faults[0].code == "clock"
-    assert "7 ms, allowed 0 ms" in arm.core.faults[0].sentence
+    assert "7 ms, allowed 0 ms" in arm.core.faults[0].detail
 
 
 @pytest.mark.parametrize("age_ms", [501, -501])
@@ -206,7 +206,7 @@ def test_a_report_of_another_time_is_silence(age_ms: int) -> None:
     robot = replace(arm.measured(), captured_ns=arm.now + (10 - age_ms) * MS)
     assert arm.step(measured=robot)[1:] == (State.DISCONNECTED, ("robot_silent",))
     assert arm.core.faults[0].code == "robot_silent"
-    assert "501 ms, allowed 500 ms" in arm.core.faults[0].sentence
+    assert "501 ms, allowed 500 ms" in arm.core.faults[0].detail
 
 
 def test_no_report_for_half_a_second_is_silence_too() -> None:
@@ -261,7 +261,7 @@ def test_a_joint_that_is_held_is_given_way_to_in_motion() -> None:
     assert arm.core.state is State.HOLD
     assert arm.arm()[2] == ("arming_following",)
     assert arm.core.faults[0].joint == "elbow"
-    assert "elbow" in arm.core.faults[0].sentence
+    assert "elbow" in arm.core.faults[0].detail
     arm.push = np.zeros(3)
     assert arm.arm()[1] is State.ARMED
 
@@ -302,7 +302,7 @@ def test_a_movement_to_a_wall_is_refused_before_it_gets_there(at: float, passes:
         assert arm.core.faults == ()
         return
     assert [fault.code for fault in arm.core.faults] == ["clearance"]
-    assert "hand and wall come within" in arm.core.faults[0].sentence
+    assert "hand and wall come within" in arm.core.faults[0].detail
     for _ in range(100):
         arm.step()
     assert arm.stream[:, 0].max() < at - 0.005
@@ -312,7 +312,7 @@ def test_the_stop_after_the_rows_is_looked_at_too() -> None:
     arm = SmallArm(clearance=Wall(PATH[29, 0] + 0.021))
     arm.arm()
     assert arm.step(proposal=arm.proposal)[2] == ("clearance",)
-    assert "in the stop after these rows" in arm.core.faults[0].sentence
+    assert "in the stop after these rows" in arm.core.faults[0].detail
 
 
 def test_a_word_from_the_future_neither_arms_nor_silences_later_ones() -> None:
@@ -369,7 +369,7 @@ def test_rows_whose_stop_would_leave_the_range_are_refused_in_time() -> None:
     arm.follow(inside, len(inside))
     assert [fault.code for fault in arm.core.faults] == ["joint_limit"]
     assert arm.core.faults[0].joint == "shoulder"
-    assert arm.core.faults[0].sentence.startswith("in the stop after these rows: joint shoulder leaves its range at")
+    assert arm.core.faults[0].detail.startswith("in the stop after these rows: joint shoulder leaves its range at")
     for _ in range(100):
         arm.step()
     assert 0.1 < arm.stream[-1, 0] <= 1.5
@@ -443,7 +443,7 @@ def check_faults(arm: SmallArm, *expected: tuple[str, str, str]) -> None:
     """Codes and joints of all faults, and a part of each message."""
     assert [(fault.code, fault.joint) for fault in arm.core.faults] == [(code, joint) for code, joint, _ in expected]
     for fault, (_, _, part) in zip(arm.core.faults, expected, strict=True):
-        assert part in fault.sentence
+        assert part in fault.detail
 
 
 def test_what_the_faults_of_reports_and_time_say() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.safety_steps import limits_at
-from paramove.safety.trajectory_check import CheckedPath, TrajectoryRefusedError, check_trajectory
+from paramove.safety.trajectory_check import CheckedPath, TrajectoryRejectedError, check_trajectory
 from tests.robots.hoap3.movements import HOAP3
 
 LIMITS = HOAP3.motion_limits
@@ -85,12 +85,12 @@ def test_a_start_within_two_degrees_is_faded_in_from_the_commanded_pose() -> Non
 def test_refused_with_the_point_and_the_joint(
     times: list[float], offsets: list[list[float]], joints: tuple[str, ...], code: str, index: int, joint: str
 ) -> None:
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check(times, offsets, joints)
-    assert (refusal.value.code, refusal.value.joint) == (code, joint)
-    assert refusal.value.index == index
-    assert refusal.value.requested
-    assert refusal.value.allowed
+    assert (rejection.value.code, rejection.value.joint) == (code, joint)
+    assert rejection.value.index == index
+    assert rejection.value.requested
+    assert rejection.value.allowed
 
 
 @pytest.mark.parametrize(
@@ -118,9 +118,9 @@ def test_refused_with_the_point_and_the_joint(
 def test_what_was_asked_and_what_is_allowed_is_said(
     times: list[float], offsets: list[list[float]], joints: tuple[str, ...], requested: str, allowed: str
 ) -> None:
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check(times, offsets, joints)
-    assert (refusal.value.requested, refusal.value.allowed) == (requested, allowed)
+    assert (rejection.value.requested, rejection.value.allowed) == (requested, allowed)
 
 
 SMALL = limits_at(0.02)  # three joints, each from -1.5 to 1.5 rad
@@ -140,26 +140,29 @@ def check_small(
 def test_a_point_at_its_limit_passes_and_one_beyond_is_told_as_it_was_given(side: int, requested: str) -> None:
     path = check_small([0, 3], [[0, 0], [0, 1.5 * side]])
     np.testing.assert_allclose(path.rows[-1], [0, 1.5 * side, 0], rtol=0, atol=1e-12)
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check_small([0, 3, 6], [[0, 0], [0, 0], [0, 1.505 * side]])
-    assert (refusal.value.code, refusal.value.index, refusal.value.joint) == ("joint_limit", 2, "elbow")
-    assert (refusal.value.requested, refusal.value.allowed) == (requested, "-85.94 to 85.94 deg")
+    assert (rejection.value.code, rejection.value.index, rejection.value.joint) == ("joint_limit", 2, "elbow")
+    assert (rejection.value.requested, rejection.value.allowed) == (requested, "-85.94 to 85.94 deg")
 
 
 def test_what_lies_exactly_at_the_tolerance_may_begin() -> None:
     assert check_small([0, 3], [[0, 0], [1, 0]]).duration_s == pytest.approx(3.0, abs=1e-9)
     assert check_small([0, 3], [[0.5, 0], [1, 0]], 0.5).rows[0].tolist() == [0, 0, 0]
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check_small([0, 3], [[0.5, 0.25], [1, 1]], [0.5, 0.125, 0.0])
-    assert (refusal.value.code, refusal.value.index, refusal.value.joint) == ("start", 0, "elbow")
-    assert (refusal.value.requested, refusal.value.allowed) == ("14.32 deg", "within 7.16 deg of the commanded 0 deg")
+    assert (rejection.value.code, rejection.value.index, rejection.value.joint) == ("start", 0, "elbow")
+    assert (rejection.value.requested, rejection.value.allowed) == (
+        "14.32 deg",
+        "within 7.16 deg of the commanded 0 deg",
+    )
 
 
 def test_two_minutes_pass_and_not_a_moment_more() -> None:
     assert check_small([0, 120], [[0, 0], [1, 0]]).duration_s == pytest.approx(120.0, abs=1e-9)
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check_small([0, 120.001], [[0, 0], [1, 0]])
-    assert (refusal.value.requested, refusal.value.allowed) == ("120.001 s", "up to 120 s")
+    assert (rejection.value.requested, rejection.value.allowed) == ("120.001 s", "up to 120 s")
 
 
 def test_numbers_of_single_precision_become_the_same_movement_as_their_doubles() -> None:
@@ -181,16 +184,16 @@ def test_a_joint_that_is_held_outside_its_range_may_begin_there_and_come_in_slow
 
     rows = to([0, 2], -10.0).rows
     np.testing.assert_array_equal(rows[0], held)
-    with pytest.raises(TrajectoryRefusedError, match="velocity"):
+    with pytest.raises(TrajectoryRejectedError, match="velocity"):
         to([0, 0.42], -36.0)
-    with pytest.raises(TrajectoryRefusedError, match="joint_limit"):
+    with pytest.raises(TrajectoryRejectedError, match="joint_limit"):
         to([0, 2], 0.1)
 
 
 def test_a_trajectory_that_ends_in_motion_is_refused() -> None:
     times = [0.001 * i for i in range(201)]
     ramp = [[-0.5 * 900 * t**2, 0.0] for t in times]
-    with pytest.raises(TrajectoryRefusedError, match="acceleration"):
+    with pytest.raises(TrajectoryRejectedError, match="acceleration"):
         check(times, ramp)
 
 
@@ -199,27 +202,27 @@ def test_a_tremble_within_velocity_and_acceleration_breaks_the_jerk() -> None:
     size = np.sin(np.pi * times / times[-1]) ** 4
     tremble = [[float(angle), 0.0] for angle in size * np.sin(100.0 * times)]
     assert check(list(times), [[0.1 * a, 0.0] for a, _ in tremble]).duration_s == times[-1]
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check(list(times), [[0.14 * a, 0.0] for a, _ in tremble])
-    assert (refusal.value.code, refusal.value.joint) == ("jerk", "right_shoulder_pitch")
-    assert refusal.value.requested.endswith("deg/s³")
+    assert (rejection.value.code, rejection.value.joint) == ("jerk", "right_shoulder_pitch")
+    assert rejection.value.requested.endswith("deg/s³")
 
 
 def test_a_refusal_says_code_place_joint_asked_and_allowed() -> None:
-    refusal = TrajectoryRefusedError("start", 3, "right_elbow", "7 deg", "2 deg")
-    assert str(refusal).endswith("(start) at point 3, joint right_elbow: requested 7 deg, allowed 2 deg")
-    assert (refusal.code, refusal.index, refusal.joint) == ("start", 3, "right_elbow")
-    assert (refusal.requested, refusal.allowed) == ("7 deg", "2 deg")
-    assert str(TrajectoryRefusedError("id", -1, "", "none", "one")).endswith("(id): requested none, allowed one")
-    assert " at point 0" in str(TrajectoryRefusedError("start", 0, "", "", ""))
+    rejection = TrajectoryRejectedError("start", 3, "right_elbow", "7 deg", "2 deg")
+    assert str(rejection).endswith("(start) at point 3, joint right_elbow: requested 7 deg, allowed 2 deg")
+    assert (rejection.code, rejection.index, rejection.joint) == ("start", 3, "right_elbow")
+    assert (rejection.requested, rejection.allowed) == ("7 deg", "2 deg")
+    assert str(TrajectoryRejectedError("id", -1, "", "none", "one")).endswith("(id): requested none, allowed one")
+    assert " at point 0" in str(TrajectoryRejectedError("start", 0, "", "", ""))
 
 
 @pytest.mark.parametrize(("offsets", "index"), [([-60, 0, 0, 0], 1), ([0, 0, -60, 0], 3), ([0, 0, 0, -60], 4)])
 def test_the_point_is_that_to_which_the_movement_is_too_fast(offsets: list[float], index: int) -> None:
     points = [[0.0, 0.0]] + [[float(sum(offsets[: k + 1])), 0.0] for k in range(4)]
-    with pytest.raises(TrajectoryRefusedError) as refusal:
+    with pytest.raises(TrajectoryRejectedError) as rejection:
         check([0.0, 0.5, 1.0, 1.5, 2.0], points)
-    assert (refusal.value.code, refusal.value.index) == ("velocity", index)
+    assert (rejection.value.code, rejection.value.index) == ("velocity", index)
 
 
 @pytest.mark.parametrize(("duration_s", "faded_s"), [(1.0, 0.5), (0.3, 0.3)])
@@ -242,7 +245,7 @@ def test_whatever_passes_keeps_every_limit(gaps: list[float], moves: list[float]
     offsets = [[0.0, 0.0], *([move, 0.0] for move in moves[: len(gaps)])]
     try:
         rows = check(times, offsets).rows
-    except TrajectoryRefusedError:
+    except TrajectoryRejectedError:
         return
     rows = np.concatenate([rows[:1]] * 4 + [rows] + [rows[-1:]] * 4)
     assert (rows >= LIMITS.lower).all()

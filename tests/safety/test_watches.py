@@ -18,7 +18,7 @@ def test_the_newest_word_of_the_emergency_stop_stays() -> None:
     pressed = watch.fault(20 * MS, True)
     assert pressed is not None
     assert (pressed.code, pressed.joint) == ("emergency_stop", "")
-    assert pressed.sentence == "the emergency stop is pressed; release it, then arm again"
+    assert pressed.detail == "the emergency stop is pressed; release it, then arm again"
     assert watch.fault(10**15, None) == pressed
     assert watch.fault(10**15, False) is None
     assert watch.fault(10**15 + 1, None) is None
@@ -30,7 +30,7 @@ def test_a_source_that_is_silent_counts_as_pressed() -> None:
     silent = watch.fault(601 * MS, None)
     assert silent is not None
     assert (silent.code, silent.joint) == ("emergency_silent", "")
-    assert "501 ms, allowed 500 ms" in silent.sentence
+    assert "501 ms, allowed 500 ms" in silent.detail
     assert watch.fault(602 * MS, False) is None
     assert watch.fault(1102 * MS, None) is None
     assert watch.fault(1103 * MS, None) is not None
@@ -55,7 +55,7 @@ def test_a_joint_that_is_away_for_long_is_named_with_error_and_limit() -> None:
     assert fault is not None
     assert (fault.code, fault.joint) == ("following", "elbow")
     for fact in ("joint elbow", "14.32 deg", "100 ms", "allowed 11.46 deg"):
-        assert fact in fault.sentence
+        assert fact in fault.detail
 
 
 def test_the_time_begins_anew_once_a_joint_was_there_again() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from paramove.action_space.messages import TablePlace, estimate_message
+from paramove.action_space.messages import TablePose, estimate_message
 from paramove.action_space.setup import TrackingSetup
 from paramove.bus import topics
 from paramove.bus.bus import Bus
@@ -104,7 +104,7 @@ def test_the_person_sits_at_first_and_then_withdraws(description: RobotDescripti
 
 def test_the_overlay_knows_where_the_table_frame_is() -> None:
     launch = load(Workspace.at(LAUNCH.parent), "rule_learning", ["sim", "action_space"])
-    place = TablePlace.model_validate(launch.file.nodes["action_tracker"].parameters["table_place"])
+    place = TablePose.model_validate(launch.file.nodes["action_tracker"].parameters["table_place"])
     points = np.random.default_rng(1).normal(size=(4, 3))
     assert place.frame == "right_shoulder"
     assert_allclose(place.frame_from_table(points), shoulder_from_table(points), rtol=0, atol=1e-9)

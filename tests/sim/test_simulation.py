@@ -54,7 +54,7 @@ def test_robot_plays_the_stream_and_reports_it(description: RobotDescription) ->
     rows[:, wrist] -= np.deg2rad(30) * share**3 * (10 - 15 * share + 6 * share**2)
     batch = StreamWriter(description, epoch=7).batch(0, rows, ramp_rows=100)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, batch))
-    assert not simulation.stream.refusal
+    assert not simulation.stream.rejection
     simulation.run_to_tick(3)
     state = simulation.robot_state()
     assert (state.epoch, state.next_index, state.depth) == (7, 200, 200)
@@ -74,8 +74,8 @@ def test_a_bad_batch_is_refused_and_reported(description: RobotDescription) -> N
     rows[20:, description.index("right_elbow")] -= np.deg2rad(10.0)
     simulation.handle(_heard(topics.WIRE_HOAP3_STREAM, StreamWriter(description, epoch=7).batch(0, rows, 10)))
     state = simulation.robot_state()
-    assert state.refused_batches == 1
-    assert "right_elbow" in state.refusal
+    assert state.rejected_batches == 1
+    assert "right_elbow" in state.rejection
     simulation.run_to_tick(2)
     assert_allclose(simulation.world.joint_positions(), description.base_pose, rtol=0, atol=np.deg2rad(0.6))
 

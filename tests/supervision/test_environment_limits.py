@@ -74,7 +74,7 @@ def test_process_that_cannot_be_started_is_tried_again():
 def test_silence_while_the_supervisor_itself_was_stopped_does_not_count(looks_s, killed):
     made, changes = node(lambda _: Process(), silent_timeout_s=10.0)
     made.start(0.0)
-    made.handle(NodeStatus(node="camera", state=NodeStatus.STATE_READY, sentence="frames", pid=os.getpid()))
+    made.handle(NodeStatus(node="camera", state=NodeStatus.STATE_READY, detail="frames", pid=os.getpid()))
     for now_s in looks_s:
         made.check(now_s)
     assert (made.process is None) == killed

@@ -28,7 +28,7 @@ def expected():
 EXPECTED = expected()
 
 
-def refusal(folder, name):
+def rejection(folder, name):
     with pytest.raises(DocumentError) as caught:
         application.check(load(Workspace((folder.parent,)), name), Workspace.at(ROOT))
     return str(caught.value).replace(f"{folder}/", "").replace(str(ROOT), "WORKSPACE").splitlines()
@@ -40,7 +40,7 @@ def test_every_wrong_file_has_its_lines():
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_wrong_file_is_refused_with_all_that_is_wrong(name):
-    assert refusal(CORPUS, name) == EXPECTED[name]
+    assert rejection(CORPUS, name) == EXPECTED[name]
 
 
 def test_what_a_terminal_would_obey_is_never_printed():
@@ -79,7 +79,7 @@ def test_what_editors_make_of_a_file_does_not_matter(launches, content):
 )
 def test_bytes_that_are_no_launch_file(launches, content, message):
     (launches / "bad.yaml").write_bytes(content)
-    assert message in refusal(launches, "bad")[0]
+    assert message in rejection(launches, "bad")[0]
 
 
 def test_a_folder_is_no_launch_file(launches):

@@ -23,7 +23,7 @@ class OwnProcess:
 def node():
     made = SupervisedNode("camera", NodeSettings(module="m"), lambda _: OwnProcess(), lambda _: None)
     made.start(0.0)
-    status = NodeStatus(node="camera", state=NodeStatus.STATE_READY, sentence="480x360 [red]", pid=os.getpid())
+    status = NodeStatus(node="camera", state=NodeStatus.STATE_READY, detail="480x360 [red]", pid=os.getpid())
     status.received.add(topic="clock", lost=3)
     made.handle(status)
     return made
@@ -34,7 +34,7 @@ def console(width=100, terminal=False):
 
 
 def test_words_of_another_process_are_passed_over(node):
-    node.handle(NodeStatus(node="camera", state=NodeStatus.STATE_FAILED, sentence="old", pid=1))
+    node.handle(NodeStatus(node="camera", state=NodeStatus.STATE_FAILED, detail="old", pid=1))
     assert (node.state, node.detail) == (State.READY, "480x360 [red]")
 
 

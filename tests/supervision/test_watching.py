@@ -124,7 +124,7 @@ def test_run_ends_when_such_a_node_does_not_come_back(workspace):
 
 
 @pytest.mark.parametrize(
-    ("code", "sentence"),
+    ("code", "detail"),
     [
         (0, "has finished"),
         (70, "ended with exit code 70"),
@@ -134,8 +134,8 @@ def test_run_ends_when_such_a_node_does_not_come_back(workspace):
         (-40, "was ended by signal 40"),
     ],
 )
-def test_end_is_described_in_words_that_follow_a_name(code, sentence):
-    assert exit_codes.describe(code) == sentence
+def test_end_is_described_in_words_that_follow_a_name(code, detail):
+    assert exit_codes.describe(code) == detail
     assert (signal_name(code) is None) == (code >= 0)
 
 

@@ -42,7 +42,7 @@ def killed(node: str, moment: str, folder: Path) -> KillResult:
 @pytest.mark.usefixtures("runtime")
 def test_arm_driver_killed_in_motion_comes_back_disarmed_and_the_run_ends_so(tmp_path: Path) -> None:
     result = killed("arm_driver", "moving", tmp_path)
-    assert re.search(r"arm_driver was killed \(SIGKILL\) and is back: .*disarmed", result.sentence), result.sentence
+    assert re.search(r"arm_driver was killed \(SIGKILL\) and is back: .*disarmed", result.detail), result.detail
     assert result.exit_code == 1
 
 
@@ -58,11 +58,11 @@ def test_camera_killed_comes_back_and_the_run_goes_on(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("runtime")
 def test_simulator_killed_ends_the_run_and_is_named(tmp_path: Path) -> None:
     result = killed("simulator", "moving", tmp_path)
-    assert "simulator was killed (SIGKILL)" in result.sentence
+    assert "simulator was killed (SIGKILL)" in result.detail
     assert result.exit_code == 1
 
 
 @pytest.mark.usefixtures("runtime")
 def test_nothing_outlives_a_killed_launcher(tmp_path: Path) -> None:
     result = killed("launcher", "moving", tmp_path)
-    assert "the launcher was killed" in result.sentence
+    assert "the launcher was killed" in result.detail

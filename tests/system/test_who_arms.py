@@ -11,7 +11,7 @@ from tests.robots.dynamixel.small_arm import LINK
 LAUNCH = "paramove launch dynamixel_arm --headless --with emulated"
 ENABLE = "paramove arm enable --yes"
 ROBOT = RobotDescription.load("robot_description/open_manipulator_x")
-REFUSED = "operator node is a program and may not arm"
+REJECTED = "operator node is a program and may not arm"
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +23,7 @@ def test_servos_that_somebody_else_emulates_are_armed_by_no_program(tmp_path):
         command = f"{LAUNCH} --set arm_driver.port={link} --runs {tmp_path / 'runs'}"
         with launched(command, environment) as running:
             heard(running, "arm_driver", "degraded", f"{link} counts as a real arm", "does not belong to this launch")
-            heard(running, "waiting until a person arms the arm", REFUSED)
+            heard(running, "waiting until a person arms the arm", REJECTED)
             with emulator.lock:
                 assert [servo.memory["Torque Enable"] for servo in emulator.bus.servos] == [0] * ROBOT.n_joints
 

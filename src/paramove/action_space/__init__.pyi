@@ -26,8 +26,8 @@ from .training import cached_action as cached_action
 from .training import table_action as table_action
 from .video_tracker import TrackedState as TrackedState
 from .video_tracker import VideoTracker as VideoTracker
+from .video_tracker import compile_observer as compile_observer
 from .video_tracker import track_frame as track_frame
-from .video_tracker import try_out as try_out
 from .vocabulary import ActionModel as ActionModel
 from .vocabulary import Vocabulary as Vocabulary
 from .vocabulary import table_target as table_target

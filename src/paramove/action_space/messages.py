@@ -29,7 +29,7 @@ BALL_M = 0.03
 """Diameter of that ball."""
 
 
-class TablePlace(BaseModel):
+class TablePose(BaseModel):
     """Pose of the table frame, in which cameras and person were measured, in another frame, such as a robot's.
 
     Attributes:
@@ -60,7 +60,7 @@ class TablePlace(BaseModel):
         return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
 
-AT_TABLE = TablePlace()
+AT_TABLE = TablePose()
 
 
 def certainty(deviation: ArrayLike) -> float:
@@ -78,7 +78,7 @@ def estimate_message(
     state: TrackedState,
     parameter_names: Mapping[str, Sequence[str]],
     particles: int,
-    table: TablePlace = AT_TABLE,
+    table: TablePose = AT_TABLE,
 ) -> ActionEstimate:
     """The whole estimate, with positions in the frame of `table`. `parameter_names` of each action."""
     estimate = state.estimate
@@ -90,7 +90,7 @@ def estimate_message(
         views=state.n_views,
         lost=estimate.lost,
         degraded=estimate.degraded,
-        sentence=estimate.detail,
+        detail=estimate.detail,
         hand=_location(estimate.pose[HAND], np.sqrt(np.diagonal(estimate.hand_covariance)), table),
         pointed=_location(state.pointed, state.pointed_deviation, table),
     )
@@ -145,7 +145,7 @@ def outline_message(state: TrackedState) -> ImageAnnotations:
     return message
 
 
-def scene_message(state: TrackedState, table: TablePlace = AT_TABLE) -> SceneUpdate:
+def scene_message(state: TrackedState, table: TablePose = AT_TABLE) -> SceneUpdate:
     """The estimated arm as lines and the ball where it points, in the frame of `table`."""
     message = SceneUpdate()
     entity = message.entities.add(id="target", frame_id=table.frame)
@@ -166,7 +166,7 @@ def scene_message(state: TrackedState, table: TablePlace = AT_TABLE) -> SceneUpd
     return message
 
 
-def _location(position: Floats, deviation: Floats, table: TablePlace) -> Location:
+def _location(position: Floats, deviation: Floats, table: TablePose) -> Location:
     x, y, z = map(float, table.frame_from_table(position))
     along = map(float, table.deviations(deviation))
     return Location(x=x, y=y, z=z, **dict(zip(("x_deviation", "y_deviation", "z_deviation"), along, strict=True)))

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from paramove.action_space.grammar import Grammar
 from paramove.action_space.grammar_file import read_grammar
-from paramove.action_space.messages import TablePlace
+from paramove.action_space.messages import TablePose
 from paramove.action_space.particle_filter import FilterOptions
 from paramove.action_space.placement import PersonPlacement
 from paramove.action_space.target_detection import DetectionOptions
@@ -97,7 +97,7 @@ class TrackingSetup(BaseModel):
     cameras: Path = Path("cameras.yaml")
     person: Path | None = None
     table: tuple[tuple[float, float], ...] | None = Field(default=None, min_length=3)
-    table_place: TablePlace = TablePlace()
+    table_place: TablePose = TablePose()
     actions: tuple[str, ...] = Field(default=("pointing",), min_length=1)
     grammar: Path | None = None
     particles: int = Field(default=400, ge=50, le=20_000)

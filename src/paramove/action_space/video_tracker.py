@@ -61,7 +61,7 @@ def _learn(tracker: ActionTracker, observer: ArmObserver, estimate: TrackEstimat
         observer.learn(estimate.pose, elapsed_s)
 
 
-def try_out(trial: ArmObserver, camera: CalibratedCamera, poses: Floats) -> None:
+def compile_observer(trial: ArmObserver, camera: CalibratedCamera, poses: Floats) -> None:
     """An observer of one camera compares postures (N, 9), m, with noise, so that everything is compiled."""
     noise = np.random.default_rng(0)
     for _ in range(2):  # the second image is compared with what was learned from the first
@@ -99,7 +99,7 @@ class VideoTracker:
         moved = tracked.propagation.predicted(tracked.particles, 0.1, np.random.default_rng(0))
         first = next(iter(self._cameras.values()))
         trial = ArmObserver(self._observer.sizes, [first], self._observer.options, table=self._observer.table)
-        try_out(trial, first, self._tracker.placement.in_world(moved.poses))
+        compile_observer(trial, first, self._tracker.placement.in_world(moved.poses))
 
     @property
     def cameras(self) -> tuple[str, ...]:
@@ -120,9 +120,9 @@ class VideoTracker:
             for views in self._views.add(camera, captured_ns, image):
                 yield from self._tracked(views)
 
-    def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
+    def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
         """Reports an image that could not be decoded."""
-        self._watch.refuse(camera, captured_ns, why)
+        self._watch.reject(camera, captured_ns, why)
 
     def tick(self, now_ns: int) -> None:
         """Advances the time, with images or without."""
@@ -133,7 +133,7 @@ class VideoTracker:
         return "; ".join(part for part in (*self._watch.troubles(), *self._dark, self._uncertainty) if part)
 
     @property
-    def kind_of_trouble(self) -> tuple[str, ...]:
+    def problem_kind(self) -> tuple[str, ...]:
         """Changes with the causes of `trouble`, not with the numbers in it."""
         estimate = self._tracker.estimate
         lost = estimate is not None and estimate.lost
@@ -161,7 +161,7 @@ class VideoTracker:
             else self._deviation(target.action, target.theta, target.covariance),
             n_views=sum(self._observer.has_image),
             trouble="; ".join(
-                [*(f"{name} sends no images" for name in views.silent), *self._dark, *self._watch.refused()]
+                [*(f"{name} sends no images" for name in views.silent), *self._dark, *self._watch.rejected()]
             ),
         )
         _learn(self._tracker, self._observer, estimate, elapsed_s)

@@ -121,7 +121,7 @@ class Applying(Stage):
         outcome = self.app.goal_client.outcome
         if outcome is None:
             return
-        if outcome.state == RelocationStatus.STATE_REFUSED:
+        if outcome.state == RelocationStatus.STATE_REJECTED:
             self._rejected(outcome)
         elif outcome.state == RelocationStatus.STATE_FAILED:
             self._failure = outcome.reason or "it failed"
@@ -136,8 +136,8 @@ class Applying(Stage):
         in_the_way = (self._avoided[number] for number in outcome.in_the_way if number < len(self._avoided))
         other = next((name for name in in_the_way if name not in self._stuck | self.app.done), "")
         if other:
-            sentence = f"{other} stands in the way of {self._object}. Please point at {other} first."
-            self.app.speak(sentence, Speech.REQUEST_POINT_AT_OBJECT, other)
+            detail = f"{other} stands in the way of {self._object}. Please point at {other} first."
+            self.app.speak(detail, Speech.REQUEST_POINT_AT_OBJECT, other)
             self.go("waiting")
         else:
             self._ask_for_help(f"I cannot reach {self._object} at {cm(self._source)}: {outcome.reason}.")
@@ -173,8 +173,8 @@ class Applying(Stage):
         self.app.speak(f"{self._object} is at {cm(place)}{': ' + reason if reason else ''}. I try again.")
         self._relocate()
 
-    def _ask_for_help(self, sentence: str) -> None:
-        self.app.speak(f"{sentence} Please put it to another place.", Speech.REQUEST_HELP, self._object)
+    def _ask_for_help(self, detail: str) -> None:
+        self.app.speak(f"{detail} Please put it to another place.", Speech.REQUEST_HELP, self._object)
         self.go("helped")
 
     def _helped(self) -> None:

@@ -28,10 +28,10 @@ class ArmWatch:
         if not self._was_armed or message.state in _AT_WORK:
             self._lost_s = None
             return
-        self._why = "; ".join(fault.sentence for fault in message.faults) or self._why
+        self._why = "; ".join(fault.detail for fault in message.faults) or self._why
         if self._lost_s is None:
             self._lost_s = now_s
-            self._why = "; ".join(fault.sentence for fault in message.faults)
+            self._why = "; ".join(fault.detail for fault in message.faults)
 
     @property
     def lost(self) -> bool:
@@ -39,7 +39,7 @@ class ArmWatch:
         return self._lost_s is not None
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """What happened, why, and what to do."""
         state = SafetyState.State.Name(self._state).removeprefix("STATE_").lower()
         why = f": {self._why}" if self._why else ""

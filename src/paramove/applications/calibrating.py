@@ -68,15 +68,15 @@ class Calibrating(Stage):
         outcome = self.app.goal_client.outcome
         if self.app.goal_client.succeeded:
             self._ask()
-        elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
+        elif outcome is not None and outcome.state == RelocationStatus.STATE_REJECTED:
             self._ask_for_help(f"I cannot hold my hand out: {outcome.reason}")
         elif outcome is not None:
             self.app.goal_client.start(RelocationGoal.KIND_REST, self.app.now_s)
             self.go("resting")
 
-    def _ask_for_help(self, sentence: str) -> None:
+    def _ask_for_help(self, detail: str) -> None:
         """The same goal would be rejected again: only a person can change that."""
-        self.app.speak(f"{sentence}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
+        self.app.speak(f"{detail}. Please help me; I try again in a while.", Speech.REQUEST_HELP, self._held)
         self.go("helped")
 
     def _helped(self) -> None:
@@ -119,7 +119,7 @@ class Calibrating(Stage):
         outcome = self.app.goal_client.outcome
         if self.app.goal_client.succeeded:
             self.go("looking")
-        elif outcome is not None and outcome.state == RelocationStatus.STATE_REFUSED:
+        elif outcome is not None and outcome.state == RelocationStatus.STATE_REJECTED:
             self._ask_for_help(f"I cannot put {self._held} at {cm(self._corner)}: {outcome.reason}")
         elif outcome is not None:
             self._start_again(outcome.reason)

@@ -12,7 +12,7 @@ from paramove.msgs.rule_pb2 import ApplicationStage, Rules, Speech
 RESEND_S = 0.5
 QUERY_S = 5.0  # the status of an acknowledged goal is queried after this time without one
 TIMEOUT_S = 30.0  # a goal fails after this time without a status
-_LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED}
+_LAST = {RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED}
 
 
 @dataclass

@@ -82,7 +82,7 @@ class Learning(Stage):
         message.captured.FromNanoseconds(round(self.app.now_s * 1e9))
         for name in sorted(self.app.rules):
             place, (seen_s, count) = self.app.rules[name], self._observations[name]
-            rule = Rule(object=name, x=place[0], y=place[1], observations=count, sentence=self._description(name))
+            rule = Rule(object=name, x=place[0], y=place[1], observations=count, text=self._description(name))
             rule.seen.FromNanoseconds(round(seen_s * 1e9))
             message.rules.append(rule)
         self.app.outgoing.rules.append(message)

@@ -31,7 +31,7 @@ STATUS_TIMEOUT_NS = 10_000_000_000
 REPORT_UNARMED_AFTER_NS = 1_000_000_000
 """How long an arm may be unarmed before that is reported: where a node arms it, no report is needed."""
 STALE_TRIES = 3
-_STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REFUSED: "refused"}
+_STOPPED = {TrajectoryStatus.STATE_STOPPED: "stopped", TrajectoryStatus.STATE_REJECTED: "refused"}
 
 
 def _near(position: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -63,7 +63,7 @@ class ReachStep(BaseModel):
         return self
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """The step as text."""
         if self.reach is not None:
             return f"reach for {metres(np.array(self.reach))}"
@@ -126,7 +126,7 @@ class ReachTask:
         self._running: _Running | None = None
         self._output = ReachOutput()
         self._now_ns = 0
-        self._unarmed = self.sentence = "waiting for the arm's driver"
+        self._unarmed = self.detail = "waiting for the arm's driver"
         self._unarmed_since_ns, self._unarmed_reported = 0, ""
         self.failure = ""
         self.finished = False
@@ -140,7 +140,7 @@ class ReachTask:
         """Store the safety gate's state."""
         self._armed = message.state == SafetyState.STATE_ARMED
         self._watch.on_safety(message, self._now_ns * 1e-9)
-        why = "".join(f"; {fault.sentence}" for fault in message.faults)
+        why = "".join(f"; {fault.detail}" for fault in message.faults)
         self._unarmed = f"waiting until a person arms the arm (paramove arm enable){why}"
 
     def on_trajectory_status(self, status: TrajectoryStatus) -> None:
@@ -149,7 +149,7 @@ class ReachTask:
         if running is None or status.trajectory_id != running.message.id:
             return
         running.received_ns = self._now_ns
-        rejected = status.state == TrajectoryStatus.STATE_REFUSED
+        rejected = status.state == TrajectoryStatus.STATE_REJECTED
         if rejected and status.code == "stale" and running.stale < STALE_TRIES:
             running.stale += 1  # it was too old when the driver received it: publish it again with the current time
             running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
@@ -167,7 +167,7 @@ class ReachTask:
         if self.finished or self.failure:
             pass
         elif self._watch.lost:
-            self._fail(self._watch.sentence)
+            self._fail(self._watch.detail)
         elif running is None:
             self._begin()
         elif now_ns - running.received_ns > STATUS_TIMEOUT_NS:
@@ -184,7 +184,7 @@ class ReachTask:
         """The current step as text."""
         if self._done >= len(self._steps):
             return "going back to the base pose"
-        return f"task {self._done + 1} of {len(self._steps)}, {self._steps[self._done].sentence}"
+        return f"task {self._done + 1} of {len(self._steps)}, {self._steps[self._done].detail}"
 
     def _rehearse(self) -> None:
         """Plan all steps once: a step that cannot be executed is reported before the arm moves."""
@@ -208,7 +208,7 @@ class ReachTask:
         if self._at is None:
             self._at = self._joints.settled(self._now_ns)
             if self._at is None:
-                self.sentence = "waiting until the arm rests"
+                self.detail = "waiting until the arm rests"
                 return
         away = np.maximum(self._reaching.lower - self._at, self._at - self._reaching.upper)
         if away.max() > self._reaching.start_tolerance:
@@ -220,8 +220,8 @@ class ReachTask:
 
     def _wait(self) -> None:
         """For a driver and an armed arm."""
-        if self.sentence != self._unarmed or not self._unarmed_since_ns:
-            self.sentence, self._unarmed_since_ns = self._unarmed, self._now_ns
+        if self.detail != self._unarmed or not self._unarmed_since_ns:
+            self.detail, self._unarmed_since_ns = self._unarmed, self._now_ns
         elif (
             self._now_ns - self._unarmed_since_ns > REPORT_UNARMED_AFTER_NS and self._unarmed_reported != self._unarmed
         ):
@@ -256,12 +256,12 @@ class ReachTask:
         self.failure = f"{self._what}: {why}"
         self._speak(self.failure, Speech.REQUEST_HELP)
 
-    def _speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
-        speech = Speech(request=request, sentence=sentence)
+    def _speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
+        speech = Speech(request=request, text=detail)
         speech.captured.FromNanoseconds(self._now_ns)
         self._output.speech.append(speech)
-        self.sentence = sentence
-        _log.info("%.1f s: %s", self._now_ns * 1e-9, sentence)
+        self.detail = detail
+        _log.info("%.1f s: %s", self._now_ns * 1e-9, detail)
 
 
 class SettledJoints:

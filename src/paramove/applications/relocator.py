@@ -60,7 +60,7 @@ class Relocator:
         self._missed = 0
         self._last_stage = ("", float("-inf"))
         self.state = ""
-        self.sentence = ""
+        self.detail = ""
         self.placed: list[Place] = []
         self._steps = {
             "resting": self._resting,
@@ -75,7 +75,7 @@ class Relocator:
     @property
     def failure(self) -> str:
         """Why the application cannot go on; empty while it can."""
-        return self._watch.sentence if self._watch.given_up(self._now_s) else ""
+        return self._watch.detail if self._watch.given_up(self._now_s) else ""
 
     @property
     def finished(self) -> bool:
@@ -105,7 +105,7 @@ class Relocator:
         armed = not self._watch.lost
         self._watch.on_safety(state, self._now_s)
         if armed and self._watch.lost:
-            self._speak(f"I cannot go on: {self._watch.sentence}.")
+            self._speak(f"I cannot go on: {self._watch.detail}.")
 
     def tick(self, now_s: float) -> OutgoingMessages:
         """One tick; returns the messages to publish."""
@@ -242,7 +242,7 @@ class Relocator:
             self._finish() if self.finished else self._fetch()
         elif outcome is None:
             return
-        elif outcome.state == RelocationStatus.STATE_REFUSED:
+        elif outcome.state == RelocationStatus.STATE_REJECTED:
             self._ask(f"I cannot put it at {cm(self._target)}: {outcome.reason}. ")
         else:
             self._ask_for_help(f"I could not put it at {cm(self._target)}: {outcome.reason}")
@@ -251,10 +251,10 @@ class Relocator:
         self._speak("It has been at all places. Thank you!", Speech.REQUEST_THANK_YOU)
         self._go("resting")
 
-    def _ask_for_help(self, sentence: str) -> None:
+    def _ask_for_help(self, detail: str) -> None:
         """Ask a person to put the object back to its start: its position is no longer known."""
         self._object_at, self._missed, self._holding = self._options.start, 0, False
-        self._speak(f"{sentence}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
+        self._speak(f"{detail}. Please stand it at {cm(self._object_at)}.", Speech.REQUEST_HELP)
         self._go("helped")
 
     def _helped(self) -> None:
@@ -270,23 +270,23 @@ class Relocator:
     def _go(self, state: str) -> None:
         self.state, self._since_s = state, self._now_s
 
-    def _speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
-        speech = Speech(request=request, object=self._options.object_name, sentence=sentence)
+    def _speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED) -> None:
+        speech = Speech(request=request, object=self._options.object_name, text=detail)
         speech.captured.FromNanoseconds(round(self._now_s * 1e9))
         self._outgoing.speech.append(speech)
-        self.sentence = sentence
-        _log.info("%.1f s: %s", self._now_s, sentence)
+        self.detail = detail
+        _log.info("%.1f s: %s", self._now_s, detail)
 
     def _publish_stage(self) -> None:
         """Publish the stage once a second and on every change."""
-        content = f"{self.state} {self.sentence} {self.finished}"
+        content = f"{self.state} {self.detail} {self.finished}"
         if content == self._last_stage[0] and self._now_s - self._last_stage[1] < STAGE_PERIOD_S:
             return
         self._last_stage = (content, self._now_s)
         message = ApplicationStage(
             stage=ApplicationStage.STAGE_DONE if self.finished else ApplicationStage.STAGE_APPLY,
             step="done" if self.finished else self.state,
-            sentence=self.sentence,
+            detail=self.detail,
             grasps=self._goal_client.grasps,
             retries=self._goal_client.retries,
         )

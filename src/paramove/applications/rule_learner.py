@@ -36,7 +36,7 @@ class RuleLearner:
     @property
     def failure(self) -> str:
         """Why the application cannot go on; empty while it can."""
-        return self._watch.sentence if self._watch.given_up(self._app.now_s) else ""
+        return self._watch.detail if self._watch.given_up(self._app.now_s) else ""
 
     @property
     def finished(self) -> bool:
@@ -44,9 +44,9 @@ class RuleLearner:
         return self._finished
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """Text of the last speech message."""
-        return self._app.sentence
+        return self._app.detail
 
     def on_gesture(self, gesture: Gesture) -> None:
         """Something happened on the table."""
@@ -63,7 +63,7 @@ class RuleLearner:
         armed = not self._watch.lost
         self._watch.on_safety(state, self._app.now_s)
         if armed and self._watch.lost:
-            self._app.speak(f"I cannot go on: {self._watch.sentence}.")
+            self._app.speak(f"I cannot go on: {self._watch.detail}.")
 
     def tick(self, now_s: float) -> OutgoingMessages:
         """One tick; returns the messages to publish."""
@@ -94,14 +94,14 @@ class RuleLearner:
         """Publish the stage once a second and on every change."""
         app, stage = self._app, self._stage
         assert stage is not None
-        state = f"{stage.state} {app.sentence} {self._finished}"
+        state = f"{stage.state} {app.detail} {self._finished}"
         if state == self._published_state and app.now_s - self._published_s < STAGE_PERIOD_S:
             return
         self._published_state, self._published_s = state, app.now_s
         message = ApplicationStage(
             stage=ApplicationStage.STAGE_DONE if self._finished else stage.stage,
             step=stage.state,
-            sentence=app.sentence,
+            detail=app.detail,
             grasps=app.goal_client.grasps,
             retries=app.goal_client.retries,
         )

@@ -66,15 +66,15 @@ class ApplicationState:
     now_s: float = 0.0
     rules: dict[str, Place] = field(default_factory=dict)
     done: set[str] = field(default_factory=set)
-    sentence: str = ""
+    detail: str = ""
 
-    def speak(self, sentence: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
+    def speak(self, detail: str, request: Speech.Request = Speech.REQUEST_UNSPECIFIED, name: str = "") -> None:
         """Send a speech message to the instructor, with or without a request."""
-        speech = Speech(request=request, object=name, sentence=sentence)
+        speech = Speech(request=request, object=name, text=detail)
         speech.captured.FromNanoseconds(round(self.now_s * 1e9))
         self.outgoing.speech.append(speech)
-        self.sentence = sentence
-        _log.info("%.1f s: %s", self.now_s, sentence)
+        self.detail = detail
+        _log.info("%.1f s: %s", self.now_s, detail)
 
 
 class Stage(ABC):

@@ -10,7 +10,7 @@ from .endpoint import owner_of as owner_of
 from .endpoint import socket_path as socket_path
 from .envelope import SIZE as SIZE
 from .envelope import Envelope as Envelope
-from .envelope import RefusedError as RefusedError
+from .envelope import RejectedError as RejectedError
 from .envelope import pack as pack
 from .envelope import unpack as unpack
 from .exchange import Exchange as Exchange

@@ -21,7 +21,7 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 from paramove.bus import topics
 from paramove.bus.bus import Bus
 from paramove.bus.endpoint import Ownership, can_read, prepare_folder, socket_path
-from paramove.bus.envelope import Reason, RefusedError, unpack
+from paramove.bus.envelope import Reason, RejectedError, unpack
 from paramove.bus.lockstep import SERVICE, from_marks, member_mark, to_marks
 from paramove.bus.monitor import ForeignConnections
 from paramove.bus.schemas import schema_hash
@@ -67,7 +67,7 @@ class LockstepBarrier:
         self._newcomers: dict[str, TickDone] = {}
         self.lost: list[str] = []
         self.tick = 0
-        self.refused = 0
+        self.rejected = 0
         if self._lockstep:
             bus.hold()
             self._open()
@@ -151,13 +151,13 @@ class LockstepBarrier:
             frames = self._socket.recv_multipart(zmq.NOBLOCK)
             try:
                 if len(frames) != 3:
-                    raise RefusedError(Reason.FRAMES, f"{len(frames)} frames, expected 3: sender, header, answer")
+                    raise RejectedError(Reason.FRAMES, f"{len(frames)} frames, expected 3: sender, header, answer")
                 unpack(frames[1], frames[2], schema_hash(TickDone), MAX_ANSWER_BYTES)
                 answer = TickDone.FromString(frames[2])
-            except (RefusedError, DecodeError) as error:
-                self.refused += 1
-                if self.refused == 10 ** (len(str(self.refused)) - 1):
-                    _log.warning("lockstep: answer rejected (number %d): %s", self.refused, error)
+            except (RejectedError, DecodeError) as error:
+                self.rejected += 1
+                if self.rejected == 10 ** (len(str(self.rejected)) - 1):
+                    _log.warning("lockstep: answer rejected (number %d): %s", self.rejected, error)
                 continue
             changed |= self._take(answer)
         return changed

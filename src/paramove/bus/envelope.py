@@ -60,7 +60,7 @@ class Reason(enum.Enum):
     NUMBER = "number"
 
 
-class RefusedError(Exception):
+class RejectedError(Exception):
     """A message that its topic cannot carry. `reason` is counted, the text has the values found and expected."""
 
     def __init__(self, reason: Reason, message: str) -> None:
@@ -118,22 +118,22 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
         RefusedError: with the first check that fails.
     """
     if len(header) != SIZE:
-        raise RefusedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")
+        raise RejectedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")
     magic, version, flags, header_schema, publisher, epoch, sequence, published_ns, captured_ns, length, crc = (
         _WHOLE.unpack(header)
     )
     if magic != MAGIC:
-        raise RefusedError(Reason.MAGIC, f"magic is {magic:#06x}, expected {MAGIC:#06x}: not a message of this bus")
+        raise RejectedError(Reason.MAGIC, f"magic is {magic:#06x}, expected {MAGIC:#06x}: not a message of this bus")
     if version != VERSION:
-        raise RefusedError(Reason.VERSION, f"envelope version is {version}, this program reads version {VERSION}")
+        raise RejectedError(Reason.VERSION, f"envelope version is {version}, this program reads version {VERSION}")
     if header_schema != schema:
-        raise RefusedError(Reason.SCHEMA, _schema_message(header_schema, schema))
+        raise RejectedError(Reason.SCHEMA, _schema_message(header_schema, schema))
     if length != len(payload) or length > max_bytes:
-        raise RefusedError(
+        raise RejectedError(
             Reason.LENGTH, f"payload has {len(payload)} bytes, header says {length}, allowed are {max_bytes}"
         )
     if crc != zlib.crc32(payload, zlib.crc32(header[: _LAYOUT.size])):
-        raise RefusedError(Reason.CRC, f"CRC of sequence {sequence} is wrong: the bytes were damaged on their way")
+        raise RejectedError(Reason.CRC, f"CRC of sequence {sequence} is wrong: the bytes were damaged on their way")
     return Envelope(schema, publisher, epoch, sequence, published_ns, captured_ns, flags, length)
 
 

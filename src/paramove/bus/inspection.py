@@ -56,7 +56,7 @@ class Measurement:
     welcomed: bool = False
     messages: int = 0
     lost: int = 0
-    refused: int = 0
+    rejected: int = 0
     sequence: int = 0
     epoch: int = 0
     bytes_total: int = 0
@@ -126,7 +126,7 @@ def measure(folder: Path, selected: Sequence[Topic], seconds: float) -> list[Mea
             measurement.welcomed = subscriber.welcomed
             measurement.messages, measurement.lost = counter.messages, counter.lost
             measurement.sequence, measurement.epoch = counter.sequence, counter.epoch or 0
-            measurement.refused = counter.refused.total()
+            measurement.rejected = counter.rejected.total()
             subscriber.close()
     return measurements
 

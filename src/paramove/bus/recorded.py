@@ -76,7 +76,7 @@ class RecordedBus:
         self.settings = BusSettings(folder=self.run_folder, clock="simulated")
         self.published: list[Published] = []
         self.states: list[tuple[str, str]] = []
-        self.refused: list[tuple[str, str]] = []
+        self.rejected: list[tuple[str, str]] = []
         self.now_ns = 0
         self.stopped = False
         self._protected = protected
@@ -154,7 +154,7 @@ class RecordedBus:
         """Whether the node gets a message."""
         reason = unsound(received.message) if self._protected else ""
         if reason:
-            self.refused.append((received.topic.name, reason))
+            self.rejected.append((received.topic.name, reason))
         return not reason
 
     def _change(self, state: str, message: str) -> None:

@@ -41,13 +41,13 @@ class SequenceCounter:
         self.lost = 0
         self.repeated = 0
         self.epochs = 0
-        self.refused: Counter[Reason] = Counter()
+        self.rejected: Counter[Reason] = Counter()
         self._past: set[int] = set()
 
     def accept(self, envelope: Envelope) -> Arrival:
         """Counts one message that passed the checks of the envelope."""
         if envelope.epoch in self._past:
-            self.refused[Reason.EPOCH] += 1
+            self.rejected[Reason.EPOCH] += 1
             return Arrival.OUTDATED
         first = envelope.epoch != self.epoch
         if first:

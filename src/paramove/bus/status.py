@@ -58,7 +58,7 @@ class StatusReporter:
         status_message = NodeStatus(
             node=self._node,
             state=self._state,
-            sentence=self._message,
+            detail=self._message,
             pid=os.getpid(),
             processing_seconds=self.processing_ns * 1e-9,
             processed=self.processed,
@@ -77,5 +77,5 @@ def _count(name: str, counter: SequenceCounter) -> TopicCount:
         messages=counter.messages,
         lost=counter.lost,
         repeated_=counter.repeated,
-        refused=counter.refused.total(),
+        rejected=counter.rejected.total(),
     )

@@ -13,7 +13,7 @@ from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
 
 from paramove.bus.budget import ALLOWANCE, BURST, RateBudget
 from paramove.bus.endpoint import can_read, holder_of, socket_path
-from paramove.bus.envelope import SIZE, Envelope, Reason, RefusedError, unpack
+from paramove.bus.envelope import SIZE, Envelope, Reason, RejectedError, unpack
 from paramove.bus.monitor import Monitor
 from paramove.bus.schemas import schema_hash
 from paramove.bus.sequence import Arrival, SequenceCounter
@@ -97,9 +97,9 @@ class Subscriber:
             envelope, payload = raw
             try:
                 if not self._budget.admits(envelope.epoch, envelope.published_ns):
-                    raise RefusedError(Reason.BUDGET, self._budget_message())
+                    raise RejectedError(Reason.BUDGET, self._budget_message())
                 message = self._decode(payload)
-            except RefusedError as error:
+            except RejectedError as error:
                 self.counter.messages -= 1
                 self._reject(error)
                 continue
@@ -116,7 +116,7 @@ class Subscriber:
             ready = False
             try:
                 envelope, payload = self._read()
-            except RefusedError as error:
+            except RejectedError as error:
                 self._reject(error)
                 continue
             except zmq.Again:
@@ -125,7 +125,7 @@ class Subscriber:
             if arrival is Arrival.NEW:
                 return envelope, payload
             if arrival is Arrival.OUTDATED:
-                self._log_rejection(RefusedError(Reason.EPOCH, self._two_publishers_message(envelope)))
+                self._log_rejection(RejectedError(Reason.EPOCH, self._two_publishers_message(envelope)))
         return None
 
     def is_deaf(self) -> bool:
@@ -148,7 +148,7 @@ class Subscriber:
         if not self.is_deaf():
             return False
         self._reject(
-            RefusedError(
+            RejectedError(
                 Reason.CONNECTION,
                 f"libzmq ended the connection to {holder_of(self._path) or 'its publisher'} for good: a message above "
                 f"{self.topic.max_bytes} bytes, or no ZeroMQ; reopened",
@@ -197,26 +197,26 @@ class Subscriber:
             payload = socket.recv(_NOBLOCK)
             frames += 1
         if frames != 2 or not head.startswith(self._frame):
-            raise RefusedError(Reason.FRAMES, f"{frames} frames, expected 2: topic and header, payload")
+            raise RejectedError(Reason.FRAMES, f"{frames} frames, expected 2: topic and header, payload")
         return unpack(head[len(self._frame) :], payload, self._schema, self.topic.max_bytes), payload
 
     def _decode(self, payload: bytes) -> Any:
         try:
             message = self.topic.type.FromString(payload)
         except (DecodeError, ValueError) as error:
-            raise RefusedError(Reason.DECODE, f"payload is not a {self.topic.type_name}: {error}") from error
+            raise RejectedError(Reason.DECODE, f"payload is not a {self.topic.type_name}: {error}") from error
         unsound_number = unsound(message)
         if unsound_number:
-            raise RefusedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
+            raise RejectedError(Reason.NUMBER, f"{unsound_number}; finite numbers expected, correct the publisher")
         return message
 
-    def _reject(self, error: RefusedError) -> None:
-        self.counter.refused[error.reason] += 1
+    def _reject(self, error: RejectedError) -> None:
+        self.counter.rejected[error.reason] += 1
         self._log_rejection(error)
 
-    def _log_rejection(self, error: RefusedError) -> None:
+    def _log_rejection(self, error: RejectedError) -> None:
         """Of each reason the 1st, 10th, 100th, ... is logged, so that a flood fills no disk."""
-        count = self.counter.refused[error.reason]
+        count = self.counter.rejected[error.reason]
         if count == 10 ** (len(str(count)) - 1):
             _log.warning("topic %s: message rejected (%s, number %d): %s", self.name, error.reason.value, count, error)
 

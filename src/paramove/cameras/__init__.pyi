@@ -15,7 +15,7 @@ from .calibration_images import ImageSource as ImageSource
 from .calibration_images import LiveImages as LiveImages
 from .calibration_images import file_source as file_source
 from .charuco_board import MARKERS as MARKERS
-from .charuco_board import SIZE_UNTOLD_ID as SIZE_UNTOLD_ID
+from .charuco_board import UNSIZED_BOARD_ID as UNSIZED_BOARD_ID
 from .charuco_board import Board as Board
 from .charuco_board import BoardView as BoardView
 from .charuco_board import dictionary as dictionary

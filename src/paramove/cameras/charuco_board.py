@@ -24,7 +24,7 @@ MARKER_FRACTION = 0.75
 DICTIONARY = cv2.aruco.DICT_4X4_100
 NOMINAL_SQUARES = (0.030, 0.045)
 """Sides of the squares, m, of boards whose markers encode their size: ids 0 to 19, the second 20 to 39."""
-SIZE_UNTOLD_ID = MARKERS * len(NOMINAL_SQUARES)
+UNSIZED_BOARD_ID = MARKERS * len(NOMINAL_SQUARES)
 """First id of boards with squares of any other size."""
 SQUARE_LIMITS = (0.004, 0.4)
 MIN_CORNERS = 8
@@ -64,7 +64,7 @@ class Board:
     """
 
     square: float
-    first_id: int = SIZE_UNTOLD_ID
+    first_id: int = UNSIZED_BOARD_ID
     thickness: float = 0.0
 
     def __post_init__(self) -> None:
@@ -152,7 +152,7 @@ class BoardFinder:
     """Detects any of the boards of `Board.printed` in an image."""
 
     def __init__(self) -> None:
-        firsts = range(0, SIZE_UNTOLD_ID + 1, MARKERS)
+        firsts = range(0, UNSIZED_BOARD_ID + 1, MARKERS)
         self._boards = {first: Board(NOMINAL_SQUARES[0], first) for first in firsts}
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -213,7 +213,7 @@ class BoardFinder:
 
 def _board_of(marker_ids: NDArray[np.int32]) -> int | None:
     """First id of the board that most of the markers belong to; None for other markers, such as those on an arm."""
-    counts = np.bincount(marker_ids // MARKERS)[: SIZE_UNTOLD_ID // MARKERS + 1]
+    counts = np.bincount(marker_ids // MARKERS)[: UNSIZED_BOARD_ID // MARKERS + 1]
     return int(np.argmax(counts)) * MARKERS if counts.any() else None
 
 

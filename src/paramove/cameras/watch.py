@@ -24,7 +24,7 @@ class CameraWatch:
         self._received_ns: dict[str, int] = {}
         self._now_ns = 0
 
-    def refuse(self, camera: str, captured_ns: int, reason: str) -> None:
+    def reject(self, camera: str, captured_ns: int, reason: str) -> None:
         """Records that an image could not be used, and why."""
         self._received(camera, captured_ns)
         self._rejected[camera] = f"{camera}: {reason}"
@@ -48,7 +48,7 @@ class CameraWatch:
         for name in self._calibrated:  # from the first tick on
             self._received_ns.setdefault(name, now_ns)
 
-    def refused(self) -> list[str]:
+    def rejected(self) -> list[str]:
         """Why the latest images of some cameras could not be used, one message each."""
         return list(self._rejected.values())
 

@@ -21,7 +21,7 @@ from paramove.cli.demos_options import (
     ThetaOption,
     ended,
     numbers,
-    one_sentence,
+    one_line,
     table_of,
     words,
 )
@@ -95,7 +95,7 @@ def show(
 
     Exit codes: 0; 66 there is no set; 78 something in it cannot be used, with file, line and column.
     """
-    with one_sentence():
+    with one_line():
         demonstrations = _loaded(folder)
     facts = {
         "set": str(folder),
@@ -179,7 +179,7 @@ def plot(
     """Draw the paths of a body point in space and its coordinates over time, coloured by a parameter."""
     from paramove.demonstrations import plot_set, write_plot
 
-    with one_sentence():
+    with one_line():
         demonstrations = _loaded(folder, action, subject)
         if body:
             demonstrations = demonstrations.in_body_frame().with_right_arms()
@@ -217,7 +217,7 @@ def label(
     if find == (start is not None or end is not None) or (not find and None in (start, end)):
         raise typer.BadParameter("give both --start and --end, or --find", param_hint="--start")
     values = list(numbers(theta, "--theta"))
-    with one_sentence():
+    with one_line():
         file = folder / FILE_NAME
         there = list(load_labels(file).file.segments) if file.exists() else []
         times = _found_in(folder / recording, point) if find else [(start or 0.0, end or 0.0)]
@@ -281,7 +281,7 @@ def split(
     """Write two sets: movements to train with, and movements to test with."""
     base = folder.resolve()
     goals = (train or base.with_name(f"{base.name}_train"), test or base.with_name(f"{base.name}_test"))
-    with one_sentence():
+    with one_line():
         _refuse_sets(goals)
         parts = _loaded(folder).split(by, fraction, seed, bins)
         for part, goal in zip(parts, goals, strict=True):
@@ -314,7 +314,7 @@ def synthesize(
     """Synthesize a set: a synthetic person reaches for, or points at, a grid of targets over 80 x 30 cm of a table."""
     from paramove.demonstrations import synthetic_takes, write_set
 
-    with one_sentence():
+    with one_line():
         takes, names = synthetic_takes(action, columns, rows, repetitions, seed)
         write_set(folder, takes, names, f"synthetic demonstrator, seed {seed}", add=add)
     typer.echo(f"{folder}: {len(takes)} movements ({action}, {columns} x {rows} targets)")

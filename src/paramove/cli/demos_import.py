@@ -15,7 +15,7 @@ from paramove.cli.demos_options import (
     ThetaOption,
     ended,
     numbers,
-    one_sentence,
+    one_line,
     words,
 )
 from paramove.documents import exit_codes
@@ -79,7 +79,7 @@ def import_files(
     label = None if action is None else Label(0, 0, action, values, subject, repetition or 0, side)
     if find is not None and label is None:
         raise typer.BadParameter("--find needs an --action", param_hint="--find")
-    with one_sentence():
+    with one_line():
         options = import_options(mapping, unit, axes, rate, point, zeros_are_places)
         results = [import_file(file, options, label, max_gap, name, find) for file in files]
         _tell(results, skip_refused)
@@ -128,7 +128,7 @@ def _tell(results: list[Imported], skip_refused: bool) -> None:
     for result in results:
         for remark in result.remarks:
             typer.echo(remark)
-    rejected = [line for result in results for line in result.refused]
+    rejected = [line for result in results for line in result.rejected]
     if rejected and not skip_refused:
         hint = "nothing was imported; --skip-refused imports the rest, --max-gap fills longer losses"
         raise ended("\n".join([*rejected, hint]), exit_codes.CONFIGURATION)

@@ -31,7 +31,7 @@ PointOption = Annotated[str | None, typer.Option("--point", help="body point (de
 
 
 @contextlib.contextmanager
-def one_sentence() -> Iterator[None]:
+def one_line() -> Iterator[None]:
     """Ends the command with what is wrong on standard error, and an exit code, instead of a traceback."""
     try:
         yield

@@ -108,7 +108,7 @@ def _show(console: Console, findings: Sequence[Finding]) -> None:
     for finding in findings:
         mark, colour = MARKS[finding.level]
         line = Text.assemble((PLAIN_MARKS[finding.level] if plain else mark, colour), " ")
-        line.append(f"{finding.subject:<{SUBJECT_WIDTH}}", "bold").append(displayed(finding.sentence))
+        line.append(f"{finding.subject:<{SUBJECT_WIDTH}}", "bold").append(displayed(finding.detail))
         console.print(line, soft_wrap=True)
         for remedy in finding.remedy:
             console.print(Text(f"      {displayed(remedy)}", "cyan"), soft_wrap=True)
@@ -119,7 +119,7 @@ def _row(part: Part, finding: Finding) -> dict[str, Any]:
         "part": part.value,
         "subject": finding.subject,
         "level": finding.level.value,
-        "sentence": finding.sentence,
+        "sentence": finding.detail,
         "remedy": list(finding.remedy),
         "can_be_fixed": finding.fix is not None,
         "facts": dict(finding.facts),

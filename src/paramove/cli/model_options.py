@@ -26,7 +26,7 @@ PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE", help=
 
 
 @contextlib.contextmanager
-def one_sentence() -> Iterator[None]:
+def one_line() -> Iterator[None]:
     """Ends the command with what is wrong on standard error, and an exit code, instead of a traceback."""
     try:
         yield

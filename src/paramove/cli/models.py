@@ -10,7 +10,7 @@ import typer
 
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import PointOption, ended, table_of
-from paramove.cli.model_options import ModelArgument, loaded, model_files, one_sentence
+from paramove.cli.model_options import ModelArgument, loaded, model_files, one_line
 from paramove.documents import InputError, exit_codes, printable
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def show(file: ModelArgument, as_json: JsonOption = False) -> None:
 
     Exit codes: 0; 66 there is no such file; 78 it is damaged or no model.
     """
-    with one_sentence():
+    with one_line():
         facts = _facts(file, loaded(file))
     if as_json:
         typer.echo(json.dumps(facts, indent=2, ensure_ascii=False))
@@ -93,7 +93,7 @@ def show(file: ModelArgument, as_json: JsonOption = False) -> None:
 
 def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
     from paramove.phmm import MovementDescription
-    from paramove.training import bounds, checksum, dimension, kind_of, parameter_names, state_seconds, told_of
+    from paramove.training import bounds, checksum, dimension, kind_of, parameter_names, state_seconds, training_facts
 
     about = model.description or MovementDescription()
     low_high = bounds(model)
@@ -129,12 +129,12 @@ def _facts(file: Path, model: ParametricHMM) -> dict[str, Any]:
             "converged": summary.converged,
             "log_likelihood_per_frame": summary.log_likelihoods[-1] / summary.n_frames,
         },
-        "left_out": (told_of(file) or {}).get("left_out"),
+        "left_out": (training_facts(file) or {}).get("left_out"),
     }  # fmt: skip
 
 
 def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    from paramove.training import left_out_sentences, with_unit
+    from paramove.training import cross_validation_rows, with_unit
 
     low_high = [f"{with_unit(name)}: {low:.4g} to {high:.4g}" for name, (low, high) in facts["parameters"].items()]
     minimum, maximum = facts["frames_per_state"]
@@ -164,7 +164,7 @@ def _lines(facts: dict[str, Any]) -> list[tuple[str, str]]:
             f"{training['sequences']} sequences, {training['iterations']} iterations, {how}, log-likelihood "
             f"{training['log_likelihood_per_frame']:.2f} per frame",
         ))  # fmt: skip
-    return rows + (left_out_sentences(facts["left_out"]) if facts["left_out"] else [])
+    return rows + (cross_validation_rows(facts["left_out"]) if facts["left_out"] else [])
 
 
 @app.command()
@@ -180,7 +180,7 @@ def plot(
     from paramove.demonstrations import write_plot
     from paramove.training import plot_model, title_of
 
-    with one_sentence():
+    with one_line():
         model = loaded(file)
         write_plot(plot_model(model, point), output, title_of(model))
     typer.echo(str(output))
@@ -203,7 +203,7 @@ def compare(
 
     if len(files) < 2:
         raise typer.BadParameter("give at least two files", param_hint="FILE FILE...")
-    with one_sentence():
+    with one_line():
         models = [loaded(file) for file in files]
         facts = [_facts(file, model) for file, model in zip(files, models, strict=True)]
         distances = table_of_distances(models)

@@ -113,7 +113,7 @@ def _row(
 ) -> dict[str, Any]:
     """A line of the list, from the node's status and its supervisor."""
     if status is None:
-        status = NodeStatus(sentence=f"alive, did not answer within {seconds:g} s" if alive else "")
+        status = NodeStatus(detail=f"alive, did not answer within {seconds:g} s" if alive else "")
     state = NodeStatus.State.Name(status.state).removeprefix("STATE_").lower() if status.state else "busy"
     known = supervised or {"state": state, "sentence": "", "restarts": None, "exit_reason": ""}
     return {
@@ -124,8 +124,8 @@ def _row(
         "seconds": round(status.processing_seconds, 3),
         "received": sum(count.messages for count in status.received),
         "lost": sum(count.lost for count in status.received),
-        "refused": sum(count.refused for count in status.received),
+        "refused": sum(count.rejected for count in status.received),
         "restarts": known["restarts"],
         "last_end": known["exit_reason"],
-        "sentence": status.sentence or known["sentence"],
+        "sentence": status.detail or known["sentence"],
     }

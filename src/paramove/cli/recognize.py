@@ -15,7 +15,7 @@ from rich.progress import track
 from paramove.cli import demos_import
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import ended, table_of
-from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_sentence
+from paramove.cli.model_options import INTERRUPTED, ModelsOption, PlotOption, classifier_of, one_line
 from paramove.demonstrations import DemonstrationError, Movement
 from paramove.documents import printable
 
@@ -64,7 +64,7 @@ def recognize(
 
     if unit not in (None, "m", "cm", "mm"):
         raise typer.BadParameter(f"expected m, cm or mm, found {unit!r}", param_hint="--unit")
-    with one_sentence():
+    with one_line():
         examiner = Examiner(classifier_of(model))
         options = demos_import.import_options(mapping, unit, axes, rate, point, False)
         movements = movements_of(source, options, find)
@@ -188,8 +188,8 @@ def movements_of(path: Path, options: ImportOptions, find: str | None = None) ->
     if path.suffix in (".mcap", ".part"):
         return _recorded(path, find)
     takes = import_file(path, options, max_gap=MAX_GAP_S)
-    if takes.refused:
-        raise DemonstrationError("; ".join(takes.refused))
+    if takes.rejected:
+        raise DemonstrationError("; ".join(takes.rejected))
     return [movement for take in takes.takes for movement in _of_take(take, takes.parameter_names, path, find)]
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from paramove.cli.demos_options import ThetaOption, numbers
-from paramove.cli.model_options import ModelArgument, PlotOption, loaded, one_sentence
+from paramove.cli.model_options import ModelArgument, PlotOption, loaded, one_line
 from paramove.documents import printable
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def synthesize(
 
     if out is not None and out.suffix not in ENDINGS:
         raise typer.BadParameter(f"files of movements end in {', '.join(ENDINGS)}", param_hint="--out")
-    with one_sentence():
+    with one_line():
         trained = loaded(model)
         values = np.array(numbers(theta, "--theta"))
         _check(trained, values)

@@ -115,7 +115,7 @@ def hz(
             "nominal_hz": item.topic.rate_hz,
             "messages": item.messages,
             "lost": item.lost,
-            "refused": item.refused,
+            "refused": item.rejected,
             "longest_gap_s": round(item.longest_gap_s, 4),
             "mean_bytes": round(item.mean_bytes),
             "state": _state(item.topic.name in alive, item.welcomed),

@@ -16,7 +16,7 @@ from rich.progress import Progress, TaskID
 from paramove.cli.bus_options import JsonOption
 from paramove.cli.demos_options import SetArgument, ended, words
 from paramove.cli.evaluation_io import PROGRESS
-from paramove.cli.model_options import INTERRUPTED, one_sentence
+from paramove.cli.model_options import INTERRUPTED, one_line
 from paramove.documents import InputError, printable
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def train(
     from paramove.training import examples_of, untrained
 
     console = Console(stderr=True, highlight=False, emoji=False, markup=False)
-    with one_sentence():
+    with one_line():
         demonstrations = DemonstrationSet.load(folder)
         examples = examples_of(
             demonstrations, action=action, parameters=words(parameters), body=body, source=folder.resolve().name

@@ -119,11 +119,11 @@ def _images() -> None:
     """Postures of an arm are compared with images."""
     import numpy as np
 
-    from paramove.action_space import try_out
+    from paramove.action_space import compile_observer
     from paramove.observation import ArmObserver, ArmSizes
 
     poses = np.tile([0.0, -0.25, 0.3, 0.1, -0.25, 0.1, 0.35, -0.2, 0.1], (10, 1))
-    try_out(ArmObserver(ArmSizes(), [_camera()]), _camera(), poses)
+    compile_observer(ArmObserver(ArmSizes(), [_camera()]), _camera(), poses)
 
 
 def _reaching() -> None:

@@ -27,7 +27,7 @@ PAGE = "/"
 class Kind(enum.Enum):
     """Kind of answer to a request."""
 
-    REFUSED = "refused"
+    REJECTED = "refused"
     PAGE = "page"
     FILE = "file"
     SOCKET = "socket"
@@ -46,7 +46,7 @@ class Verdict:
 
     kind: Kind
     status: http.HTTPStatus = http.HTTPStatus.OK
-    sentence: str = ""
+    detail: str = ""
     file: str = ""
     by_token: bool = False
 
@@ -61,7 +61,7 @@ class Secrets:
 
 
 def _rejected(status: http.HTTPStatus, message: str) -> Verdict:
-    return Verdict(Kind.REFUSED, status, message)
+    return Verdict(Kind.REJECTED, status, message)
 
 
 FORBIDDEN, NOT_FOUND = http.HTTPStatus.FORBIDDEN, http.HTTPStatus.NOT_FOUND

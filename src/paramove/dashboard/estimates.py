@@ -16,7 +16,7 @@ from paramove.objects import HomographyError, PlaneHomography
 MAX_SPEECH = 12
 MAX_RESULTS = 8
 POINTING_DISPLAY_S = 3.0
-_ENDED = frozenset({RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REFUSED})
+_ENDED = frozenset({RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED})
 _PUTS_DOWN = frozenset({RelocationGoal.KIND_RELOCATE, RelocationGoal.KIND_PLACE_HELD})
 _GESTURES = {
     Gesture.KIND_APPEARED: "stands",
@@ -73,7 +73,7 @@ class Estimates:
 
     def on_speech(self, speech: Speech, now_s: float) -> None:
         """Speech of the robot."""
-        self._speech.append({"s": round(now_s, 1), "sentence": speech.sentence})
+        self._speech.append({"s": round(now_s, 1), "sentence": speech.text})
 
     def on_rules(self, rules: Rules, now_s: float) -> None:
         """Learned rules."""

@@ -140,8 +140,8 @@ def _sites_of(robot: RobotDescription, side: str) -> tuple[str, str]:
 def _safety(message: SafetyState) -> dict[str, Any]:
     return {
         "state": SafetyState.State.Name(message.state).removeprefix("STATE_").lower(),
-        "faults": [{"joint": fault.joint, "sentence": fault.sentence} for fault in message.faults],
-        "refused": message.refused_trajectories,
+        "faults": [{"joint": fault.joint, "sentence": fault.detail} for fault in message.faults],
+        "refused": message.rejected_trajectories,
     }
 
 

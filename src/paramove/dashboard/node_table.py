@@ -48,7 +48,7 @@ class NodeTable:
             {
                 "name": name,
                 "state": NodeStatus.State.Name(node.status.state).removeprefix("STATE_").lower(),
-                "sentence": node.status.sentence,
+                "sentence": node.status.detail,
                 "ms": None if node.processing_ms is None else round(node.processing_ms, 1),
                 "lost": sum(count.lost for count in node.status.received),
                 "restarts": node.restarts,

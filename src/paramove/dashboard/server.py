@@ -190,10 +190,10 @@ class PageServer:
             if self._browsers < MAX_BROWSERS:
                 return None
             message = f"{MAX_BROWSERS} browsers are already connected; close one of them."
-            verdict = Verdict(Kind.REFUSED, http.HTTPStatus.SERVICE_UNAVAILABLE, message)
-        if verdict.kind is Kind.REFUSED:
+            verdict = Verdict(Kind.REJECTED, http.HTTPStatus.SERVICE_UNAVAILABLE, message)
+        if verdict.kind is Kind.REJECTED:
             self._log_rejection(request, verdict)
-            return self._response(verdict.status, "text/plain", verdict.sentence.encode() + b"\n")
+            return self._response(verdict.status, "text/plain", verdict.detail.encode() + b"\n")
         if verdict.kind is Kind.FILE:
             return self._response(http.HTTPStatus.OK, MEDIA_TYPES[Path(verdict.file).suffix], self._files[verdict.file])
         return self._page(verdict.by_token)
@@ -236,7 +236,7 @@ class PageServer:
         self._rejections += 1
         if self._rejections <= LOGGED_REJECTIONS:
             path = request.path.partition("?")[0]
-            _log.warning("rejected with %d: %.20r %.80r: %s", verdict.status, request.method, path, verdict.sentence)
+            _log.warning("rejected with %d: %.20r %.80r: %s", verdict.status, request.method, path, verdict.detail)
 
     async def _attend(self, connection: ServerConnection) -> None:
         """Serves one browser until it disconnects."""

@@ -36,7 +36,7 @@ class StopButton:
 
     def __init__(self, was_pressed: Callable[[], bool], publish: Callable[[StopRequest], None]) -> None:
         self.progress = Progress.NOT_REQUESTED
-        self.sentence = ""
+        self.detail = ""
         self._was_pressed = was_pressed
         self._publish = publish
         self._requested_ns = 0
@@ -59,10 +59,10 @@ class StopButton:
         if received.topic.name != topics.ARM_SAFETY.name:
             return
         safety: SafetyState = received.message
-        sentences = [fault.sentence for fault in safety.faults if fault.code == PERSON_STOP]
+        sentences = [fault.detail for fault in safety.faults if fault.code == PERSON_STOP]
         if not sentences:
             return
-        self.sentence = sentences[0]
+        self.detail = sentences[0]
         if safety.state in (SafetyState.STATE_HOLD, SafetyState.STATE_ESTOP):
             self.progress = Progress.STOPPED
             self._stopped_ns = received.published_ns if self._stopped_ns is None else self._stopped_ns
@@ -75,4 +75,4 @@ class StopButton:
 
     def section(self) -> dict[str, Any]:
         """For the page."""
-        return {"progress": self.progress.value, "sentence": self.sentence}
+        return {"progress": self.progress.value, "sentence": self.detail}

@@ -31,7 +31,7 @@ from .movement import AXIS_ENDINGS as AXIS_ENDINGS
 from .movement import POINTS_FIRST as POINTS_FIRST
 from .movement import DemonstrationError as DemonstrationError
 from .movement import Movement as Movement
-from .movement import place_of_theta as place_of_theta
+from .movement import position_in_theta as position_in_theta
 from .movement_ends import FRAMES as FRAMES
 from .movement_ends import at_times as at_times
 from .movement_ends import last_parts as last_parts
@@ -69,7 +69,7 @@ from .synthetic import Demonstrator as Demonstrator
 from .synthetic import Timing as Timing
 from .synthetic import Variation as Variation
 from .synthetic import arc as arc
-from .synthetic import kept_away as kept_away
+from .synthetic import kept_clear as kept_clear
 from .synthetic import leaning as leaning
 from .synthetic import minimum_jerk as minimum_jerk
 from .synthetic import overreach as overreach

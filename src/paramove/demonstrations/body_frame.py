@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramove.demonstrations.movement import DemonstrationError, Movement, place_of_theta
+from paramove.demonstrations.movement import DemonstrationError, Movement, position_in_theta
 from paramove.documents import Floats
 
 BODY = "body"
@@ -84,7 +84,7 @@ def scaled(movement: Movement, factor: float) -> Movement:
 def _mapped(movement: Movement, linear: Floats, origin: Floats, frame: str) -> Movement:
     """Every position p becomes `linear` @ (p - origin)."""
     theta = movement.theta.copy()
-    position = place_of_theta(movement.parameter_names)
+    position = position_in_theta(movement.parameter_names)
     if position is not None:
         theta[position] = linear @ (theta[position] - origin)
     return replace(movement, positions=(movement.positions - origin) @ linear.T, theta=theta, frame=frame)

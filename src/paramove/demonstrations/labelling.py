@@ -74,7 +74,7 @@ def label(folder: Path, segments: Sequence[Segment], parameter_names: Sequence[s
     for segment in segments:
         if segment.recording not in recordings:
             recordings[segment.recording] = read_poses(folder / segment.recording)
-        _refuse(segment, recordings[segment.recording])
+        _reject(segment, recordings[segment.recording])
     file = folder / FILE_NAME
     if not file.exists():
         write_labels(file, LabelsFile(parameters=list(_names(segments, parameter_names))))
@@ -99,7 +99,7 @@ def _names(segments: Sequence[Segment], given: Sequence[str] | None) -> Sequence
     return [f"parameter_{number}" for number in range(1, count + 1)]
 
 
-def _refuse(segment: Segment, poses: PoseRecording) -> None:
+def _reject(segment: Segment, poses: PoseRecording) -> None:
     since = poses.time_ns - poses.time_ns[0]
     what = f"{segment.recording}, {segment.start:g} to {segment.end:g} s"
     if segment.end <= segment.start:

@@ -103,7 +103,7 @@ class Movement:
         return "" if np.isfinite(self.theta).all() else "theta is not finite"
 
 
-def place_of_theta(parameter_names: tuple[str, ...]) -> slice | None:
+def position_in_theta(parameter_names: tuple[str, ...]) -> slice | None:
     """Which components of theta are a position in space: three that follow each other and end in _x, _y, _z."""
     for first in range(len(parameter_names) - 2):
         three = parameter_names[first : first + 3]

@@ -123,7 +123,7 @@ class Demonstrator:
         shoulder = RESTING_SHOULDER + posture + nearness[:, None] * lean
         sternum = RESTING_STERNUM + 0.7 * posture + nearness[:, None] * 0.35 * lean
         effector = self._hand_path(target, progress, timing, scale, rng)
-        effector = kept_away(effector, shoulder, target)
+        effector = kept_clear(effector, shoulder, target)
         shoulder = shoulder + overreach(effector - shoulder, self.lengths.upper_arm + self.lengths.forearm + reach)
         swivel = self._swivel(target, lean, nearness, scale, rng)
         aperture = grasping(progress, timing) if action == "reaching" else np.full_like(progress, RELAXED)
@@ -218,7 +218,7 @@ def leaning(target: Floats, arm_length: float) -> Floats:
     return result
 
 
-def kept_away(effector: Floats, shoulder: Floats, target: Floats) -> Floats:
+def kept_clear(effector: Floats, shoulder: Floats, target: Floats) -> Floats:
     """The path with positions too near to the shoulder for a bent arm moved outward; the target stays. (T, 3)."""
     width = 0.03
     minimum = min(0.26, float(np.linalg.norm(target - shoulder, axis=1).min()) - 2.0 * width)

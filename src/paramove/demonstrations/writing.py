@@ -79,7 +79,7 @@ def write_set(
     Raises DemonstrationError if there is a set or a recording already, or if parameters differ from those of the set.
     """
     there = (folder / FILE_NAME).exists()
-    _refuse(folder, takes, parameter_names, there, add)
+    _reject(folder, takes, parameter_names, there, add)
     names = dict.fromkeys(take.recording for take in takes)
     recordings = {name: _together([take for take in takes if take.recording == name]) for name in names}
     folder.mkdir(parents=True, exist_ok=True)  # nothing is written before everything is checked
@@ -97,7 +97,7 @@ def write_set(
     write_labels(folder / FILE_NAME, content)
 
 
-def _refuse(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str], there: bool, add: bool) -> None:
+def _reject(folder: Path, takes: Sequence[Take], parameter_names: Sequence[str], there: bool, add: bool) -> None:
     if not takes:
         raise DemonstrationError("there is no movement to write")
     if there and not add:

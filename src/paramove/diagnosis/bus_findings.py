@@ -16,12 +16,12 @@ from paramove.robots.dynamixel import (
     BAUD_RATES,
     USUAL_BAUD_RATES,
     BusScan,
-    FoundServo,
+    DetectedServo,
     PortLostError,
     ServoChain,
     ServoPort,
+    error_text,
     hardware_errors,
-    in_words,
     listed,
     scan_bus,
 )
@@ -73,7 +73,7 @@ def bus_findings(
     return findings
 
 
-def servo_findings(port: Path, servo: FoundServo) -> list[Finding]:
+def servo_findings(port: Path, servo: DetectedServo) -> list[Finding]:
     """Of one servo: first its state, then its faults."""
     about = f"servo {servo.number}"
     details = [servo.name, *([f"firmware {servo.firmware}"] if servo.firmware else []), f"{servo.baud_rate} bit/s"]
@@ -106,7 +106,7 @@ def _overview(port: Path, scan: BusScan) -> Finding:
     )
 
 
-def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
+def _mixed_rates(port: Path, servos: Sequence[DetectedServo]) -> Iterator[Finding]:
     """A program uses one rate: the others get the rate of most servos, of two equal ones the faster."""
     by_rate: dict[int, list[int]] = {}
     for servo in servos:
@@ -122,8 +122,8 @@ def _mixed_rates(port: Path, servos: Sequence[FoundServo]) -> Iterator[Finding]:
     yield Finding("bus", Level.PROBLEM, message, remedy)
 
 
-def _identity(port: Path, servo: FoundServo) -> Iterator[Wrong]:
-    if servo.is_shared:
+def _identity(port: Path, servo: DetectedServo) -> Iterator[Wrong]:
+    if servo.has_duplicate_id:
         change = _setting(port, servo, "ID", "NEW_ID", "one that no other servo has")
         yield Level.PROBLEM, servo.fault, (f"{servo.remedy}, or", *change)
     elif servo.fault:
@@ -132,7 +132,7 @@ def _identity(port: Path, servo: FoundServo) -> Iterator[Wrong]:
         yield Level.WARNING, f"{servo.name} has no table in dynamixel-sdk: its state cannot be read", ()
 
 
-def _voltage(servo: FoundServo) -> Iterator[Wrong]:
+def _voltage(servo: DetectedServo) -> Iterator[Wrong]:
     names = ("Present Input Voltage", "Min Voltage Limit", "Max Voltage Limit")
     present, minimum, maximum = (servo.values.get(name) for name in names)
     if present is None or minimum is None or maximum is None or minimum <= present <= maximum:
@@ -142,7 +142,7 @@ def _voltage(servo: FoundServo) -> Iterator[Wrong]:
     yield Level.PROBLEM, message, (f"switch off, and give it a supply of {recommended}",)
 
 
-def _temperature(servo: FoundServo) -> Iterator[Wrong]:
+def _temperature(servo: DetectedServo) -> Iterator[Wrong]:
     present, limit = servo.temperature, servo.values.get("Temperature Limit")
     if present is None or limit is None or present < limit - NEAR_LIMIT_C:
         return
@@ -150,17 +150,17 @@ def _temperature(servo: FoundServo) -> Iterator[Wrong]:
     yield level, f"is {present} °C hot, its limit is {limit} °C", ("let it cool with torque off, and reduce its load",)
 
 
-def _hardware_errors(port: Path, servo: FoundServo) -> Iterator[Wrong]:
+def _hardware_errors(port: Path, servo: DetectedServo) -> Iterator[Wrong]:
     status = servo.hardware_error
     if not status:
         return
-    message = f"has stopped: {in_words(status)} (Hardware Error Status {status:#04x})"
+    message = f"has stopped: {error_text(status)} (Hardware Error Status {status:#04x})"
     restart = "then hold the arm, as its torque goes off, and restart the servo:"
     command = _command(port, servo, f"reboot(p, {servo.number})")
     yield Level.PROBLEM, message, (*(one.remedy for one in hardware_errors(status)), restart, command)
 
 
-def _setting(port: Path, servo: FoundServo, register: str, value: str, meaning: str) -> tuple[str, ...]:
+def _setting(port: Path, servo: DetectedServo, register: str, value: str, meaning: str) -> tuple[str, ...]:
     """How a register is set; by a command only where its address is known for certain."""
     aim = f"set {register} of servo {servo.number} to {meaning}, with its torque off"
     if servo.table is None:
@@ -170,7 +170,7 @@ def _setting(port: Path, servo: FoundServo, register: str, value: str, meaning: 
     return (f"{aim}; this prints (0, 0) when done:", _command(port, servo, call))
 
 
-def _command(port: Path, servo: FoundServo, call: str) -> str:
+def _command(port: Path, servo: DetectedServo, call: str) -> str:
     """For a shell: what dynamixel-sdk is to do with a servo at its rate."""
     code = f"from dynamixel_sdk import *; p = PortHandler({json.dumps(str(port))}); p.openPort(); "
     code += f"p.setBaudRate({servo.baud_rate}); print(PacketHandler(2.0).{call})"

@@ -55,7 +55,7 @@ class Finding:
 
     subject: str
     level: Level
-    sentence: str
+    detail: str
     remedy: tuple[str, ...] = ()
     fix: Fix | None = None
     facts: Mapping[str, object] = field(default_factory=dict)

@@ -90,7 +90,7 @@ def sockets_finding() -> Finding:
     finding = folder_finding("sockets", folder)
     if finding.level is Level.OK:
         return Finding(subject, Level.OK, f"{folder} can be written, and is short enough", facts=facts)
-    return Finding(subject, finding.level, finding.sentence, (*finding.remedy, *own), finding.fix, facts)
+    return Finding(subject, finding.level, finding.detail, (*finding.remedy, *own), finding.fix, facts)
 
 
 def disk_findings(folders: Mapping[str, Path]) -> Iterator[Finding]:

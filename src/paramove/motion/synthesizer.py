@@ -30,7 +30,7 @@ STALE_TRIES = 3
 NOT_AT_BASE = "the arm is not at its base pose; send a goal of kind REST first"
 RESTARTED = "the synthesizer was restarted; its motion ran to its end; send a new goal"
 
-_ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED}
+_ENDED = {TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REJECTED}
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Synthesizer:
         return self._commanded_opening() < FELT_OPENING < self._hand.measured
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """A description of its state, for people."""
         if self._running is not None:
             return f"goal {self._running.goal.id}: {self._running.phase or 'begins'}"
@@ -146,7 +146,7 @@ class Synthesizer:
         if running is None or running.message is None or status.trajectory_id != running.message.id:
             self._on_status_of_others(status)
             return
-        if status.state == TrajectoryStatus.STATE_REFUSED and status.code == "stale" and running.stale < STALE_TRIES:
+        if status.state == TrajectoryStatus.STATE_REJECTED and status.code == "stale" and running.stale < STALE_TRIES:
             running.stale += 1  # planning took longer than the driver waits: it is sent again with the current time
             running.acknowledged, running.sent_ns = False, self._now_ns - RESEND_NS
             return
@@ -246,7 +246,7 @@ class Synthesizer:
         try:
             self._begin(goal)
         except (GoalRejectedError, NoClearPlanError, UnreachablePoseError) as error:
-            self._report(goal.id, RelocationStatus.STATE_REFUSED, reason=str(error))
+            self._report(goal.id, RelocationStatus.STATE_REJECTED, reason=str(error))
             if isinstance(error, NoClearPlanError):
                 self._latest[goal.id].in_the_way.extend(sorted(error.in_the_way))
 

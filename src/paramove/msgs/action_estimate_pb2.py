@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/action_estimate.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xff\x02\n\x0e\x41\x63tionEstimate\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12,\n\x07\x61\x63tions\x18\x03 \x03(\x0b\x32\x1b.paramove.msgs.ActionBelief\x12\x10\n\x08progress\x18\x04 \x03(\x01\x12\x1d\n\x15\x65\x66\x66\x65\x63tive_sample_size\x18\x05 \x01(\x01\x12\x11\n\tparticles\x18\x06 \x01(\r\x12\r\n\x05views\x18\x07 \x01(\r\x12\x0c\n\x04lost\x18\x08 \x01(\x08\x12\x10\n\x08\x64\x65graded\x18\t \x01(\x08\x12\x10\n\x08sentence\x18\n \x01(\t\x12%\n\x04hand\x18\x0b \x01(\x0b\x32\x17.paramove.msgs.Location\x12(\n\x07pointed\x18\x0c \x01(\x0b\x32\x17.paramove.msgs.Location\x12,\n\x06target\x18\r \x01(\x0b\x32\x1c.paramove.msgs.PointedTarget\"g\n\x0c\x41\x63tionBelief\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\t\x12\x13\n\x0bprobability\x18\x02 \x01(\x01\x12\x32\n\nparameters\x18\x03 \x03(\x0b\x32\x1e.paramove.msgs.ActionParameter\"T\n\x0f\x41\x63tionParameter\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04mean\x18\x02 \x01(\x01\x12\x11\n\tdeviation\x18\x03 \x01(\x01\x12\x12\n\ncovariance\x18\x04 \x03(\x01\"j\n\x08Location\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\x12\x13\n\x0bx_deviation\x18\x04 \x01(\x01\x12\x13\n\x0by_deviation\x18\x05 \x01(\x01\x12\x13\n\x0bz_deviation\x18\x06 \x01(\x01\"\x87\x01\n\rPointedTarget\x12\x0e\n\x06number\x18\x01 \x01(\r\x12+\n\x07\x61rrived\x18\x02 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06\x61\x63tion\x18\x03 \x01(\t\x12)\n\x08location\x18\x04 \x01(\x0b\x32\x17.paramove.msgs.Locationb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#paramove/msgs/action_estimate.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\x8c\x03\n\x0e\x41\x63tionEstimate\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12\x31\n\x07\x61\x63tions\x18\x03 \x03(\x0b\x32 .paramove.msgs.ActionProbability\x12\x10\n\x08progress\x18\x04 \x03(\x01\x12\x1d\n\x15\x65\x66\x66\x65\x63tive_sample_size\x18\x05 \x01(\x01\x12\x11\n\tparticles\x18\x06 \x01(\r\x12\r\n\x05views\x18\x07 \x01(\r\x12\x0c\n\x04lost\x18\x08 \x01(\x08\x12\x10\n\x08\x64\x65graded\x18\t \x01(\x08\x12\x0e\n\x06\x64\x65tail\x18\n \x01(\t\x12%\n\x04hand\x18\x0b \x01(\x0b\x32\x17.paramove.msgs.Location\x12(\n\x07pointed\x18\x0c \x01(\x0b\x32\x17.paramove.msgs.Location\x12,\n\x06target\x18\r \x01(\x0b\x32\x1c.paramove.msgs.PointedTargetR\x08sentence\"l\n\x11\x41\x63tionProbability\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\t\x12\x13\n\x0bprobability\x18\x02 \x01(\x01\x12\x32\n\nparameters\x18\x03 \x03(\x0b\x32\x1e.paramove.msgs.ActionParameter\"T\n\x0f\x41\x63tionParameter\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0c\n\x04mean\x18\x02 \x01(\x01\x12\x11\n\tdeviation\x18\x03 \x01(\x01\x12\x12\n\ncovariance\x18\x04 \x03(\x01\"j\n\x08Location\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\x12\x13\n\x0bx_deviation\x18\x04 \x01(\x01\x12\x13\n\x0by_deviation\x18\x05 \x01(\x01\x12\x13\n\x0bz_deviation\x18\x06 \x01(\x01\"\x87\x01\n\rPointedTarget\x12\x0e\n\x06number\x18\x01 \x01(\r\x12+\n\x07\x61rrived\x18\x02 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x0e\n\x06\x61\x63tion\x18\x03 \x01(\t\x12)\n\x08location\x18\x04 \x01(\x0b\x32\x17.paramove.msgs.Locationb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,13 +33,13 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'paramove.msgs.action_estima
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_ACTIONESTIMATE']._serialized_start=88
-  _globals['_ACTIONESTIMATE']._serialized_end=471
-  _globals['_ACTIONBELIEF']._serialized_start=473
-  _globals['_ACTIONBELIEF']._serialized_end=576
-  _globals['_ACTIONPARAMETER']._serialized_start=578
-  _globals['_ACTIONPARAMETER']._serialized_end=662
-  _globals['_LOCATION']._serialized_start=664
-  _globals['_LOCATION']._serialized_end=770
-  _globals['_POINTEDTARGET']._serialized_start=773
-  _globals['_POINTEDTARGET']._serialized_end=908
+  _globals['_ACTIONESTIMATE']._serialized_end=484
+  _globals['_ACTIONPROBABILITY']._serialized_start=486
+  _globals['_ACTIONPROBABILITY']._serialized_end=594
+  _globals['_ACTIONPARAMETER']._serialized_start=596
+  _globals['_ACTIONPARAMETER']._serialized_end=680
+  _globals['_LOCATION']._serialized_start=682
+  _globals['_LOCATION']._serialized_end=788
+  _globals['_POINTEDTARGET']._serialized_start=791
+  _globals['_POINTEDTARGET']._serialized_end=926
 # @@protoc_insertion_point(module_scope)

@@ -7,7 +7,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ActionEstimate(_message.Message):
-    __slots__ = ("captured", "frame", "actions", "progress", "effective_sample_size", "particles", "views", "lost", "degraded", "sentence", "hand", "pointed", "target")
+    __slots__ = ("captured", "frame", "actions", "progress", "effective_sample_size", "particles", "views", "lost", "degraded", "detail", "hand", "pointed", "target")
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     FRAME_FIELD_NUMBER: _ClassVar[int]
     ACTIONS_FIELD_NUMBER: _ClassVar[int]
@@ -17,26 +17,26 @@ class ActionEstimate(_message.Message):
     VIEWS_FIELD_NUMBER: _ClassVar[int]
     LOST_FIELD_NUMBER: _ClassVar[int]
     DEGRADED_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
     HAND_FIELD_NUMBER: _ClassVar[int]
     POINTED_FIELD_NUMBER: _ClassVar[int]
     TARGET_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     frame: str
-    actions: _containers.RepeatedCompositeFieldContainer[ActionBelief]
+    actions: _containers.RepeatedCompositeFieldContainer[ActionProbability]
     progress: _containers.RepeatedScalarFieldContainer[float]
     effective_sample_size: float
     particles: int
     views: int
     lost: bool
     degraded: bool
-    sentence: str
+    detail: str
     hand: Location
     pointed: Location
     target: PointedTarget
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame: _Optional[str] = ..., actions: _Optional[_Iterable[_Union[ActionBelief, _Mapping]]] = ..., progress: _Optional[_Iterable[float]] = ..., effective_sample_size: _Optional[float] = ..., particles: _Optional[int] = ..., views: _Optional[int] = ..., lost: bool = ..., degraded: bool = ..., sentence: _Optional[str] = ..., hand: _Optional[_Union[Location, _Mapping]] = ..., pointed: _Optional[_Union[Location, _Mapping]] = ..., target: _Optional[_Union[PointedTarget, _Mapping]] = ...) -> None: ...
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame: _Optional[str] = ..., actions: _Optional[_Iterable[_Union[ActionProbability, _Mapping]]] = ..., progress: _Optional[_Iterable[float]] = ..., effective_sample_size: _Optional[float] = ..., particles: _Optional[int] = ..., views: _Optional[int] = ..., lost: bool = ..., degraded: bool = ..., detail: _Optional[str] = ..., hand: _Optional[_Union[Location, _Mapping]] = ..., pointed: _Optional[_Union[Location, _Mapping]] = ..., target: _Optional[_Union[PointedTarget, _Mapping]] = ...) -> None: ...
 
-class ActionBelief(_message.Message):
+class ActionProbability(_message.Message):
     __slots__ = ("action", "probability", "parameters")
     ACTION_FIELD_NUMBER: _ClassVar[int]
     PROBABILITY_FIELD_NUMBER: _ClassVar[int]

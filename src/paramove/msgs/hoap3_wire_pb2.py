@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eparamove/msgs/hoap3_wire.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x01\n\x0bStreamBatch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x13\n\x0b\x66irst_index\x18\x02 \x01(\x04\x12\x11\n\tperiod_us\x18\x03 \x01(\r\x12\x13\n\x0bjoint_count\x18\x04 \x01(\r\x12\x18\n\x10stop_ramp_frames\x18\x05 \x01(\r\x12\x0e\n\x06\x66rames\x18\x06 \x01(\x0c\x12\x0b\n\x03\x63rc\x18\x07 \x01(\r\"\xe7\x02\n\nHoap3State\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x65poch\x18\x02 \x01(\r\x12\x12\n\nnext_index\x18\x03 \x01(\x04\x12\r\n\x05\x64\x65pth\x18\x04 \x01(\r\x12\x32\n\x07playing\x18\x05 \x01(\x0e\x32!.paramove.msgs.Hoap3State.Playing\x12\x0e\n\x06\x63ounts\x18\x06 \x03(\x11\x12\x17\n\x0frefused_batches\x18\x07 \x01(\x04\x12\x0f\n\x07refusal\x18\x08 \x01(\t\x12\x15\n\rtarget_counts\x18\t \x03(\x11\"t\n\x07Playing\x12\x17\n\x13PLAYING_UNSPECIFIED\x10\x00\x12\x13\n\x0fPLAYING_NOTHING\x10\x01\x12\x12\n\x0ePLAYING_FRAMES\x10\x02\x12\x15\n\x11PLAYING_STOP_RAMP\x10\x03\x12\x10\n\x0cPLAYING_HELD\x10\x04\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1eparamove/msgs/hoap3_wire.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\x90\x01\n\x0bStreamBatch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x13\n\x0b\x66irst_index\x18\x02 \x01(\x04\x12\x11\n\tperiod_us\x18\x03 \x01(\r\x12\x13\n\x0bjoint_count\x18\x04 \x01(\r\x12\x18\n\x10stop_ramp_frames\x18\x05 \x01(\r\x12\x0e\n\x06\x66rames\x18\x06 \x01(\x0c\x12\x0b\n\x03\x63rc\x18\x07 \x01(\r\"\x84\x03\n\nHoap3State\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x65poch\x18\x02 \x01(\r\x12\x12\n\nnext_index\x18\x03 \x01(\x04\x12\r\n\x05\x64\x65pth\x18\x04 \x01(\r\x12\x32\n\x07playing\x18\x05 \x01(\x0e\x32!.paramove.msgs.Hoap3State.Playing\x12\x0e\n\x06\x63ounts\x18\x06 \x03(\x11\x12\x18\n\x10rejected_batches\x18\x07 \x01(\x04\x12\x11\n\trejection\x18\x08 \x01(\t\x12\x15\n\rtarget_counts\x18\t \x03(\x11\"t\n\x07Playing\x12\x17\n\x13PLAYING_UNSPECIFIED\x10\x00\x12\x13\n\x0fPLAYING_NOTHING\x10\x01\x12\x12\n\x0ePLAYING_FRAMES\x10\x02\x12\x15\n\x11PLAYING_STOP_RAMP\x10\x03\x12\x10\n\x0cPLAYING_HELD\x10\x04R\x0frefused_batchesR\x07refusalb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,7 +35,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_STREAMBATCH']._serialized_start=83
   _globals['_STREAMBATCH']._serialized_end=227
   _globals['_HOAP3STATE']._serialized_start=230
-  _globals['_HOAP3STATE']._serialized_end=589
-  _globals['_HOAP3STATE_PLAYING']._serialized_start=473
-  _globals['_HOAP3STATE_PLAYING']._serialized_end=589
+  _globals['_HOAP3STATE']._serialized_end=618
+  _globals['_HOAP3STATE_PLAYING']._serialized_start=476
+  _globals['_HOAP3STATE_PLAYING']._serialized_end=592
 # @@protoc_insertion_point(module_scope)

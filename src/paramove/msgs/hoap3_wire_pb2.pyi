@@ -26,7 +26,7 @@ class StreamBatch(_message.Message):
     def __init__(self, epoch: _Optional[int] = ..., first_index: _Optional[int] = ..., period_us: _Optional[int] = ..., joint_count: _Optional[int] = ..., stop_ramp_frames: _Optional[int] = ..., frames: _Optional[bytes] = ..., crc: _Optional[int] = ...) -> None: ...
 
 class Hoap3State(_message.Message):
-    __slots__ = ("captured", "epoch", "next_index", "depth", "playing", "counts", "refused_batches", "refusal", "target_counts")
+    __slots__ = ("captured", "epoch", "next_index", "depth", "playing", "counts", "rejected_batches", "rejection", "target_counts")
     class Playing(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         PLAYING_UNSPECIFIED: _ClassVar[Hoap3State.Playing]
@@ -45,8 +45,8 @@ class Hoap3State(_message.Message):
     DEPTH_FIELD_NUMBER: _ClassVar[int]
     PLAYING_FIELD_NUMBER: _ClassVar[int]
     COUNTS_FIELD_NUMBER: _ClassVar[int]
-    REFUSED_BATCHES_FIELD_NUMBER: _ClassVar[int]
-    REFUSAL_FIELD_NUMBER: _ClassVar[int]
+    REJECTED_BATCHES_FIELD_NUMBER: _ClassVar[int]
+    REJECTION_FIELD_NUMBER: _ClassVar[int]
     TARGET_COUNTS_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     epoch: int
@@ -54,7 +54,7 @@ class Hoap3State(_message.Message):
     depth: int
     playing: Hoap3State.Playing
     counts: _containers.RepeatedScalarFieldContainer[int]
-    refused_batches: int
-    refusal: str
+    rejected_batches: int
+    rejection: str
     target_counts: _containers.RepeatedScalarFieldContainer[int]
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., epoch: _Optional[int] = ..., next_index: _Optional[int] = ..., depth: _Optional[int] = ..., playing: _Optional[_Union[Hoap3State.Playing, str]] = ..., counts: _Optional[_Iterable[int]] = ..., refused_batches: _Optional[int] = ..., refusal: _Optional[str] = ..., target_counts: _Optional[_Iterable[int]] = ...) -> None: ...
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., epoch: _Optional[int] = ..., next_index: _Optional[int] = ..., depth: _Optional[int] = ..., playing: _Optional[_Union[Hoap3State.Playing, str]] = ..., counts: _Optional[_Iterable[int]] = ..., rejected_batches: _Optional[int] = ..., rejection: _Optional[str] = ..., target_counts: _Optional[_Iterable[int]] = ...) -> None: ...

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$paramove/msgs/joint_trajectory.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xbb\x01\n\x0fJointTrajectory\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\n\n\x02id\x18\x02 \x01(\t\x12\x0e\n\x06joints\x18\x03 \x03(\t\x12.\n\x06points\x18\x04 \x03(\x0b\x32\x1e.paramove.msgs.TrajectoryPoint\x12.\n\x06phases\x18\x05 \x03(\x0b\x32\x1e.paramove.msgs.TrajectoryPhase\"7\n\x0fTrajectoryPoint\x12\x0e\n\x06time_s\x18\x01 \x01(\x01\x12\x14\n\x0cposition_rad\x18\x02 \x03(\x01\"0\n\x0fTrajectoryPhase\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07start_s\x18\x02 \x01(\x01\"\xd4\x02\n\x10TrajectoryStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x15\n\rtrajectory_id\x18\x02 \x01(\t\x12\x34\n\x05state\x18\x03 \x01(\x0e\x32%.paramove.msgs.TrajectoryStatus.State\x12\x0e\n\x06time_s\x18\x04 \x01(\x01\x12\x12\n\nduration_s\x18\x05 \x01(\x01\x12\x0e\n\x06reason\x18\x06 \x01(\t\x12\x0c\n\x04\x63ode\x18\x07 \x01(\t\"\x82\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_ACCEPTED\x10\x01\x12\x13\n\x0fSTATE_EXECUTING\x10\x02\x12\x13\n\x0fSTATE_SUCCEEDED\x10\x03\x12\x11\n\rSTATE_STOPPED\x10\x04\x12\x11\n\rSTATE_REFUSED\x10\x05\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$paramove/msgs/joint_trajectory.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"\xbb\x01\n\x0fJointTrajectory\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\n\n\x02id\x18\x02 \x01(\t\x12\x0e\n\x06joints\x18\x03 \x03(\t\x12.\n\x06points\x18\x04 \x03(\x0b\x32\x1e.paramove.msgs.TrajectoryPoint\x12.\n\x06phases\x18\x05 \x03(\x0b\x32\x1e.paramove.msgs.TrajectoryPhase\"7\n\x0fTrajectoryPoint\x12\x0e\n\x06time_s\x18\x01 \x01(\x01\x12\x14\n\x0cposition_rad\x18\x02 \x03(\x01\"0\n\x0fTrajectoryPhase\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x0f\n\x07start_s\x18\x02 \x01(\x01\"\xe4\x02\n\x10TrajectoryStatus\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x15\n\rtrajectory_id\x18\x02 \x01(\t\x12\x34\n\x05state\x18\x03 \x01(\x0e\x32%.paramove.msgs.TrajectoryStatus.State\x12\x0e\n\x06time_s\x18\x04 \x01(\x01\x12\x12\n\nduration_s\x18\x05 \x01(\x01\x12\x0e\n\x06reason\x18\x06 \x01(\t\x12\x0c\n\x04\x63ode\x18\x07 \x01(\t\"\x92\x01\n\x05State\x12\x15\n\x11STATE_UNSPECIFIED\x10\x00\x12\x12\n\x0eSTATE_ACCEPTED\x10\x01\x12\x13\n\x0fSTATE_EXECUTING\x10\x02\x12\x13\n\x0fSTATE_SUCCEEDED\x10\x03\x12\x11\n\rSTATE_STOPPED\x10\x04\x12\x12\n\x0eSTATE_REJECTED\x10\x05*\rSTATE_REFUSEDb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -39,7 +39,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TRAJECTORYPHASE']._serialized_start=335
   _globals['_TRAJECTORYPHASE']._serialized_end=383
   _globals['_TRAJECTORYSTATUS']._serialized_start=386
-  _globals['_TRAJECTORYSTATUS']._serialized_end=726
+  _globals['_TRAJECTORYSTATUS']._serialized_end=742
   _globals['_TRAJECTORYSTATUS_STATE']._serialized_start=596
-  _globals['_TRAJECTORYSTATUS_STATE']._serialized_end=726
+  _globals['_TRAJECTORYSTATUS_STATE']._serialized_end=742
 # @@protoc_insertion_point(module_scope)

@@ -46,13 +46,13 @@ class TrajectoryStatus(_message.Message):
         STATE_EXECUTING: _ClassVar[TrajectoryStatus.State]
         STATE_SUCCEEDED: _ClassVar[TrajectoryStatus.State]
         STATE_STOPPED: _ClassVar[TrajectoryStatus.State]
-        STATE_REFUSED: _ClassVar[TrajectoryStatus.State]
+        STATE_REJECTED: _ClassVar[TrajectoryStatus.State]
     STATE_UNSPECIFIED: TrajectoryStatus.State
     STATE_ACCEPTED: TrajectoryStatus.State
     STATE_EXECUTING: TrajectoryStatus.State
     STATE_SUCCEEDED: TrajectoryStatus.State
     STATE_STOPPED: TrajectoryStatus.State
-    STATE_REFUSED: TrajectoryStatus.State
+    STATE_REJECTED: TrajectoryStatus.State
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     TRAJECTORY_ID_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class NodeStatus(_message.Message):
-    __slots__ = ("node", "state", "sentence", "pid", "captured", "processing_seconds", "processed", "published", "received")
+    __slots__ = ("node", "state", "detail", "pid", "captured", "processing_seconds", "processed", "published", "received")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[NodeStatus.State]
@@ -25,7 +25,7 @@ class NodeStatus(_message.Message):
     STATE_STOPPED: NodeStatus.State
     NODE_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
     PID_FIELD_NUMBER: _ClassVar[int]
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     PROCESSING_SECONDS_FIELD_NUMBER: _ClassVar[int]
@@ -34,25 +34,25 @@ class NodeStatus(_message.Message):
     RECEIVED_FIELD_NUMBER: _ClassVar[int]
     node: str
     state: NodeStatus.State
-    sentence: str
+    detail: str
     pid: int
     captured: _timestamp_pb2.Timestamp
     processing_seconds: float
     processed: int
     published: _containers.RepeatedCompositeFieldContainer[TopicCount]
     received: _containers.RepeatedCompositeFieldContainer[TopicCount]
-    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., sentence: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., received: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
+    def __init__(self, node: _Optional[str] = ..., state: _Optional[_Union[NodeStatus.State, str]] = ..., detail: _Optional[str] = ..., pid: _Optional[int] = ..., captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., processing_seconds: _Optional[float] = ..., processed: _Optional[int] = ..., published: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ..., received: _Optional[_Iterable[_Union[TopicCount, _Mapping]]] = ...) -> None: ...
 
 class TopicCount(_message.Message):
-    __slots__ = ("topic", "messages", "lost", "repeated_", "refused")
+    __slots__ = ("topic", "messages", "lost", "repeated_", "rejected")
     TOPIC_FIELD_NUMBER: _ClassVar[int]
     MESSAGES_FIELD_NUMBER: _ClassVar[int]
     LOST_FIELD_NUMBER: _ClassVar[int]
     REPEATED__FIELD_NUMBER: _ClassVar[int]
-    REFUSED_FIELD_NUMBER: _ClassVar[int]
+    REJECTED_FIELD_NUMBER: _ClassVar[int]
     topic: str
     messages: int
     lost: int
     repeated_: int
-    refused: int
-    def __init__(self, topic: _Optional[str] = ..., messages: _Optional[int] = ..., lost: _Optional[int] = ..., repeated_: _Optional[int] = ..., refused: _Optional[int] = ...) -> None: ...
+    rejected: int
+    def __init__(self, topic: _Optional[str] = ..., messages: _Optional[int] = ..., lost: _Optional[int] = ..., repeated_: _Optional[int] = ..., rejected: _Optional[int] = ...) -> None: ...

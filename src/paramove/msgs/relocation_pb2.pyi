@@ -65,13 +65,13 @@ class RelocationStatus(_message.Message):
         STATE_EXECUTING: _ClassVar[RelocationStatus.State]
         STATE_SUCCEEDED: _ClassVar[RelocationStatus.State]
         STATE_FAILED: _ClassVar[RelocationStatus.State]
-        STATE_REFUSED: _ClassVar[RelocationStatus.State]
+        STATE_REJECTED: _ClassVar[RelocationStatus.State]
     STATE_UNSPECIFIED: RelocationStatus.State
     STATE_ACCEPTED: RelocationStatus.State
     STATE_EXECUTING: RelocationStatus.State
     STATE_SUCCEEDED: RelocationStatus.State
     STATE_FAILED: RelocationStatus.State
-    STATE_REFUSED: RelocationStatus.State
+    STATE_REJECTED: RelocationStatus.State
     class Hull(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         HULL_UNSPECIFIED: _ClassVar[RelocationStatus.Hull]

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from google.protobuf import timestamp_pb2 as google_dot_protobuf_dot_timestamp__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18paramove/msgs/rule.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"h\n\x05Rules\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12\"\n\x05rules\x18\x03 \x03(\x0b\x32\x13.paramove.msgs.Rule\"~\n\x04Rule\x12\x0e\n\x06object\x18\x01 \x01(\t\x12\t\n\x01x\x18\x02 \x01(\x01\x12\t\n\x01y\x18\x03 \x01(\x01\x12(\n\x04seen\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x14\n\x0cobservations\x18\x05 \x01(\r\x12\x10\n\x08sentence\x18\x06 \x01(\t\"\xb0\x02\n\x10\x41pplicationStage\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x34\n\x05stage\x18\x02 \x01(\x0e\x32%.paramove.msgs.ApplicationStage.Stage\x12\x0c\n\x04step\x18\x03 \x01(\t\x12\x10\n\x08sentence\x18\x04 \x01(\t\x12\x0e\n\x06grasps\x18\x05 \x01(\r\x12\x0f\n\x07retries\x18\x06 \x01(\r\"w\n\x05Stage\x12\x15\n\x11STAGE_UNSPECIFIED\x10\x00\x12\x13\n\x0fSTAGE_CALIBRATE\x10\x01\x12\x0f\n\x0bSTAGE_LEARN\x10\x02\x12\x0f\n\x0bSTAGE_APPLY\x10\x03\x12\x0e\n\nSTAGE_DONE\x10\x04\x12\x10\n\x0cSTAGE_FAILED\x10\x05\"\xf7\x02\n\x06Speech\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12.\n\x07request\x18\x02 \x01(\x0e\x32\x1d.paramove.msgs.Speech.Request\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\x10\n\x08sentence\x18\x04 \x01(\t\"\xec\x01\n\x07Request\x12\x17\n\x13REQUEST_UNSPECIFIED\x10\x00\x12\x1d\n\x19REQUEST_HAND_ME_AN_OBJECT\x10\x01\x12\x12\n\x0eREQUEST_LET_GO\x10\x02\x12\x16\n\x12REQUEST_SHOW_RULES\x10\x03\x12\x1b\n\x17REQUEST_SHOW_RULE_AGAIN\x10\x04\x12\x1b\n\x17REQUEST_POINT_AT_OBJECT\x10\x05\x12\x10\n\x0cREQUEST_HELP\x10\x06\x12\x15\n\x11REQUEST_THANK_YOU\x10\x07\x12\x1a\n\x16REQUEST_POINT_AT_PLACE\x10\x08\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18paramove/msgs/rule.proto\x12\rparamove.msgs\x1a\x1fgoogle/protobuf/timestamp.proto\"h\n\x05Rules\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\r\n\x05\x66rame\x18\x02 \x01(\t\x12\"\n\x05rules\x18\x03 \x03(\x0b\x32\x13.paramove.msgs.Rule\"\x84\x01\n\x04Rule\x12\x0e\n\x06object\x18\x01 \x01(\t\x12\t\n\x01x\x18\x02 \x01(\x01\x12\t\n\x01y\x18\x03 \x01(\x01\x12(\n\x04seen\x18\x04 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x14\n\x0cobservations\x18\x05 \x01(\r\x12\x0c\n\x04text\x18\x06 \x01(\tR\x08sentence\"\xb8\x02\n\x10\x41pplicationStage\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12\x34\n\x05stage\x18\x02 \x01(\x0e\x32%.paramove.msgs.ApplicationStage.Stage\x12\x0c\n\x04step\x18\x03 \x01(\t\x12\x0e\n\x06\x64\x65tail\x18\x04 \x01(\t\x12\x0e\n\x06grasps\x18\x05 \x01(\r\x12\x0f\n\x07retries\x18\x06 \x01(\r\"w\n\x05Stage\x12\x15\n\x11STAGE_UNSPECIFIED\x10\x00\x12\x13\n\x0fSTAGE_CALIBRATE\x10\x01\x12\x0f\n\x0bSTAGE_LEARN\x10\x02\x12\x0f\n\x0bSTAGE_APPLY\x10\x03\x12\x0e\n\nSTAGE_DONE\x10\x04\x12\x10\n\x0cSTAGE_FAILED\x10\x05R\x08sentence\"\xfd\x02\n\x06Speech\x12,\n\x08\x63\x61ptured\x18\x01 \x01(\x0b\x32\x1a.google.protobuf.Timestamp\x12.\n\x07request\x18\x02 \x01(\x0e\x32\x1d.paramove.msgs.Speech.Request\x12\x0e\n\x06object\x18\x03 \x01(\t\x12\x0c\n\x04text\x18\x04 \x01(\t\"\xec\x01\n\x07Request\x12\x17\n\x13REQUEST_UNSPECIFIED\x10\x00\x12\x1d\n\x19REQUEST_HAND_ME_AN_OBJECT\x10\x01\x12\x12\n\x0eREQUEST_LET_GO\x10\x02\x12\x16\n\x12REQUEST_SHOW_RULES\x10\x03\x12\x1b\n\x17REQUEST_SHOW_RULE_AGAIN\x10\x04\x12\x1b\n\x17REQUEST_POINT_AT_OBJECT\x10\x05\x12\x10\n\x0cREQUEST_HELP\x10\x06\x12\x15\n\x11REQUEST_THANK_YOU\x10\x07\x12\x1a\n\x16REQUEST_POINT_AT_PLACE\x10\x08R\x08sentenceb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,14 +34,14 @@ if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_RULES']._serialized_start=76
   _globals['_RULES']._serialized_end=180
-  _globals['_RULE']._serialized_start=182
-  _globals['_RULE']._serialized_end=308
-  _globals['_APPLICATIONSTAGE']._serialized_start=311
-  _globals['_APPLICATIONSTAGE']._serialized_end=615
-  _globals['_APPLICATIONSTAGE_STAGE']._serialized_start=496
-  _globals['_APPLICATIONSTAGE_STAGE']._serialized_end=615
-  _globals['_SPEECH']._serialized_start=618
-  _globals['_SPEECH']._serialized_end=993
-  _globals['_SPEECH_REQUEST']._serialized_start=757
-  _globals['_SPEECH_REQUEST']._serialized_end=993
+  _globals['_RULE']._serialized_start=183
+  _globals['_RULE']._serialized_end=315
+  _globals['_APPLICATIONSTAGE']._serialized_start=318
+  _globals['_APPLICATIONSTAGE']._serialized_end=630
+  _globals['_APPLICATIONSTAGE_STAGE']._serialized_start=501
+  _globals['_APPLICATIONSTAGE_STAGE']._serialized_end=620
+  _globals['_SPEECH']._serialized_start=633
+  _globals['_SPEECH']._serialized_end=1014
+  _globals['_SPEECH_REQUEST']._serialized_start=768
+  _globals['_SPEECH_REQUEST']._serialized_end=1004
 # @@protoc_insertion_point(module_scope)

@@ -18,23 +18,23 @@ class Rules(_message.Message):
     def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., frame: _Optional[str] = ..., rules: _Optional[_Iterable[_Union[Rule, _Mapping]]] = ...) -> None: ...
 
 class Rule(_message.Message):
-    __slots__ = ("object", "x", "y", "seen", "observations", "sentence")
+    __slots__ = ("object", "x", "y", "seen", "observations", "text")
     OBJECT_FIELD_NUMBER: _ClassVar[int]
     X_FIELD_NUMBER: _ClassVar[int]
     Y_FIELD_NUMBER: _ClassVar[int]
     SEEN_FIELD_NUMBER: _ClassVar[int]
     OBSERVATIONS_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
     object: str
     x: float
     y: float
     seen: _timestamp_pb2.Timestamp
     observations: int
-    sentence: str
-    def __init__(self, object: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., seen: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., observations: _Optional[int] = ..., sentence: _Optional[str] = ...) -> None: ...
+    text: str
+    def __init__(self, object: _Optional[str] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., seen: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., observations: _Optional[int] = ..., text: _Optional[str] = ...) -> None: ...
 
 class ApplicationStage(_message.Message):
-    __slots__ = ("captured", "stage", "step", "sentence", "grasps", "retries")
+    __slots__ = ("captured", "stage", "step", "detail", "grasps", "retries")
     class Stage(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STAGE_UNSPECIFIED: _ClassVar[ApplicationStage.Stage]
@@ -52,19 +52,19 @@ class ApplicationStage(_message.Message):
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     STAGE_FIELD_NUMBER: _ClassVar[int]
     STEP_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
     GRASPS_FIELD_NUMBER: _ClassVar[int]
     RETRIES_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     stage: ApplicationStage.Stage
     step: str
-    sentence: str
+    detail: str
     grasps: int
     retries: int
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., stage: _Optional[_Union[ApplicationStage.Stage, str]] = ..., step: _Optional[str] = ..., sentence: _Optional[str] = ..., grasps: _Optional[int] = ..., retries: _Optional[int] = ...) -> None: ...
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., stage: _Optional[_Union[ApplicationStage.Stage, str]] = ..., step: _Optional[str] = ..., detail: _Optional[str] = ..., grasps: _Optional[int] = ..., retries: _Optional[int] = ...) -> None: ...
 
 class Speech(_message.Message):
-    __slots__ = ("captured", "request", "object", "sentence")
+    __slots__ = ("captured", "request", "object", "text")
     class Request(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         REQUEST_UNSPECIFIED: _ClassVar[Speech.Request]
@@ -88,9 +88,9 @@ class Speech(_message.Message):
     CAPTURED_FIELD_NUMBER: _ClassVar[int]
     REQUEST_FIELD_NUMBER: _ClassVar[int]
     OBJECT_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     request: Speech.Request
     object: str
-    sentence: str
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., request: _Optional[_Union[Speech.Request, str]] = ..., object: _Optional[str] = ..., sentence: _Optional[str] = ...) -> None: ...
+    text: str
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., request: _Optional[_Union[Speech.Request, str]] = ..., object: _Optional[str] = ..., text: _Optional[str] = ...) -> None: ...

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Iterable as _Iterable, Mapping as _Map
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SafetyState(_message.Message):
-    __slots__ = ("captured", "state", "faults", "limited_frames", "refused_trajectories")
+    __slots__ = ("captured", "state", "faults", "limited_frames", "rejected_trajectories")
     class State(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATE_UNSPECIFIED: _ClassVar[SafetyState.State]
@@ -29,23 +29,23 @@ class SafetyState(_message.Message):
     STATE_FIELD_NUMBER: _ClassVar[int]
     FAULTS_FIELD_NUMBER: _ClassVar[int]
     LIMITED_FRAMES_FIELD_NUMBER: _ClassVar[int]
-    REFUSED_TRAJECTORIES_FIELD_NUMBER: _ClassVar[int]
+    REJECTED_TRAJECTORIES_FIELD_NUMBER: _ClassVar[int]
     captured: _timestamp_pb2.Timestamp
     state: SafetyState.State
     faults: _containers.RepeatedCompositeFieldContainer[SafetyFault]
     limited_frames: int
-    refused_trajectories: int
-    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., state: _Optional[_Union[SafetyState.State, str]] = ..., faults: _Optional[_Iterable[_Union[SafetyFault, _Mapping]]] = ..., limited_frames: _Optional[int] = ..., refused_trajectories: _Optional[int] = ...) -> None: ...
+    rejected_trajectories: int
+    def __init__(self, captured: _Optional[_Union[_timestamp_pb2.Timestamp, _Mapping]] = ..., state: _Optional[_Union[SafetyState.State, str]] = ..., faults: _Optional[_Iterable[_Union[SafetyFault, _Mapping]]] = ..., limited_frames: _Optional[int] = ..., rejected_trajectories: _Optional[int] = ...) -> None: ...
 
 class SafetyFault(_message.Message):
-    __slots__ = ("code", "joint", "sentence")
+    __slots__ = ("code", "joint", "detail")
     CODE_FIELD_NUMBER: _ClassVar[int]
     JOINT_FIELD_NUMBER: _ClassVar[int]
-    SENTENCE_FIELD_NUMBER: _ClassVar[int]
+    DETAIL_FIELD_NUMBER: _ClassVar[int]
     code: str
     joint: str
-    sentence: str
-    def __init__(self, code: _Optional[str] = ..., joint: _Optional[str] = ..., sentence: _Optional[str] = ...) -> None: ...
+    detail: str
+    def __init__(self, code: _Optional[str] = ..., joint: _Optional[str] = ..., detail: _Optional[str] = ...) -> None: ...
 
 class ArmRequest(_message.Message):
     __slots__ = ("captured", "source", "armed", "reason", "by_person")

@@ -69,9 +69,9 @@ class BodyTracking:
             for views in self._views.add(camera, captured_ns, image):
                 yield self._located(views)
 
-    def cannot_see(self, camera: str, captured_ns: int, why: str) -> None:
+    def add_unreadable(self, camera: str, captured_ns: int, why: str) -> None:
         """Reports an image that could not be decoded."""
-        self._watch.refuse(camera, captured_ns, why)
+        self._watch.reject(camera, captured_ns, why)
 
     def tick(self, now_ns: int) -> None:
         """Advances the time, with images or without."""

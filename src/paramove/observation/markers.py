@@ -13,12 +13,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from paramove.cameras import MARKERS, SIZE_UNTOLD_ID, WORLD_FRAME, CalibratedCamera, StereoRig, dictionary
+from paramove.cameras import MARKERS, UNSIZED_BOARD_ID, WORLD_FRAME, CalibratedCamera, StereoRig, dictionary
 from paramove.documents import Floats, Image, InputError
 from paramove.msgs.arm_pose_pb2 import ArmPose
 from paramove.objects import Colour, ColourTracker
 
-BOARD_IDS = SIZE_UNTOLD_ID + MARKERS
+BOARD_IDS = UNSIZED_BOARD_ID + MARKERS
 """Smaller ids are those of calibration boards, which may lie on the table at the same time."""
 MIN_SIDE, MAX_SIDE = 0.005, 0.15
 """m. A marker reconstructed with sides outside these limits was a wrong match."""

@@ -26,9 +26,9 @@ class Operator:
 
     def __init__(self, arms_at_start: bool, restarted: bool = False) -> None:
         self._to_arm = arms_at_start and not restarted
-        self.sentence = "arms once at the start" if arms_at_start else "does not arm"
+        self.detail = "arms once at the start" if arms_at_start else "does not arm"
         if arms_at_start and restarted:
-            self.sentence = "does not arm: it was started before in this run, so only a person arms"
+            self.detail = "does not arm: it was started before in this run, so only a person arms"
         self._requested_ns: int | None = None
 
     def update(self, safety: SafetyState, now_ns: int) -> ArmRequest | None:

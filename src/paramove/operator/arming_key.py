@@ -19,7 +19,7 @@ class ArmingKey:
     """
 
     def __init__(self) -> None:
-        self.sentence = ""
+        self.detail = ""
         self._gate = SafetyState()
         self._stopped_ns = 0
         self._pressed_s: float | None = None
@@ -42,29 +42,29 @@ class ArmingKey:
             return
         before, self._gate = self._gate.state, gate
         if gate.state == SafetyState.STATE_ARMED and self._requested_s is not None:
-            self.sentence, self._requested_s = "armed", None
+            self.detail, self._requested_s = "armed", None
         elif self._requested_s is not None and self._faults not in ("", self._faults_before):
-            self.refuse(self._faults)
+            self.reject(self._faults)
         elif before != gate.state and self._faults and self._requested_s is None:
-            self.sentence = self._faults
+            self.detail = self._faults
 
     def tick(self, now_s: float) -> bool:
         """Whether to send the arming request now."""
         if self._requested_s is not None and now_s - self._requested_s > ANSWER_TIMEOUT_S:
-            self.refuse(self._faults or f"no answer within {ANSWER_TIMEOUT_S:g} s; press a again")
+            self.reject(self._faults or f"no answer within {ANSWER_TIMEOUT_S:g} s; press a again")
         if self._pressed_s is None:
             return False
         if self._gate.state in ACCEPTING:
             self._pressed_s, self._requested_s = None, now_s
-            self._faults_before, self.sentence = self._faults, "checking the servos"
+            self._faults_before, self.detail = self._faults, "checking the servos"
             return True
-        self.sentence = "the arm is still stopping: it is armed once it rests"
+        self.detail = "the arm is still stopping: it is armed once it rests"
         if self._gate.state == SafetyState.STATE_ARMED:
-            self.sentence, self._pressed_s = "already armed", None
+            self.detail, self._pressed_s = "already armed", None
         elif self._gate.state != SafetyState.STATE_STOPPING:
-            self.refuse(self._faults or "no data from the safety gate")
+            self.reject(self._faults or "no data from the safety gate")
         elif now_s - self._pressed_s > PRESS_VALID_S:
-            self.refuse(f"the arm has not come to rest within {PRESS_VALID_S:g} s; press a again once it does")
+            self.reject(f"the arm has not come to rest within {PRESS_VALID_S:g} s; press a again once it does")
         return False
 
     def stopped(self, answer: SafetyState) -> None:
@@ -75,11 +75,11 @@ class ArmingKey:
         """Cancels a press, because a stop was requested."""
         self._pressed_s = self._requested_s = None
 
-    def refuse(self, why: str) -> None:
+    def reject(self, why: str) -> None:
         """Reports why the arm is not armed, and cancels the press."""
-        self.sentence = f"not armed: {why}"
+        self.detail = f"not armed: {why}"
         self.cancel()
 
     @property
     def _faults(self) -> str:
-        return "; ".join(fault.sentence for fault in self._gate.faults)
+        return "; ".join(fault.detail for fault in self._gate.faults)

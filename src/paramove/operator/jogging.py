@@ -13,7 +13,7 @@ FASTEST = float(np.deg2rad(10.0))
 POINTS = 21
 OVERDUE_S = 2.0
 """Beyond the time of a step: the driver waits a second for joints that do not arrive."""
-OVER = (TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REFUSED)
+OVER = (TrajectoryStatus.STATE_SUCCEEDED, TrajectoryStatus.STATE_STOPPED, TrajectoryStatus.STATE_REJECTED)
 
 
 class Jogging:
@@ -32,7 +32,7 @@ class Jogging:
     def __init__(self, name: str, step: float) -> None:
         self.chosen = 0
         self.angles: dict[str, float] = {}
-        self.sentence = ""
+        self.detail = ""
         self._name, self._step = name, step
         self._count = 0
         self._goals: dict[str, float] = {}
@@ -65,15 +65,15 @@ class Jogging:
             return
         self._waits_for = ""
         if message.state == TrajectoryStatus.STATE_SUCCEEDED:
-            self.sentence = "there"
+            self.detail = "there"
         else:
             self._goals.clear()  # the joint is not at the goal of the last step
-            self.sentence = message.reason
+            self.detail = message.reason
 
     def tick(self, now_ns: int) -> None:
         """Gives up a step whose end the driver does not report, because it was restarted."""
         if self.is_moving and now_ns > self._overdue_ns:
-            self._waits_for, self.sentence = "", "no status of this step from the arm's driver: was it restarted?"
+            self._waits_for, self.detail = "", "no status of this step from the arm's driver: was it restarted?"
             self._goals.clear()
 
     def step(self, direction: int, now_ns: int) -> JointTrajectory | None:
@@ -88,7 +88,7 @@ class Jogging:
         end = begin + direction * self._step
         self._goals = {self.joint: end}
         self._count += 1
-        self._waits_for, self.sentence = f"{self._name}-{self._count}", "moving"
+        self._waits_for, self.detail = f"{self._name}-{self._count}", "moving"
         message = JointTrajectory(id=self._waits_for, joints=[self.joint])
         message.captured.FromNanoseconds(now_ns)
         phase = np.linspace(0.0, 1.0, POINTS)

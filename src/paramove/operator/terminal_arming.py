@@ -16,7 +16,7 @@ TERMINAL = "terminal"
 """Source of the request."""
 
 
-def arm_by_word(folder: Path, armed: bool, timeout_s: float) -> SafetyState | None:
+def request_arming(folder: Path, armed: bool, timeout_s: float) -> SafetyState | None:
     """Publishes one request to arm or disarm and waits for the gate's answer.
 
     It is not repeated: a repetition could arm an arm that a fault has just stopped.
@@ -54,7 +54,7 @@ def obeyed(state: SafetyState, armed: bool) -> bool:
 
 
 def _faults(state: SafetyState) -> list[str]:
-    return [fault.sentence for fault in state.faults]
+    return [fault.detail for fault in state.faults]
 
 
 def _until(

@@ -15,5 +15,5 @@ from .self_collision import SelfCollision as SelfCollision
 from .stopping import longest_path_s as longest_path_s
 from .stopping import stop_ramp as stop_ramp
 from .stopping import straight_move as straight_move
-from .trajectory_check import TrajectoryRefusedError as TrajectoryRefusedError
+from .trajectory_check import TrajectoryRejectedError as TrajectoryRejectedError
 from .trajectory_check import check_trajectory as check_trajectory

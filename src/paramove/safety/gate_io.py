@@ -31,7 +31,7 @@ class Fault:
 
     code: str
     joint: str
-    sentence: str
+    detail: str
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ MAX_DETOUR = np.deg2rad(1.0)
 FADE_S = 0.5
 
 
-class TrajectoryRefusedError(ValueError):
+class TrajectoryRejectedError(ValueError):
     """A trajectory that will not be played.
 
     Attributes:
@@ -82,7 +82,7 @@ def check_trajectory(
     segment, column, detour = largest_detour(times, points)
     if detour > MAX_DETOUR:
         allowed = f"{np.rad2deg(MAX_DETOUR):.3g} deg between points; give points closer together"
-        raise TrajectoryRefusedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
+        raise TrajectoryRejectedError("detour", segment, joints[column], f"{np.rad2deg(detour):.3g} deg", allowed)
     moving = sample_path(times, points, limits.dt_s)
     moving += _fade(len(moving), limits.dt_s)[:, None] * (commanded[indices] - points[0])
     rows = np.repeat(commanded[None], len(moving), axis=0)
@@ -93,45 +93,45 @@ def check_trajectory(
 
 def _indices(joints: Sequence[str], limits: MotionLimits) -> NDArray[np.intp]:
     if not joints:
-        raise TrajectoryRefusedError("joints", -1, "", "no joints", "at least one")
+        raise TrajectoryRejectedError("joints", -1, "", "no joints", "at least one")
     for joint in joints:
         if joint not in limits.names:
-            raise TrajectoryRefusedError("joints", -1, joint, "an unknown joint", ", ".join(limits.names))
+            raise TrajectoryRejectedError("joints", -1, joint, "an unknown joint", ", ".join(limits.names))
         if list(joints).count(joint) > 1:
-            raise TrajectoryRefusedError("joints", -1, joint, "the joint twice", "once")
+            raise TrajectoryRejectedError("joints", -1, joint, "the joint twice", "once")
     return np.array([limits.names.index(joint) for joint in joints], dtype=np.intp)
 
 
 def _points(joints: Sequence[str], positions: Sequence[Sequence[float]]) -> Floats:
     if len(positions) < 2:
-        raise TrajectoryRefusedError("times", -1, "", f"{len(positions)} points", "at least 2")
+        raise TrajectoryRejectedError("times", -1, "", f"{len(positions)} points", "at least 2")
     for index, point in enumerate(positions):
         if len(point) != len(joints):
-            raise TrajectoryRefusedError("joints", index, "", f"{len(point)} angles", f"{len(joints)}")
+            raise TrajectoryRejectedError("joints", index, "", f"{len(point)} angles", f"{len(joints)}")
     points = np.array([list(point) for point in positions], dtype=np.float64)
     bad = np.argwhere(~np.isfinite(points))
     if len(bad):
         index, column = (int(i) for i in bad[0])
-        raise TrajectoryRefusedError("not_finite", index, joints[column], f"{points[index, column]}", "finite angles")
+        raise TrajectoryRejectedError("not_finite", index, joints[column], f"{points[index, column]}", "finite angles")
     return points
 
 
 def _times(times_s: ArrayLike, n_points: int) -> Floats:
     times = np.asarray(times_s, dtype=np.float64)
     if times.shape != (n_points,):
-        raise TrajectoryRefusedError("times", -1, "", f"{times.size} times", f"{n_points}, one a point")
+        raise TrajectoryRejectedError("times", -1, "", f"{times.size} times", f"{n_points}, one a point")
     if not np.isfinite(times).all():
         index = int(np.argmin(np.isfinite(times)))
-        raise TrajectoryRefusedError("not_finite", index, "", f"time {times[index]} s", "finite times")
+        raise TrajectoryRejectedError("not_finite", index, "", f"time {times[index]} s", "finite times")
     if times[0] != 0.0:
-        raise TrajectoryRefusedError("times", 0, "", f"{times[0]:.6g} s", "0 s at the first point")
+        raise TrajectoryRejectedError("times", 0, "", f"{times[0]:.6g} s", "0 s at the first point")
     steps = np.diff(times)
     if (steps <= 0).any():
         index = int(np.argmax(steps <= 0)) + 1
         requested = f"{times[index]:.6g} s after {times[index - 1]:.6g} s"
-        raise TrajectoryRefusedError("times", index, "", requested, "times that increase strictly")
+        raise TrajectoryRejectedError("times", index, "", requested, "times that increase strictly")
     if times[-1] > MAX_DURATION_S:
-        raise TrajectoryRefusedError("times", n_points - 1, "", f"{times[-1]:.6g} s", f"up to {MAX_DURATION_S:g} s")
+        raise TrajectoryRejectedError("times", n_points - 1, "", f"{times[-1]:.6g} s", f"up to {MAX_DURATION_S:g} s")
     return times
 
 
@@ -152,12 +152,14 @@ def _check_points(
     if len(outside):
         index, column = (int(i) for i in outside[0])
         allowed = f"{lower[column]:.4g} to {upper[column]:.4g} deg"
-        raise TrajectoryRefusedError("joint_limit", index, joints[column], f"{degrees[index, column]:.4g} deg", allowed)
+        raise TrajectoryRejectedError(
+            "joint_limit", index, joints[column], f"{degrees[index, column]:.4g} deg", allowed
+        )
     away = np.abs(points[0] - held)
     if (away > tolerance).any():
         column = int(np.argmax(np.where(away > tolerance, away, 0.0)))
         allowed = f"within {np.rad2deg(tolerance[column]):.3g} deg of the commanded {_deg(held[column])}"
-        raise TrajectoryRefusedError("start", 0, joints[column], _deg(points[0, column]), allowed)
+        raise TrajectoryRejectedError("start", 0, joints[column], _deg(points[0, column]), allowed)
 
 
 def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLimits) -> None:
@@ -167,7 +169,7 @@ def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLi
     row_time = min(violation.row * limits.dt_s, times[-1])
     index = int(np.searchsorted(times, row_time, side="left"))
     requested = f"{violation.requested:.4g} {violation.unit}"
-    raise TrajectoryRefusedError(violation.code, index, violation.joint, requested, violation.allowed)
+    raise TrajectoryRejectedError(violation.code, index, violation.joint, requested, violation.allowed)
 
 
 def _fade(n_rows: int, dt_s: float) -> Floats:

@@ -142,7 +142,7 @@ class SupervisedNode:
         if self.state in (State.STOPPING, State.SUSPENDED):
             return
         state = _STATE_OF_STATUS.get(status.state, self.state)
-        message = printable(status.sentence)
+        message = printable(status.detail)
         if state is self.state:
             self.detail = message
             return
@@ -196,7 +196,7 @@ class SupervisedNode:
             if timeout_s is not None and now_s >= self._suspended_s + timeout_s:
                 return f"was stopped (SIGSTOP) for {timeout_s:g} s"
             return ""
-        last = printable(self.status.sentence) or "none"
+        last = printable(self.status.detail) or "none"
         if self.state is State.STARTING and now_s >= self._deadline_s:
             return f"was not ready within {settings.ready_timeout_s:g} s, last message: {last}"
         if self.state in _AT_WORK and self._no_status_s >= (settings.silent_timeout_s or float("inf")):
@@ -215,9 +215,9 @@ class SupervisedNode:
             self._conclude_by_hand(code, now_s)
             return
         self._end = self._killed_for or describe(code)
-        has_reason = self.status.state == NodeStatus.STATE_STOPPED and self.status.sentence not in USUAL_ENDS
+        has_reason = self.status.state == NodeStatus.STATE_STOPPED and self.status.detail not in USUAL_ENDS
         if not self._killed_for and (has_reason or self.status.state == NodeStatus.STATE_FAILED):
-            self._end += f" ({printable(self.status.sentence)})"
+            self._end += f" ({printable(self.status.detail)})"
         verdict = self._policy.after_exit(FAILURE if self._killed_for else code, now_s)
         if self.settings.restart_ends_run and self.restarts > 0 and not self.came_back:
             verdict = Verdict(None, True, "it did not come back")

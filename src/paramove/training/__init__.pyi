@@ -21,12 +21,12 @@ from .pictures import plot_synthesis as plot_synthesis
 from .pictures import state_seconds as state_seconds
 from .pictures import title_of as title_of
 from .recognition_pictures import plot_recognition as plot_recognition
-from .report import left_out_sentences as left_out_sentences
+from .report import cross_validation_rows as cross_validation_rows
 from .report import sentences as sentences
 from .report import write_training_report as write_training_report
 from .training import Make as Make
 from .training import Trained as Trained
 from .training import checksum as checksum
-from .training import told_of as told_of
 from .training import train_and_write as train_and_write
+from .training import training_facts as training_facts
 from .training import with_check as with_check

@@ -53,13 +53,13 @@ def sentences(facts: dict[str, Any]) -> list[tuple[str, str]]:
             f"frame, {facts['seconds']:.1f} s",
         ))  # fmt: skip
     if facts["left_out"]:
-        rows += left_out_sentences(facts["left_out"])
+        rows += cross_validation_rows(facts["left_out"])
     if facts["file"]:
         rows.append(("written", facts["file"]))
     return rows
 
 
-def left_out_sentences(left: dict[str, Any]) -> list[tuple[str, str]]:
+def cross_validation_rows(left: dict[str, Any]) -> list[tuple[str, str]]:
     """Result of cross-validation, as names and values for people."""
     group = {"theta": "each theta", "subject": "each person", "repetition": "each repetition"}[left["left_out"]]
     if "theta_median_m" in left:

@@ -115,7 +115,7 @@ def with_check(trained: Trained, make: Make, by: LeftOutBy, finished: Callable[[
     return checked
 
 
-def told_of(file: Path) -> dict[str, Any] | None:
+def training_facts(file: Path) -> dict[str, Any] | None:
     """Facts that were written when the model in a file was trained; None if they are missing or of another file."""
     facts_file = file.with_suffix(FACTS_ENDING)
     try:

@@ -220,7 +220,7 @@ def test_estop_believes_the_gate_alone(desk, monkeypatch, answer, code):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(desk.data.parent))
     monkeypatch.delenv("PARAMOVE_DOMAIN", raising=False)
     (desk.data.parent / "paramove" / "default").mkdir(parents=True)
-    fault = SafetyFault(code=PERSON_STOP, sentence="stopped from the terminal by a person")
+    fault = SafetyFault(code=PERSON_STOP, detail="stopped from the terminal by a person")
     state = None if answer is None else SafetyState(state=answer, faults=[fault])
     monkeypatch.setattr("paramove.operator.stop_arm", lambda folder, source, timeout_s: state)
     done = CliRunner().invoke(build("arm"), ["arm", "estop"])

@@ -14,7 +14,7 @@ from paramove.cli.arm.terminal_person import TerminalPerson
 from paramove.cli.main import build
 from paramove.msgs.safety_state_pb2 import SafetyFault, SafetyState
 
-FAULTS = [SafetyFault(code=str(number), sentence=f"reason {number}") for number in (1, 2)]
+FAULTS = [SafetyFault(code=str(number), detail=f"reason {number}") for number in (1, 2)]
 ANSWERS = {
     "armed": SafetyState(state=SafetyState.STATE_ARMED),
     "disarmed": SafetyState(state=SafetyState.STATE_DISARMED),
@@ -31,13 +31,13 @@ def words(tmp_path, monkeypatch):
     (tmp_path / "paramove" / "default").mkdir(parents=True)
     told = {"answer": "armed", "words": []}
 
-    def arm_by_word(folder, armed, timeout_s):
+    def request_arming(folder, armed, timeout_s):
         told["words"].append(armed)
         if told["answer"] == "taken":
             raise TopicTakenError("operator says operator/arm already")
         return ANSWERS[told["answer"]]
 
-    monkeypatch.setattr("paramove.operator.arm_by_word", arm_by_word)
+    monkeypatch.setattr("paramove.operator.request_arming", request_arming)
     monkeypatch.setattr(TerminalPerson, "is_at_terminal", True)
     return told
 
@@ -55,7 +55,7 @@ def test_arming_asks_first(words, line, code, heard):
 
 
 @pytest.mark.parametrize(
-    ("answer", "code", "sentence"),
+    ("answer", "code", "detail"),
     [
         ("refused", 3, "hold, not armed: reason 1; reason 2"),
         ("disarmed", 69, "disarmed, not armed: the arm's driver does not answer"),
@@ -63,11 +63,11 @@ def test_arming_asks_first(words, line, code, heard):
         ("taken", 75, "only one program may arm an arm; stop that one first; `paramove arm estop` stops the arm"),
     ],
 )
-def test_what_keeps_it_from_arming_is_told(words, answer, code, sentence):
+def test_what_keeps_it_from_arming_is_told(words, answer, code, detail):
     words["answer"] = answer
     done = said("enable", "--yes")
     assert done.exit_code == code
-    assert sentence in done.stderr
+    assert detail in done.stderr
     assert "ARMED" not in done.stdout
 
 

@@ -29,7 +29,7 @@ from paramove.safety.gate_io import PERSON_STOP
 from tests.supervision.test_unread_terminal import stopped_terminal
 
 SUBSCRIBES = (topics.ARM_TRAJECTORY, topics.OPERATOR_ARM, *topics.STOPS)
-STOPPED = SafetyFault(code=PERSON_STOP, sentence="stopped by a person")
+STOPPED = SafetyFault(code=PERSON_STOP, detail="stopped by a person")
 PUBLISHES = (topics.ARM_JOINT_STATES, topics.ARM_TRAJECTORY_STATUS, topics.ARM_SAFETY)
 
 

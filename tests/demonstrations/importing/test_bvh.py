@@ -100,7 +100,7 @@ def test_position_channels_stand_in_place_of_the_offset(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "detail"),
     [
         ("HIERARCHY", "HIERARCHIE", r"take.bvh:1: 'HIERARCHIE'; expected HIERARCHY"),
         ("JOINT Elbow", "JOINT Hips", "take.bvh:10: a second joint 'Hips'"),
@@ -114,20 +114,20 @@ def test_position_channels_stand_in_place_of_the_offset(tmp_path):
         ("End Site", "End", "expected Site"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path, old, new, sentence):
+def test_what_is_wrong_is_told_with_its_line(tmp_path, old, new, detail):
     assert old in ARM
-    with pytest.raises(DemonstrationError, match=sentence):
+    with pytest.raises(DemonstrationError, match=detail):
         read_bvh(write(tmp_path, ARM.replace(old, new, 1)))
 
 
 def test_cut_anywhere_it_is_refused_with_a_line_or_whole():
     whole = parse(ARM, "whole").values
-    refused = 0
+    rejected = 0
     for at in range(len(ARM)):
         try:
             values = parse(ARM[:at], "cut").values
         except DemonstrationError:
-            refused += 1
+            rejected += 1
         else:
             assert (values.ravel()[:-1] == whole.ravel()[:-1]).all()  # of the last number digits may be missing
-    assert refused >= len(ARM) - 3
+    assert rejected >= len(ARM) - 3

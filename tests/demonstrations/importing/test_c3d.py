@@ -54,10 +54,10 @@ def test_lost_markers_are_named_filled_or_refused(tmp_path, points):
     label = Label(0, 0, "reach", (), "Anna")
     found = import_file(path, ImportOptions(), label)
     assert found.takes[0].labels == ()
-    (sentence,) = found.refused
-    assert "take.c3d: reach, frames 0-59: lost for longer than 0.1 s: Anna:RFIN in frames 30-41 (0.12 s)" in sentence
+    (detail,) = found.rejected
+    assert "take.c3d: reach, frames 0-59: lost for longer than 0.1 s: Anna:RFIN in frames 30-41 (0.12 s)" in detail
     found = import_file(path, ImportOptions(), label, max_gap=0.2)
-    assert found.refused == ()
+    assert found.rejected == ()
     assert "filled Anna:RELB in frames 10-13 (0.04 s); Anna:RFIN in frames 30-41" in found.remarks[0]
     assert [(one.first, one.end) for one in found.takes[0].labels] == [(0, 60)]
 

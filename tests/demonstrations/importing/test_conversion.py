@@ -69,7 +69,7 @@ def test_targets_are_converted_with_the_points():
 
 
 @pytest.mark.parametrize(
-    ("changes", "options", "sentence"),
+    ("changes", "options", "detail"),
     [
         ({}, {}, "take.csv does not define its unit; give --unit m, cm, mm"),
         ({"unit": "inch"}, {}, "the unit is 'inch'; give --unit"),
@@ -78,8 +78,8 @@ def test_targets_are_converted_with_the_points():
         ({"unit": "m"}, {"points": {"index": ("C",)}}, "has no point 'C' for index"),
     ],
 )
-def test_what_is_missing_is_told_with_its_option(changes, options, sentence):
-    with pytest.raises(DemonstrationError, match=sentence):
+def test_what_is_missing_is_told_with_its_option(changes, options, detail):
+    with pytest.raises(DemonstrationError, match=detail):
         converted(raw(**changes), ImportOptions(**options), FILE)
 
 
@@ -110,7 +110,7 @@ def test_a_mapping_file(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "detail"),
     [
         ("units: mm", r"mapping.yaml:1:1: units: did you mean 'unit'\?"),
         ("unit: inch", "mapping.yaml:1:1: unit: Input should be 'm', 'cm' or 'mm'"),
@@ -119,10 +119,10 @@ def test_a_mapping_file(tmp_path):
         ("points: {index: [}", "mapping.yaml:1:"),
     ],
 )
-def test_a_wrong_mapping_file_is_told_with_its_place(tmp_path, text, sentence):
+def test_a_wrong_mapping_file_is_told_with_its_place(tmp_path, text, detail):
     path = tmp_path / "mapping.yaml"
     path.write_text(text)
-    with pytest.raises(DemonstrationError, match=sentence):
+    with pytest.raises(DemonstrationError, match=detail):
         read_mapping_file(path)
 
 

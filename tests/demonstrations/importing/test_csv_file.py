@@ -51,7 +51,7 @@ def test_float64_is_kept_bit_by_bit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "detail"),
     [
         ("wrist_y", "wrist", "take.csv:1: column 3 is called 'wrist'; expected wrist_x, wrist_y, wrist_z"),
         ("index_z", "index_y", "take.csv:1: column 7 is called 'index_y'"),
@@ -61,8 +61,8 @@ def test_float64_is_kept_bit_by_bit(tmp_path):
         (",index_z", "", r"take.csv:1: index_z is missing|take.csv:2: 7 cells"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(tmp_path, old, new, sentence):
-    with pytest.raises(DemonstrationError, match=sentence):
+def test_what_is_wrong_is_told_with_its_line(tmp_path, old, new, detail):
+    with pytest.raises(DemonstrationError, match=detail):
         read_csv(write(tmp_path, GOOD.replace(old, new, 1)))
 
 

@@ -66,7 +66,7 @@ def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("changes", "detail"),
     [
         ({"points": ["wrist"]}, "positions have shape"),
         ({"rate_hz": None, "time": np.arange(9)}, "10 frames have times of shape"),
@@ -74,14 +74,14 @@ def test_what_the_file_marks_as_unusable_is_left_out_and_told(tmp_path):
         ({"positions": np.array([None, None])}, "found pickled objects"),
     ],
 )
-def test_arrays_that_do_not_fit(tmp_path, changes, sentence):
+def test_arrays_that_do_not_fit(tmp_path, changes, detail):
     arrays = {key: value for key, value in (ONE | changes).items() if value is not None}
-    with pytest.raises(DemonstrationError, match=sentence):
+    with pytest.raises(DemonstrationError, match=detail):
         import_file(write(tmp_path, arrays), ImportOptions())
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("changes", "detail"),
     [
         ({"segment": np.array([[2, 99], [0, 10], [1, 10]])}, "movement 0 has the segment 2 to 99 of 10 frames"),
         ({"flat_time": np.arange(7)}, "its arrays do not fit together"),
@@ -89,9 +89,9 @@ def test_arrays_that_do_not_fit(tmp_path, changes, sentence):
         ({"segment": None}, "the array 'segment' is missing"),
     ],
 )
-def test_many_that_do_not_fit(tmp_path, changes, sentence):
+def test_many_that_do_not_fit(tmp_path, changes, detail):
     arrays = {key: value for key, value in (MANY | changes).items() if value is not None}
-    with pytest.raises(DemonstrationError, match=sentence):
+    with pytest.raises(DemonstrationError, match=detail):
         import_file(write(tmp_path, arrays), ImportOptions())
 
 

@@ -98,4 +98,4 @@ def test_batches_that_come_late_make_the_guard_longer(late: int, arrives: bool) 
     rig.send("reach", GOAL, duration_s=1.2)
     rig.run_until_rest()
     assert (rig.statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED) == arrives, rig.statuses[-1].reason
-    assert rig.robot.reader.refused_batches <= 1 or late > 0
+    assert rig.robot.reader.rejected_batches <= 1 or late > 0

@@ -15,7 +15,7 @@ from tests.robots.hoap3.movements import HOAP3
 from tests.robots.streaming.fake_robot import TICK_NS, Rig, armed, trajectory
 
 GOAL = {"right_shoulder_pitch": 40.0, "right_elbow": -70.0, "right_wrist": 30.0, "right_fingers": 20.0}
-ACCEPTED, EXECUTING, SUCCEEDED, STOPPED, REFUSED = range(1, 6)
+ACCEPTED, EXECUTING, SUCCEEDED, STOPPED, REJECTED = range(1, 6)
 
 
 def expect_within_limits(rig: Rig) -> None:
@@ -35,7 +35,7 @@ def test_disarmed_at_the_start_and_sends_nothing() -> None:
     assert [joint.name for joint in output.joint_states.joints] == list(HOAP3.joint_names)
     rig.send("early", GOAL)
     rig.tick()
-    assert rig.statuses[-1].state == REFUSED
+    assert rig.statuses[-1].state == REJECTED
     assert "only while armed" in rig.statuses[-1].reason
 
 
@@ -52,7 +52,7 @@ def test_a_trajectory_is_played_to_its_end_and_the_rest_of_the_body_keeps_its_po
     np.testing.assert_array_equal(rig.robot.reader.target, HOAP3.units.to_counts(expected))
     still = np.setdiff1d(np.arange(28), HOAP3.indices(GOAL))
     assert (np.array(rig.robot.played)[:, still] == HOAP3.units.to_counts(HOAP3.base_pose)[still]).all()
-    assert rig.robot.reader.refused_batches == 0
+    assert rig.robot.reader.rejected_batches == 0
     expect_within_limits(rig)
 
 
@@ -119,7 +119,7 @@ def test_an_under_run_is_latched_until_somebody_arms_again() -> None:
     assert "ran out of rows" in rig.statuses[-1].reason
     rig.send("two", GOAL)
     rig.tick()
-    assert rig.statuses[-1].state == REFUSED
+    assert rig.statuses[-1].state == REJECTED
     rig.arm()
     assert rig.driver.state is State.ARMED
 
@@ -169,7 +169,7 @@ def test_a_trajectory_from_the_future_is_refused_like_an_old_one(ahead_s: float,
     rig = armed()
     rig.driver.on_trajectory(trajectory("one", GOAL, 1.0), rig.now_ns + TICK_NS + round(ahead_s * 1e9))
     rig.tick()
-    assert (rig.statuses[-1].state != REFUSED) is accepted
+    assert (rig.statuses[-1].state != REJECTED) is accepted
     assert accepted or (rig.statuses[-1].code, "age -" in rig.statuses[-1].reason) == ("stale", True)
 
 
@@ -198,11 +198,11 @@ def test_trajectories_that_cannot_be_played_are_refused(change: dict, reason: st
     goal = {**GOAL, **change.pop("goal_deg", {})}
     rig.send("bad", goal, **change)
     rig.tick()
-    assert rig.statuses[-1].state == REFUSED
+    assert rig.statuses[-1].state == REJECTED
     assert reason in rig.statuses[-1].reason
     assert rig.output is not None
     assert rig.output.stream is None
-    assert rig.output.safety.refused_trajectories == 1
+    assert rig.output.safety.rejected_trajectories == 1
 
 
 def test_old_trajectories_are_refused() -> None:
@@ -248,4 +248,4 @@ def test_whatever_is_lost_the_robot_moves_smoothly(pattern: list[str]) -> None:
 
 
 def test_states_of_the_status_are_those_of_the_message() -> None:
-    assert (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_REFUSED) == (ACCEPTED, REFUSED)
+    assert (TrajectoryStatus.STATE_ACCEPTED, TrajectoryStatus.STATE_REJECTED) == (ACCEPTED, REJECTED)

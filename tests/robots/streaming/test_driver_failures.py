@@ -15,10 +15,10 @@ from tests.robots.streaming.fake_robot import Rig, trajectory
 from tests.robots.streaming.test_driver import GOAL, armed, expect_within_limits
 
 NAN = float("nan")
-SUCCEEDED, STOPPED, REFUSED = (
+SUCCEEDED, STOPPED, REJECTED = (
     TrajectoryStatus.STATE_SUCCEEDED,
     TrajectoryStatus.STATE_STOPPED,
-    TrajectoryStatus.STATE_REFUSED,
+    TrajectoryStatus.STATE_REJECTED,
 )
 
 
@@ -66,7 +66,7 @@ def test_restarted_in_motion_it_is_disarmed_and_goes_on_from_rest_once_a_person_
     rig.run_until_rest()
     assert rig.statuses[-1].state == SUCCEEDED
     np.testing.assert_array_equal(rig.robot.reader.target, HOAP3.units.to_counts(HOAP3.base_pose))
-    assert rig.robot.reader.refused_batches == 0
+    assert rig.robot.reader.rejected_batches == 0
     expect_within_limits(rig)
 
 
@@ -92,11 +92,11 @@ def test_stopped_for_a_second_in_motion_it_holds_and_drops_what_waited() -> None
         rig.tick()
     assert rig.driver.state is State.HOLD
     assert rig.output is not None
-    assert "stalled for 1.0" in rig.output.safety.faults[0].sentence
+    assert "stalled for 1.0" in rig.output.safety.faults[0].detail
     assert rig.output.safety.faults[0].code == "driver_stalled"
-    assert "arm again" in rig.output.safety.faults[0].sentence
+    assert "arm again" in rig.output.safety.faults[0].detail
     said = {status.trajectory_id: status for status in rig.statuses}
-    assert (said["queued"].state, said["queued"].code) == (REFUSED, "stale")
+    assert (said["queued"].state, said["queued"].code) == (REJECTED, "stale")
     assert said["one"].state == STOPPED
     rig.driver.on_trajectory(from_where_it_is(rig, "later"), rig.now_ns)
     rig.tick()
@@ -197,7 +197,7 @@ def test_empty_and_impossible_trajectories_are_refused_and_never_read_as_zero(
         output = rig.tick()
         assert output is not None
         assert output.stream is None
-    assert (rig.statuses[-1].state, rig.statuses[-1].code) == (REFUSED, code)
+    assert (rig.statuses[-1].state, rig.statuses[-1].code) == (REJECTED, code)
     assert "allowed" in rig.statuses[-1].reason
     np.testing.assert_array_equal(rig.robot.reader.target, HOAP3.units.to_counts(HOAP3.base_pose))
 
@@ -205,7 +205,7 @@ def test_empty_and_impossible_trajectories_are_refused_and_never_read_as_zero(
 def test_empty_words_and_batches_move_nothing() -> None:
     rig = armed()
     assert not rig.robot.reader.offer(StreamBatch())
-    assert "epoch 0" in rig.robot.reader.refusal
+    assert "epoch 0" in rig.robot.reader.rejection
     rig.driver.on_robot_state(Hoap3State(), rig.now_ns)
     assert rig.driver.state is State.ARMED
     rig.driver.on_arm_request(ArmRequest(), rig.now_ns + 1)

@@ -118,10 +118,10 @@ def test_rows_of_another_period_are_driven_by_the_same_driver(period_us: int) ->
         statuses += output.statuses
         if output.stream is not None:
             assert output.stream.period_us == period_us
-            assert reader.offer(output.stream), reader.refusal
+            assert reader.offer(output.stream), reader.rejection
         played += [reader.play() for _ in range(40_000 // period_us)]
     assert statuses[-1].state == TrajectoryStatus.STATE_SUCCEEDED, statuses[-1].reason
-    assert reader.refused_batches == 0
+    assert reader.rejected_batches == 0
     steps = np.abs(np.diff(np.array(played, dtype=np.float64), axis=0))
     period_s = period_us * 1e-6
     per_rad = np.abs(robot.units.counts_per_rad)

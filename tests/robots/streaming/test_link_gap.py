@@ -64,7 +64,7 @@ class LinkedRig(Rig):
 
 
 @pytest.mark.parametrize(
-    ("to_robot", "to_driver", "code", "sentence"),
+    ("to_robot", "to_driver", "code", "detail"),
     [
         (True, False, "stream_under_run", "the robot ran out of rows after "),
         (True, True, "robot_silent", "no data from the robot for 533 ms, allowed 500 ms"),
@@ -78,7 +78,7 @@ class LinkedRig(Rig):
     ids=["to the robot", "both ways", "to the driver"],
 )
 def test_half_a_second_without_the_link_is_a_stop_that_only_a_new_arm_word_ends(
-    to_robot: bool, to_driver: bool, code: str, sentence: str
+    to_robot: bool, to_driver: bool, code: str, detail: str
 ) -> None:
     rig = LinkedRig(to_robot, to_driver)
     rig.tick()
@@ -93,13 +93,13 @@ def test_half_a_second_without_the_link_is_a_stop_that_only_a_new_arm_word_ends(
     for _ in range(24):
         output = rig.tick()
         assert output is not None
-        faults += [(fault.code, fault.sentence) for fault in output.safety.faults]
+        faults += [(fault.code, fault.detail) for fault in output.safety.faults]
     assert rig.robot.reader.at_rest
     assert faults[0][0] == code
-    assert faults[0][1].startswith(sentence)
+    assert faults[0][1].startswith(detail)
     assert "arm again" in faults[0][1]
     assert rig.statuses[-1].state == TrajectoryStatus.STATE_STOPPED
-    assert rig.statuses[-1].reason.startswith(sentence)
+    assert rig.statuses[-1].reason.startswith(detail)
     assert rig.driver.state in (State.HOLD, State.DISARMED)
     expect_within_limits(rig)
     resting = rig.robot.reader.target.copy()

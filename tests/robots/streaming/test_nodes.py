@@ -40,15 +40,15 @@ class RobotBus:
         self.pending: list[tuple[Topic, Any]] = []
         self.published: list[tuple[Topic, Any]] = []
 
-    def ready(self, sentence: str) -> None:
-        assert sentence
+    def ready(self, detail: str) -> None:
+        assert detail
 
     def publish(self, topic: Topic, message: Any, captured_ns: int | None = None) -> None:
         assert topic in arm_driver.PUBLISHES
         assert isinstance(message, topic.type)
         self.published.append((topic, message))
         if topic is topics.WIRE_HOAP3_STREAM:
-            assert self.robot.reader.offer(message), self.robot.reader.refusal
+            assert self.robot.reader.offer(message), self.robot.reader.rejection
         if topic is topics.ARM_SAFETY and (word := self.operator.update(message, self.now_ns)):
             word.by_person = self.by_person
             self.pending.append((topics.OPERATOR_ARM_AT_START, word))
@@ -86,8 +86,8 @@ def test_a_driver_started_by_hand_takes_no_program_for_a_person(monkeypatch: Any
     states = [message for topic, message in bus.published if topic is topics.ARM_SAFETY]
     assert {state.state for state in states} == {SafetyState.STATE_DISARMED}
     assert [fault.code for fault in states[-1].faults] == ["arming_program"]
-    assert "operator node is a program" in states[-1].faults[0].sentence
-    assert "started by hand" in states[-1].faults[0].sentence
+    assert "operator node is a program" in states[-1].faults[0].detail
+    assert "started by hand" in states[-1].faults[0].detail
 
 
 def test_with_a_real_robot_the_operator_refuses_to_start(tmp_path: Path) -> None:

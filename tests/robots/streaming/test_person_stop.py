@@ -17,7 +17,7 @@ SENTENCE = "stopped from the page by a person"
 
 def faults(rig: Rig) -> list[tuple[str, str]]:
     assert rig.output is not None
-    return [(fault.code, fault.sentence) for fault in rig.output.safety.faults]
+    return [(fault.code, fault.detail) for fault in rig.output.safety.faults]
 
 
 def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None:
@@ -42,7 +42,7 @@ def test_the_tick_after_the_stop_begins_to_stop_and_the_arm_then_holds() -> None
     resting = rig.robot.reader.target.copy()
     rig.send("two", GOAL)
     rig.tick()
-    assert rig.statuses[-1].state == TrajectoryStatus.STATE_REFUSED
+    assert rig.statuses[-1].state == TrajectoryStatus.STATE_REJECTED
     np.testing.assert_array_equal(rig.robot.reader.target, resting)
 
 

@@ -54,7 +54,7 @@ def test_a_batch_alone_is_a_movement_that_ends_at_rest() -> None:
 def test_successive_batches_play_the_whole_path_exactly() -> None:
     robot, frames = reader(), []
     for start in range(0, len(PATH) - 1, 67):
-        assert robot.offer(cut(max(0, start), 400)), robot.refusal
+        assert robot.offer(cut(max(0, start), 400)), robot.rejection
         frames += [robot.play() for _ in range(67)]
     expected = HOAP3.units.to_counts(PATH[1:])
     np.testing.assert_array_equal(np.array(frames)[: len(expected)], expected)
@@ -121,8 +121,8 @@ RADIANS = np.rint(np.repeat(PATH[:1], 20, axis=0))
 def test_bad_batches_are_refused_and_nothing_is_played(batch: StreamBatch, reason: str) -> None:
     robot = reader()
     assert not robot.offer(batch)
-    assert reason in robot.refusal
-    assert robot.refused_batches == 1
+    assert reason in robot.rejection
+    assert robot.rejected_batches == 1
     assert robot.at_rest
     np.testing.assert_array_equal(robot.play(), HELD)
 
@@ -135,7 +135,7 @@ def test_late_duplicated_and_foreign_batches_are_refused_while_playing() -> None
     late, foreign, gap = cut(0, 300), cut(20, 300, epoch=8), cut(900, 100)
     for batch, reason in ((late, "too late"), (foreign, "allowed only at rest"), (gap, "a gap")):
         assert not robot.offer(batch)
-        assert reason in robot.refusal
+        assert reason in robot.rejection
     assert robot.playing == Hoap3State.PLAYING_FRAMES
     played_to_rest(robot)
     assert robot.offer(StreamWriter(HOAP3, 8).batch(0, HOAP3.units.to_radians(robot.target)[None], 0))
@@ -144,7 +144,7 @@ def test_late_duplicated_and_foreign_batches_are_refused_while_playing() -> None
 def test_a_movement_that_ends_without_a_ramp_is_refused() -> None:
     robot = reader()
     assert not robot.offer(StreamWriter(HOAP3, EPOCH).batch(0, PATH[1:500], 0))
-    assert "speed changes" in robot.refusal
+    assert "speed changes" in robot.rejection
 
 
 def test_state_reports_target_and_measured_counts() -> None:
@@ -161,9 +161,9 @@ def test_frames_of_22_joints_are_refused_even_if_they_say_28() -> None:
     robot = reader()
     frames = np.repeat(HELD[None, :22], 10, axis=0)
     assert not robot.offer(recoded(frames, 22))
-    assert robot.refusal == "22 joints, allowed 28"
+    assert robot.rejection == "22 joints, allowed 28"
     assert not robot.offer(recoded(frames, 28))
-    assert robot.refusal == "440 bytes, allowed 1 to 5000 frames of 28 16 bit numbers"
+    assert robot.rejection == "440 bytes, allowed 1 to 5000 frames of 28 16 bit numbers"
 
 
 def test_counts_beyond_16_bits_never_become_a_batch() -> None:
@@ -177,11 +177,11 @@ def test_more_frames_than_the_buffer_takes_are_refused() -> None:
     robot = reader()
     assert robot.offer(recoded(np.repeat(HELD[None], 5000, axis=0)))
     assert not robot.offer(recoded(np.repeat(HELD[None], 5001, axis=0)))
-    assert "allowed 1 to 5000 frames" in robot.refusal
+    assert "allowed 1 to 5000 frames" in robot.rejection
     appended = recoded(HELD[None])
     appended.first_index = 5000
     assert not robot.offer(appended)
-    assert robot.refusal == "5001 frames to be played, allowed 5000: the buffer is full"
+    assert robot.rejection == "5001 frames to be played, allowed 5000: the buffer is full"
     assert robot.depth == 5000
     robot.play()
     assert robot.offer(appended)
@@ -208,7 +208,7 @@ def test_an_overlap_that_does_not_continue_the_movement_is_refused_and_the_ramp_
     elsewhere = cut(600, 300)
     elsewhere.first_index = 200
     assert not robot.offer(elsewhere)
-    assert "a step of" in robot.refusal
+    assert "a step of" in robot.rejection
     assert robot.depth == depth
 
 
@@ -218,7 +218,7 @@ def test_after_a_lost_batch_the_next_joins_or_is_a_gap() -> None:
     robot = moving()
     end = robot.next_index + robot.depth
     assert not robot.offer(cut(end + 1, 300))
-    assert robot.refusal == f"first index {end + 1}, allowed up to {end}: a gap"
+    assert robot.rejection == f"first index {end + 1}, allowed up to {end}: a gap"
     played = played_to_rest(robot)
     assert np.abs(np.diff(played[-4:], axis=0)).max() <= 1
 
@@ -233,7 +233,7 @@ def test_a_batch_repeated_changes_nothing_and_one_repeated_too_late_is_refused()
     for _ in range(60):
         robot.play()
     assert not robot.offer(batch)
-    assert robot.refusal == "first index 200, played up to 210: too late"
+    assert robot.rejection == "first index 200, played up to 210: too late"
     assert robot.depth == depth - 60
 
 
@@ -251,6 +251,6 @@ def test_accelerations_are_judged_over_a_frame_of_10_ms() -> None:
     slow = replace(HOAP3, stream=HOAP3.stream.model_copy(update={"period_us": 10_000}))
     robot = StreamReader(slow, HELD)
     path = PATH[10::10]
-    assert robot.offer(StreamWriter(slow, EPOCH).batch(0, path, 0)), robot.refusal
+    assert robot.offer(StreamWriter(slow, EPOCH).batch(0, path, 0)), robot.rejection
     assert not robot.offer(StreamWriter(slow, EPOCH).batch(0, path[:60], 0))
-    assert "counts in 1 frames" in robot.refusal
+    assert "counts in 1 frames" in robot.rejection

@@ -10,7 +10,7 @@ from paramove.runs.recorded_run import load_run
 from paramove.runs.relocate_by_pointing.__main__ import main
 from paramove.runs.relocate_by_pointing.run import GOAL, SCALE, pointed_relocations_of, summary_of
 from sim import small_person
-from tests.runs.synthetic_relocations import GOOD, REFUSED, write_run
+from tests.runs.synthetic_relocations import GOOD, REJECTED, write_run
 
 FAR = replace(GOOD, final=(0.16, 0.013))
 
@@ -69,14 +69,14 @@ def test_an_earlier_pointing_does_not_stand_for_one_that_was_not_answered(tmp_pa
 
 
 def test_a_refused_goal_is_no_relocation(tmp_path):
-    found = judged(tmp_path / "run", [REFUSED, GOOD])
+    found = judged(tmp_path / "run", [REJECTED, GOOD])
     assert (found["success"], len(found["relocations"]), found["refused"], found["asked"]) == (True, 1, 1, 2)
 
 
 def test_a_run_that_did_not_come_to_its_end_is_a_failure(tmp_path):
     found = judged(tmp_path / "run", [GOOD], done=False)
     assert (found["success"], found["reason"]) == (False, "after 1 places the run ended")
-    assert judged(tmp_path / "none", [REFUSED])["reason"] == "the object was put nowhere"
+    assert judged(tmp_path / "none", [REJECTED])["reason"] == "the object was put nowhere"
 
 
 @pytest.mark.parametrize(("put", "code"), [(GOOD, 0), (FAR, 3)])

@@ -111,7 +111,7 @@ def test_every_missed_goal_has_a_reason() -> None:
     missed = {(one.row.text.split(",")[0].split()[0], one.row.target.name) for one in rows if one.met is False}
     sentences = why(experiment())
     for word, target in missed:
-        assert any(word in sentence.lower() and target in sentence for sentence in sentences), (word, target)
+        assert any(word in detail.lower() and target in detail for detail in sentences), (word, target)
 
 
 def test_the_report_needs_no_other_file(tmp_path: Path) -> None:

@@ -37,8 +37,8 @@ class Actor:
         with self.events.open("a") as file:
             file.write(f"{self.name} {text}\n")
 
-    def status(self, state, sentence):
-        message = NodeStatus(node=self.name, state=state, sentence=sentence, pid=os.getpid())
+    def status(self, state, detail):
+        message = NodeStatus(node=self.name, state=state, detail=detail, pid=os.getpid())
         self.publishers["status"].publish(message, 0, time.monotonic_ns())
 
     def act(self):
@@ -73,7 +73,7 @@ class Actor:
                     self.status(NodeStatus.STATE_READY, "all set")
             if "speech" in self.publishers:
                 self.publishers["speech"].publish(
-                    Speech(sentence=self.parameters["say"].replace("<bell>", "\a")), 0, time.monotonic_ns()
+                    Speech(text=self.parameters["say"].replace("<bell>", "\a")), 0, time.monotonic_ns()
                 )
 
 

@@ -28,13 +28,13 @@ def calibrate(
     77 the data folder cannot be written, which is checked first; 78 the measurements do not fit the description,
     with the cause; 130 Ctrl-C, and the old file stays.
     """
-    from paramove.robots.dynamixel import ArmCalibrator, check_can_be_kept, load_plan
+    from paramove.robots.dynamixel import ArmCalibrator, check_writable, load_plan
 
     with explained():
         plan = load_plan(robot)
     created = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     with open_arm(by_id, serial, data, plan.baud_rate) as arm:
-        check_can_be_kept(arm.path)
+        check_writable(arm.path)
         calibrator = ArmCalibrator(arm.chain, plan, arm.adapter.serial, TerminalPerson())
         try:
             calibration = calibrator.run(created, f"paramove {version('paramove')}")

@@ -54,13 +54,13 @@ def disable(domain: DomainOption = None) -> None:
 
 def _answer(armed: bool, domain: str | None) -> SafetyState:
     from paramove.bus import BusFolderError, TopicTakenError, default_folder
-    from paramove.operator import arm_by_word
+    from paramove.operator import request_arming
 
     folder = default_folder(domain)
     if not folder.is_dir():
         raise ended(f"nothing is running in {folder}", exit_codes.UNAVAILABLE)
     try:
-        state = arm_by_word(folder, armed, TIMEOUT_S)
+        state = request_arming(folder, armed, TIMEOUT_S)
     except TopicTakenError as error:
         remedy = "stop that one first; `paramove arm estop` stops the arm in any case"
         raise ended(f"{error}: only one program may arm an arm; {remedy}", exit_codes.TEMPORARY) from error
@@ -80,7 +80,7 @@ def _is(state: SafetyState, armed: bool) -> bool:
 
 
 def _reasons(state: SafetyState) -> str:
-    return "; ".join(fault.sentence for fault in state.faults) or "without a reason"
+    return "; ".join(fault.detail for fault in state.faults) or "without a reason"
 
 
 def _name(state: SafetyState) -> str:

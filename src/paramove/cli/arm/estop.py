@@ -34,5 +34,5 @@ def estop(domain: DomainOption = None) -> None:
     if answer is None:
         raise ended(f"no safety gate has answered within {TIMEOUT_S:g} s; {REAL_ONE}", exit_codes.UNAVAILABLE)
     state = SafetyState.State.Name(answer.state).removeprefix("STATE_").lower()
-    message = next(fault.sentence for fault in answer.faults if fault.code == PERSON_STOP)
+    message = next(fault.detail for fault in answer.faults if fault.code == PERSON_STOP)
     typer.echo(f"the safety gate has received it: {state}, {message}")

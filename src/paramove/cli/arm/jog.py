@@ -121,7 +121,7 @@ class _Link:
             self._arming.cancel()
             if answer := stop_arm(self._folder, TERMINAL, STOP_S):
                 self._arming.stopped(answer)
-            self.jogging.sentence = "stopped" if answer else "no answer: use the switch of the motors' power"
+            self.jogging.detail = "stopped" if answer else "no answer: use the switch of the motors' power"
 
     def exchange(self) -> None:
         """Receives messages, and publishes the arming request when it is due."""
@@ -141,10 +141,10 @@ class _Link:
         self.jogging.tick(time.monotonic_ns())
         if self._arming.tick(now_s):
             self._arm()
-        if self._arming.sentence != self._arming_message:
-            self._arming_message = self.jogging.sentence = self._arming.sentence
+        if self._arming.detail != self._arming_message:
+            self._arming_message = self.jogging.detail = self._arming.detail
         if self.has_no_data:
-            self.jogging.sentence = f"no data for {NO_DATA_S:g} s: is the arm's driver running?"
+            self.jogging.detail = f"no data for {NO_DATA_S:g} s: is the arm's driver running?"
 
     @property
     def has_no_data(self) -> bool:
@@ -159,7 +159,7 @@ class _Link:
         jogging = self.jogging
         angle = math.degrees(jogging.angles[jogging.joint])
         state = "no data" if self.has_no_data else self._arming.state
-        status, message = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.sentence
+        status, message = f"{state}  {jogging.chosen + 1} {jogging.joint} {angle:.1f} deg", jogging.detail
         what = f"{state} {jogging.joint} {message}"
         if sys.stdout.isatty():
             columns = shutil.get_terminal_size().columns
@@ -181,6 +181,6 @@ class _Link:
         try:
             self._arms = self._arms or self._bus.publisher(self._topics.OPERATOR_ARM)
         except TopicTakenError as error:
-            self._arming.refuse(f"{error}, and only one program may arm an arm")
+            self._arming.reject(f"{error}, and only one program may arm an arm")
             return
         publish_now(self._arms, ArmRequest(source=TERMINAL, armed=True, reason="jogging", by_person=self._by_person))

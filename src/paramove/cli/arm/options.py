@@ -91,11 +91,11 @@ def open_arm(by_id: Path | None, serial: str, data: Path | None, baud_rate: int 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
     """Ends the command with a message on errors of a servo, the port or a file, and at Ctrl-C."""
-    from paramove.robots.dynamixel import PortLostError, ServoError, ServoSilentError
+    from paramove.robots.dynamixel import PortLostError, ServoError, ServoTimeoutError
 
     try:
         yield
-    except (ServoSilentError, PortLostError) as error:
+    except (ServoTimeoutError, PortLostError) as error:
         raise ended(str(error), exit_codes.UNAVAILABLE) from error
     except ServoError as error:
         raise ended(str(error), exit_codes.FAILURE) from error

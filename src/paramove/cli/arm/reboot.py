@@ -28,14 +28,14 @@ def reboot(
     from paramove.robots.dynamixel import (
         ServoLoadedError,
         check_unloaded,
-        reboot_sentences,
+        reboot_messages,
         reboot_servo,
         servo_before_reboot,
     )
 
     with open_arm(by_id, serial, data, baud_rate) as arm:
         servo = servo_before_reboot(arm.chain, number)
-        typer.echo("\n".join(reboot_sentences(servo)))
+        typer.echo("\n".join(reboot_messages(servo)))
         try:
             if not yes:
                 check_unloaded(arm.chain, servo)
@@ -43,5 +43,5 @@ def reboot(
             raise ended(str(error), exit_codes.USAGE) from error
         after = reboot_servo(arm.chain, number)
     if after.hardware_error:
-        raise ended(f"rebooted, but {reboot_sentences(after)[0]}", exit_codes.FAILURE)
+        raise ended(f"rebooted, but {reboot_messages(after)[0]}", exit_codes.FAILURE)
     typer.echo(f"servo {number} was rebooted: no hardware error, torque off")

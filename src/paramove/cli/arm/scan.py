@@ -10,10 +10,10 @@ import typer
 from paramove.cli.arm.options import ByIdOption, DataOption, SerialOption, configured_baud_rate, ended, open_arm
 from paramove.cli.bus_options import JsonOption, show
 from paramove.documents import exit_codes
-from paramove.robots.dynamixel import in_words, serial_adapters
+from paramove.robots.dynamixel import error_text, serial_adapters
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel import FoundServo
+    from paramove.robots.dynamixel import DetectedServo
 
 FINDING = 3
 
@@ -71,7 +71,7 @@ def _tell(adapter: dict[str, Any], rates: str) -> None:
         typer.echo(line)
 
 
-def _row(servo: FoundServo) -> dict[str, Any]:
+def _row(servo: DetectedServo) -> dict[str, Any]:
     return {
         "id": servo.number,
         "model": servo.model,
@@ -80,6 +80,6 @@ def _row(servo: FoundServo) -> dict[str, Any]:
         "baud_rate": servo.baud_rate,
         "voltage": servo.voltage,
         "temperature": servo.temperature,
-        "hardware_error": None if servo.hardware_error is None else in_words(servo.hardware_error) or "none",
+        "hardware_error": None if servo.hardware_error is None else error_text(servo.hardware_error) or "none",
         "torque": servo.torque,
     }

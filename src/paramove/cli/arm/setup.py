@@ -13,7 +13,7 @@ from paramove.cli.arm.terminal_person import QuitError, TerminalPerson
 from paramove.documents import InputError, exit_codes
 
 if TYPE_CHECKING:
-    from paramove.robots.dynamixel import ArmPlan, FoundServo, PlannedServo, ServoChain
+    from paramove.robots.dynamixel import ArmPlan, DetectedServo, PlannedServo, ServoChain
 
 
 def setup(
@@ -81,7 +81,7 @@ def _set_up(
         return
 
 
-def _check_is_new(found: FoundServo, plan: ArmPlan, servo: PlannedServo, done: Sequence[PlannedServo]) -> None:
+def _check_is_new(found: DetectedServo, plan: ArmPlan, servo: PlannedServo, done: Sequence[PlannedServo]) -> None:
     """Raises InputError for a servo that was left connected: it would get a second ID, and its label be wrong."""
     for one in done:
         if (found.number, found.baud_rate) == (one.number, plan.baud_rate):

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from paramove.demonstrations import DemonstrationError, Take, place_of_theta, recording_name
+from paramove.demonstrations import DemonstrationError, Take, position_in_theta, recording_name
 from paramove.demonstrations.importing.raw import RawTake
 from paramove.documents import Floats, closest, nearest, read_document
 
@@ -95,7 +95,7 @@ def converted(raw: RawTake, options: ImportOptions, file: Path) -> Take:
 
 def _theta(theta: tuple[float, ...], names: tuple[str, ...], matrix: Floats) -> tuple[float, ...]:
     values = np.array(theta, dtype=np.float64)
-    position = place_of_theta(names)
+    position = position_in_theta(names)
     if position is not None:
         values[position] = matrix @ values[position]
     return tuple(values.tolist())

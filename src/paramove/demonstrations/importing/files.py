@@ -39,7 +39,7 @@ class Imported:
     takes: tuple[Take, ...]
     parameter_names: tuple[str, ...]
     remarks: tuple[str, ...]
-    refused: tuple[str, ...]
+    rejected: tuple[str, ...]
 
 
 def import_file(

@@ -10,15 +10,15 @@ from .bus.bench import BusBench as BusBench
 from .bus.bench import bench_bus as bench_bus
 from .bus.bench import latency_timer_ms as latency_timer_ms
 from .bus.bench import slow_timer as slow_timer
+from .bus.hardware_error import error_text as error_text
 from .bus.hardware_error import hardware_errors as hardware_errors
-from .bus.hardware_error import in_words as in_words
 from .bus.packets import Instruction as Instruction
 from .bus.packets import Packet as Packet
 from .bus.packets import encoded as encoded
 from .bus.scan import ALL_IDS as ALL_IDS
 from .bus.scan import USUAL_BAUD_RATES as USUAL_BAUD_RATES
 from .bus.scan import BusScan as BusScan
-from .bus.scan import FoundServo as FoundServo
+from .bus.scan import DetectedServo as DetectedServo
 from .bus.scan import listed as listed
 from .bus.scan import scan_bus as scan_bus
 from .bus.serial_adapters import BY_ID_VARIABLE as BY_ID_VARIABLE
@@ -28,7 +28,7 @@ from .bus.serial_adapters import serial_adapter as serial_adapter
 from .bus.serial_adapters import serial_adapters as serial_adapters
 from .bus.servo_chain import ServoChain as ServoChain
 from .bus.servo_chain import ServoError as ServoError
-from .bus.servo_chain import ServoSilentError as ServoSilentError
+from .bus.servo_chain import ServoTimeoutError as ServoTimeoutError
 from .bus.servo_models import BAUD_RATES as BAUD_RATES
 from .bus.servo_models import MODELS as MODELS
 from .bus.servo_models import XL330_M288 as XL330_M288
@@ -37,7 +37,7 @@ from .bus.servo_port import PortLostError as PortLostError
 from .bus.servo_port import ServoPort as ServoPort
 from .bus.servo_reboot import ServoLoadedError as ServoLoadedError
 from .bus.servo_reboot import check_unloaded as check_unloaded
-from .bus.servo_reboot import reboot_sentences as reboot_sentences
+from .bus.servo_reboot import reboot_messages as reboot_messages
 from .bus.servo_reboot import reboot_servo as reboot_servo
 from .bus.servo_reboot import servo_before_reboot as servo_before_reboot
 from .bus.servo_setup import only_servo as only_servo
@@ -51,7 +51,7 @@ from .calibration.arm_plan import PlannedServo as PlannedServo
 from .calibration.arm_plan import load_plan as load_plan
 from .calibration.path import DATA_VARIABLE as DATA_VARIABLE
 from .calibration.path import calibration_path as calibration_path
-from .calibration.path import check_can_be_kept as check_can_be_kept
+from .calibration.path import check_writable as check_writable
 from .calibration.procedure import ArmCalibrator as ArmCalibrator
 from .calibration.servo_settings import adopted as adopted
 from .calibration.servo_settings import compare as compare

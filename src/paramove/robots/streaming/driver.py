@@ -33,7 +33,7 @@ from paramove.safety import (
     SafetyCore,
     SafetySettings,
     State,
-    TrajectoryRefusedError,
+    TrajectoryRejectedError,
     check_trajectory,
     longest_path_s,
 )
@@ -131,7 +131,7 @@ class ArmDriver:
         return self._core.state
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """The state of the gate, for people."""
         if self._core.state is State.DISCONNECTED:
             return "disarmed, waiting for the robot"
@@ -144,7 +144,7 @@ class ArmDriver:
             before, execution = self._report, self._execution
             # A first batch is sent until it is known to be played; those rejected meanwhile were not late.
             begun = before is not None and execution is not None and before.next_index > execution.start_index
-            if before is not None and begun and report.refused_batches > before.refused_batches:
+            if before is not None and begun and report.rejected_batches > before.rejected_batches:
                 self._guard_ms = min(self._guard_ms + GUARD_STEP_MS, LONGEST_GUARD_MS)
             self._report = report
             self._reported = True
@@ -239,28 +239,28 @@ class ArmDriver:
             try:
                 if stalled_s:
                     allowed = f"up to {MAX_STALL_S:g} s; send it again"
-                    raise TrajectoryRefusedError(
+                    raise TrajectoryRejectedError(
                         "stale", -1, "", f"a driver that stalled for {stalled_s:.2f} s", allowed
                     )
                 self._begin(message, captured_ns)
-            except TrajectoryRefusedError as error:
+            except TrajectoryRejectedError as error:
                 self._rejected += 1
-                self._add_status(message.id, TrajectoryStatus.STATE_REFUSED, 0.0, 0.0, str(error), error.code)
+                self._add_status(message.id, TrajectoryStatus.STATE_REJECTED, 0.0, 0.0, str(error), error.code)
 
     def _begin(self, message: JointTrajectory, captured_ns: int) -> None:
         report = self._report
         if self._core.state is not State.ARMED or report is None:
             state = self._core.state.value
-            raise TrajectoryRefusedError("not_armed", -1, "", f"a movement while {state}", "only while armed")
+            raise TrajectoryRejectedError("not_armed", -1, "", f"a movement while {state}", "only while armed")
         if not message.id:
-            raise TrajectoryRefusedError("id", -1, "", "an empty id", "a name for the trajectory")
+            raise TrajectoryRejectedError("id", -1, "", "an empty id", "a name for the trajectory")
         if self._execution is not None:
             busy = self._execution.trajectory_id
-            raise TrajectoryRefusedError("busy", -1, "", "a second trajectory", f"one at a time; {busy} is executed")
+            raise TrajectoryRejectedError("busy", -1, "", "a second trajectory", f"one at a time; {busy} is executed")
         age_s = (self._now_ns - captured_ns) * 1e-9
         if not -MAX_TRAJECTORY_LEAD_S <= age_s <= MAX_TRAJECTORY_AGE_S:
             allowed = f"{-MAX_TRAJECTORY_LEAD_S:g} to {MAX_TRAJECTORY_AGE_S:g} s"
-            raise TrajectoryRefusedError("stale", -1, "", f"age {age_s:.2f} s", allowed)
+            raise TrajectoryRejectedError("stale", -1, "", f"age {age_s:.2f} s", allowed)
         held = self._core.held(report.next_index) if report.epoch == self._writer.epoch else None
         path = check_trajectory(
             list(message.joints),
@@ -311,7 +311,7 @@ class ArmDriver:
         if self._core.state is State.STOPPING:
             return
         if self._core.state is not State.ARMED:
-            reason = "; ".join(fault.sentence for fault in self._core.faults) or "disarmed"
+            reason = "; ".join(fault.detail for fault in self._core.faults) or "disarmed"
             self._add_status(name, TrajectoryStatus.STATE_STOPPED, time_s, duration_s, reason)
             self._execution = None
             return
@@ -337,16 +337,16 @@ class ArmDriver:
         )
         status.captured.FromNanoseconds(self._now_ns)
         self._statuses.append(status)
-        if state != TrajectoryStatus.STATE_REFUSED:  # a rejected one that is sent again is judged again
+        if state != TrajectoryStatus.STATE_REJECTED:  # a rejected one that is sent again is judged again
             self._last_status[name] = status
             while len(self._last_status) > 100:
                 del self._last_status[next(iter(self._last_status))]
 
     def _safety_state(self, now_ns: int) -> SafetyState:
-        message = SafetyState(state=SAFETY_STATES[self._core.state], refused_trajectories=self._rejected)
+        message = SafetyState(state=SAFETY_STATES[self._core.state], rejected_trajectories=self._rejected)
         message.captured.FromNanoseconds(now_ns)
         message.faults.extend(
-            SafetyFault(code=fault.code, joint=fault.joint, sentence=fault.sentence) for fault in self._core.faults
+            SafetyFault(code=fault.code, joint=fault.joint, detail=fault.detail) for fault in self._core.faults
         )
         return message
 

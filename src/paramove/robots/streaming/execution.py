@@ -64,13 +64,13 @@ class Execution:
         if not begun:
             if now_ns - self.begun_ns < START_TIMEOUT_S * 1e9:
                 return None
-            why = f"; the robot reports: {report.refusal}" if report.refusal else ""
+            why = f"; the robot reports: {report.rejection}" if report.rejection else ""
             return Fault("stream_not_begun", "", f"nothing was played within {START_TIMEOUT_S:g} s{why}")
         ran_out = report.at_rest or report.playing == Hoap3State.PLAYING_STOP_RAMP
         if not ran_out or report.next_index >= self.end_index:
             return None
         progress = f"{report.next_index - self.start_index} of {len(self.rows) - 1} rows"
-        why = f"; the robot reports: {report.refusal}" if report.refusal else ""
+        why = f"; the robot reports: {report.rejection}" if report.rejection else ""
         return Fault("stream_under_run", "", f"the robot ran out of rows after {progress} and stops{why}; arm again")
 
     def ending(self, report: RobotReport, epoch: int, now_ns: int, description: RobotDescription) -> str | None:

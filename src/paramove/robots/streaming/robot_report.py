@@ -22,8 +22,8 @@ class RobotReport:
     epoch: int
     next_index: int
     playing: Hoap3State.Playing
-    refused_batches: int
-    refusal: str
+    rejected_batches: int
+    rejection: str
     positions: Floats
     commanded: Floats
     velocities: Floats
@@ -49,8 +49,8 @@ class RobotReport:
             message.epoch,
             message.next_index,
             message.playing,
-            message.refused_batches,
-            message.refusal,
+            message.rejected_batches,
+            message.rejection,
             positions,
             commanded,
             velocities,

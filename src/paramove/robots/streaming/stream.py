@@ -78,8 +78,8 @@ class StreamReader:
     def __init__(self, description: RobotDescription, held_counts: Frames) -> None:
         self.epoch = 0
         self.next_index = 0
-        self.refused_batches = 0
-        self.refusal = ""
+        self.rejected_batches = 0
+        self.rejection = ""
         self._units = description.units
         self._period_us = description.stream.period_us
         period_s = self._period_us * 1e-6
@@ -138,8 +138,8 @@ class StreamReader:
             frames = np.frombuffer(batch.frames, dtype=_FRAME_TYPE).reshape(-1, batch.joint_count).astype(np.int16)
             reason = self._error_of_index(batch, len(frames)) or self._error_of_frames(batch, frames)
         if reason:
-            self.refused_batches += 1
-            self.refusal = reason
+            self.rejected_batches += 1
+            self.rejection = reason
             return False
         if batch.epoch != self.epoch:
             self.epoch = batch.epoch
@@ -158,8 +158,8 @@ class StreamReader:
             playing=self.playing,
             counts=[int(count) for count in measured_counts],
             target_counts=[int(count) for count in self.target],
-            refused_batches=self.refused_batches,
-            refusal=self.refusal,
+            rejected_batches=self.rejected_batches,
+            rejection=self.rejection,
         )
         state.captured.FromNanoseconds(captured_ns)
         return state

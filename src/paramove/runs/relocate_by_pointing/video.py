@@ -44,7 +44,7 @@ def write_relocation_video(run: RecordedRun, console: Console) -> Path | None:
     views = sum(1 for _ in recording_in(run.folder, "truth.mcap").read({topics.TRUTH_VIEW.name}))
     if not views:
         return None
-    speech = [(r.publish_ns, r.message.sentence) for r in run.received(topics.SPEECH)]
+    speech = [(r.publish_ns, r.message.text) for r in run.received(topics.SPEECH)]
     states = [(r.publish_ns, r.message.step.replace("_", " ")) for r in run.received(topics.APPLICATION_STAGE)]
     path = run.folder / "relocations.mp4"
     title = f"relocation by pointing, seed {run.truth.layout.seed}"
@@ -100,7 +100,7 @@ def _latest(texts: list[tuple[int, str]], time_ns: int) -> str:
     return texts[at - 1][1] if at else ""
 
 
-def _quoted(sentence: str) -> str:
-    if not sentence:
+def _quoted(detail: str) -> str:
+    if not detail:
         return ""
-    return f"“{sentence if len(sentence) <= MAX_LETTERS else sentence[: MAX_LETTERS - 1] + '…'}”"
+    return f"“{detail if len(detail) <= MAX_LETTERS else detail[: MAX_LETTERS - 1] + '…'}”"

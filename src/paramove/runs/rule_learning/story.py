@@ -39,7 +39,7 @@ class RobotState:
     """
 
     stage: str
-    sentence: str
+    detail: str
     rules: dict[str, tuple[float, float]]
     goal: Relocation | None
     phase: str
@@ -102,7 +102,7 @@ class Story:
         fresh = gesture is not None and time_s - gesture.publish_ns * 1e-9 < GESTURE_DISPLAYED_S
         return RobotState(
             stage=ApplicationStage.Stage.Name(stage.message.stage).removeprefix("STAGE_").lower() if stage else "",
-            sentence=speech.message.sentence if speech is not None else "",
+            detail=speech.message.text if speech is not None else "",
             rules={rule.object: (rule.x, rule.y) for rule in rules.message.rules} if rules is not None else {},
             goal=goal,
             phase=status.message.phase if of_goal and status is not None else "",

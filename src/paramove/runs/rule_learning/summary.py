@@ -141,7 +141,7 @@ class RunEvaluation:
                 {
                     "time_s": recorded.publish_ns * 1e-9,
                     "request": Speech.Request.Name(recorded.message.request).removeprefix("REQUEST_").lower(),
-                    "sentence": recorded.message.sentence,
+                    "sentence": recorded.message.text,
                 }
                 for recorded in run.received(topics.SPEECH)
             ],
@@ -274,7 +274,7 @@ def _rule(name: str, openings: dict[str, Any], radius: float, opening: str, lear
         "error_mm": 1e3 * float(np.linalg.norm(position - true)),
         "nearest_opening": nearest,
         "right": bool(np.linalg.norm(position - true) < radius),
-        "sentence": learnt.sentence,
+        "sentence": learnt.text,
     }
 
 

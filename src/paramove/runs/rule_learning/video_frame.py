@@ -134,8 +134,8 @@ def _draw_object(image: Image, item: Any, state: RobotState) -> None:
 
 
 def _captions(panel: Image, state: RobotState) -> None:
-    if state.sentence:
-        paste(panel, label(f"“{_shortened(state.sentence, 96)}”", 17, TEXT, bold=True), 14, 12)
+    if state.detail:
+        paste(panel, label(f"“{_shortened(state.detail, 96)}”", 17, TEXT, bold=True), 14, 12)
     paste(panel, label("estimates", 13, FAINT), 14, 46)
     x = 84
     for name, (u, v) in state.rules.items():

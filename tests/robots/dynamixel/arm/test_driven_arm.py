@@ -163,7 +163,7 @@ def test_a_joint_that_jumps_stops_the_arm_and_its_angle_is_not_published(person)
     person.emulator.faults = OneElsewhere(15, 2100)
     person.waits_for("HOLD")
     assert person.codes() == [("joint_jumped", ROBOT.joint_names[4])]
-    assert "servo 15 (gripper) jumped by 184.6 deg" in person.safety.faults[0].sentence
+    assert "servo 15 (gripper) jumped by 184.6 deg" in person.safety.faults[0].detail
     assert np.abs(np.diff(person.angles, axis=0)).max() < 0.2
 
 
@@ -210,7 +210,7 @@ def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulato
         person.waits_for("ESTOP")
         assert arm.trouble == said
         told = ("emergency_stop", "the emergency stop is pressed; release it, then arm again")
-        assert [(fault.code, fault.sentence) for fault in person.safety.faults] == [told]
+        assert [(fault.code, fault.detail) for fault in person.safety.faults] == [told]
         assert person.is_told("STOPPED").reason == told[1]
         person.hears_until(lambda: np.ptp(person.angles[-30:], axis=0).max() < 1e-3)
         rested = person.goals()
@@ -225,7 +225,7 @@ def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulato
 
 
 @pytest.mark.parametrize(
-    ("goes_wrong", "sentence"),
+    ("goes_wrong", "detail"),
     [
         (lambda servo: servo.memory.__setitem__("Torque Enable", 0), TORQUE_LOST),
         (lambda servo: servo.fail(HardwareError.OVERHEATING), "overheated (register 70 is 0x04); let it cool, and"),
@@ -235,7 +235,7 @@ def test_an_emergency_stop_by_a_file_stays_and_its_release_moves_nothing(emulato
     ],
     ids=["torque", "heat", "load", "encoder", "voltage"],
 )
-def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, monkeypatch, goes_wrong, sentence):
+def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, monkeypatch, goes_wrong, detail):
     reboots = []
     monkeypatch.setattr(EmulatedServo, "reboot", reboots.append)
     person.arms_and_waits()
@@ -244,13 +244,11 @@ def test_a_servo_in_trouble_stops_all_of_them_and_the_others_hold(person, monkey
         goes_wrong(person.emulator.bus.servos[1])
     person.waits_for("HOLD")
     fault = person.safety.faults[0]
-    assert (fault.code, fault.joint) == ("torque_lost" if sentence == TORQUE_LOST else "hardware_error", "joint2")
-    assert sentence in fault.sentence
-    assert fault.sentence.startswith("servo 12 (joint2) has ")
-    assert sentence == TORQUE_LOST or fault.sentence.endswith(
-        "then, once this driver has ended, `paramove arm reboot 12`"
-    )
-    assert person.is_told("STOPPED").reason.startswith(fault.sentence)
+    assert (fault.code, fault.joint) == ("torque_lost" if detail == TORQUE_LOST else "hardware_error", "joint2")
+    assert detail in fault.detail
+    assert fault.detail.startswith("servo 12 (joint2) has ")
+    assert detail == TORQUE_LOST or fault.detail.endswith("then, once this driver has ended, `paramove arm reboot 12`")
+    assert person.is_told("STOPPED").reason.startswith(fault.detail)
     assert [person.memory("Torque Enable")[place] for place in (0, 2, 3, 4)] == [1] * 4
     rested = person.goals()
     assert rested != list(ROBOT.units.to_counts(person.away()))
@@ -267,7 +265,7 @@ def test_a_servo_that_reboots_in_motion_stops_all_of_them_and_is_limp_until_some
         person.emulator.bus.servos[1].reboot()
     person.waits_for("HOLD")
     assert person.codes()[0] in (("torque_lost", "joint2"), ("joint_silent", "joint2"))
-    told = person.safety.faults[0].sentence
+    told = person.safety.faults[0].detail
     assert TORQUE_LOST in told or told.startswith("no data from servo 12 (joint2)")
     assert person.memory("Torque Enable") == [1, 0, 1, 1, 1]
     person.hears_until(lambda: person.emulator.bus.servos[1].listens)
@@ -283,10 +281,10 @@ def test_a_wire_that_damages_a_fifth_of_the_answers_stops_the_arm(person):
     person.emulator.faults = WireFaults(damaged=0.2, seed=1)
     person.waits_for("HOLD")
     assert person.codes()[0][0] == "bus_noise"
-    sentence = r"\d+ of the last \d+ exchanges on the bus were damaged, allowed 20%: check cable, plugs and supply"
-    assert re.match(sentence, person.safety.faults[0].sentence)
+    detail = r"\d+ of the last \d+ exchanges on the bus were damaged, allowed 20%: check cable, plugs and supply"
+    assert re.match(detail, person.safety.faults[0].detail)
     rested = person.goals()
-    assert person.is_told("STOPPED").reason == person.safety.faults[0].sentence
+    assert person.is_told("STOPPED").reason == person.safety.faults[0].detail
     assert person.goals() == rested
 
 
@@ -298,7 +296,7 @@ def test_a_second_servo_of_one_id_stops_the_arm(person):
         person.emulator.bus.add(EmulatedServo(XL430_W250, 12, 1_000_000))
     person.waits_for("HOLD")
     assert person.codes()[0] in (("joint_silent", "joint2"), ("bus_noise", ""))
-    told = person.safety.faults[0].sentence
+    told = person.safety.faults[0].detail
     assert told.startswith("no data from servo 12 (joint2)") or "two servos may have one ID" in told
 
 
@@ -311,7 +309,7 @@ def test_a_joint_that_is_held_stops_the_arm_and_is_named(person):
     (fault,) = person.safety.faults
     assert (fault.code, fault.joint) == ("following", "joint1")
     told = r"joint joint1 has been [0-9.]+ deg from its commanded position for 100 ms, allowed 10\.00 deg"
-    assert re.match(told, fault.sentence)
+    assert re.match(told, fault.detail)
     person.hears_until(lambda: np.ptp(person.angles[-10:], axis=0).max() < 1e-3)
     held = person.memory("Present Position")
     np.testing.assert_allclose(person.goals(), held, rtol=0, atol=2)  # no wind-up: let go of, it does not move

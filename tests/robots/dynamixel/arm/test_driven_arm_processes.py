@@ -116,10 +116,10 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
         wait_until_tripped_and_at_rest(emulator)
         rested = memory(emulator, "Present Position")
         driver.send_signal(signal.SIGCONT)
-        ((code, sentence),) = json.loads(driver.stdout.readline())
+        ((code, detail),) = json.loads(driver.stdout.readline())
         assert code == "watchdog_tripped"
-        assert "servo 11 (joint1) has stopped by itself" in sentence
-        assert "1000 ms" in sentence
+        assert "servo 11 (joint1) has stopped by itself" in detail
+        assert "1000 ms" in detail
         assert memory(emulator, "Present Position") == rested
         assert driver.stdout.readline() == "moves\n"  # once it was armed again
         driver.kill()
@@ -154,9 +154,9 @@ def test_logic_that_hangs_while_the_loop_lives_ends_in_the_stop_ramp(emulator):
         person.waits_for("HOLD")
         (fault,) = person.safety.faults
         assert fault.code in ("driver_stalled", "stream_under_run")
-        assert "stalled for" in fault.sentence or "ran out of rows" in fault.sentence
-        assert fault.sentence.endswith("arm again")
-        assert person.is_told("STOPPED").reason == fault.sentence
+        assert "stalled for" in fault.detail or "ran out of rows" in fault.detail
+        assert fault.detail.endswith("arm again")
+        assert person.is_told("STOPPED").reason == fault.detail
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="others than root cannot open a port that is in use")
@@ -168,4 +168,4 @@ def test_another_program_that_talks_on_the_bus_stops_the_arm(emulator):
             person.waits_for("HOLD")
         (fault, *_) = person.safety.faults
         assert fault.code in ("bus_noise", "joint_silent")
-        assert "another program talks on the bus" in fault.sentence or "check its cable" in fault.sentence
+        assert "another program talks on the bus" in fault.detail or "check its cable" in fault.detail

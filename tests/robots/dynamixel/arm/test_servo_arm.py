@@ -89,7 +89,7 @@ def test_goals_reach_the_servos_and_positions_come_back(arm, emulator):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "code", "sentence"),
+    ("name", "value", "code", "detail"),
     [
         ("ID", 9, "servo_missing", r"servo 2 \(lift\) does not answer.*`paramove arm scan`"),
         ("Model Number", 1200, "servo_model", r"servo 2 \(lift\) is of model 1200, expected 1060 \(xl430_w250\)"),
@@ -109,12 +109,12 @@ def test_goals_reach_the_servos_and_positions_come_back(arm, emulator):
         ),
     ],
 )
-def test_what_keeps_an_arm_from_being_armed(arm, emulator, port, name, value, code, sentence):
+def test_what_keeps_an_arm_from_being_armed(arm, emulator, port, name, value, code, detail):
     change(emulator, 1, name, value)
     port.latency_s = 0.05 if name == "ID" else PATIENT_S
     (fault,) = arm.check()
     assert (fault.code, fault.joint) == (code, "lift")
-    assert re.search(sentence, fault.sentence)
+    assert re.search(detail, fault.detail)
 
 
 def test_all_that_is_wrong_is_told_together(arm, emulator):
@@ -143,8 +143,8 @@ def test_a_calibrated_arm_whose_position_limits_are_others_is_not_armed(emulator
     change(emulator, 2, f"{end} Position Limit", found)
     (fault,) = arm.check()
     assert (fault.code, fault.joint) == ("servo_settings", "wrist")
-    assert f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}" in fault.sentence
-    assert all(option in fault.sentence for option in ("`paramove arm verify --write`", "`--adopt`"))
+    assert f"servo 3 (wrist) has {end} Position Limit {found}, expected {expected[end]}" in fault.detail
+    assert all(option in fault.detail for option in ("`paramove arm verify --write`", "`--adopt`"))
     assert memory(emulator, "Torque Enable") == [0, 0, 0]
 
 
@@ -153,7 +153,7 @@ def test_an_adapter_that_keeps_answers_for_16_ms_is_told_with_time_and_remedy(em
     (fault,) = ServoArm(JOINTS, ServoChain(port), period_s=0.010).check()
     assert fault.code == "bus_slow"
     facts = re.search(
-        r"takes ([0-9.]+) ms, allowed 10\.0 ms: .*latency timer to 1 ms .*`paramove doctor`", fault.sentence
+        r"takes ([0-9.]+) ms, allowed 10\.0 ms: .*latency timer to 1 ms .*`paramove doctor`", fault.detail
     )
     assert facts is not None
     assert float(facts[1]) >= 16.0
@@ -167,8 +167,8 @@ def test_servos_that_stopped_by_themselves_are_told_take_no_goal_and_hold_again_
         pass
     fault = arm.look_after_watchdogs()
     assert (fault.code, fault.joint) == ("watchdog_tripped", "pan")
-    assert "servo 1 (pan) has stopped by itself" in fault.sentence
-    assert "1000 ms" in fault.sentence
+    assert "servo 1 (pan) has stopped by itself" in fault.detail
+    assert "1000 ms" in fault.detail
     goal = XL430_W250.registers["Goal Position"]
     with pytest.raises(ServoRejectedError, match=r"servo 1 .*out of range: write Goal Position = 10"):
         ServoChain(port).write(1, goal, 1010)
@@ -183,7 +183,7 @@ def test_a_servo_that_cannot_hold_leaves_the_others_as_they_were(arm, emulator):
         emulator.bus.servos[2].memory["Max Position Limit"] = 2900
     (fault,) = arm.take_hold()
     assert (fault.code, fault.joint) == ("servo_refused", "wrist")
-    assert "beyond its limits" in fault.sentence
+    assert "beyond its limits" in fault.detail
     assert memory(emulator, "Torque Enable") == [1, 0, 0]
     assert not arm.holds
 
@@ -209,7 +209,7 @@ def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port)
     def told(words):
         """The fault that begins so: a pause of the machine may make others silent for a while."""
         until_s = time.monotonic() + 60.0
-        while (fault := arm.fault_of_answers(arm.measured())) is None or not fault.sentence.startswith(words):
+        while (fault := arm.fault_of_answers(arm.measured())) is None or not fault.detail.startswith(words):
             assert time.monotonic() < until_s, fault
         return fault
 
@@ -219,7 +219,7 @@ def test_joints_that_fall_silent_together_are_told_together(arm, emulator, port)
     change(emulator, 2, "ID", 19)
     fault = told("no data from any servo for")
     assert (fault.code, fault.joint) == ("joint_silent", "")
-    assert fault.sentence.endswith("check cables and the motors' power")
+    assert fault.detail.endswith("check cables and the motors' power")
 
 
 def test_the_loop_does_not_wait_for_an_arm_that_is_silent(arm, emulator, port, monkeypatch):
@@ -254,7 +254,7 @@ def test_an_overload_is_told_in_words_while_it_moves(arm, emulator):
     change(emulator, 1, "Hardware Error Status", 0x20)
     fault = arm.look_after()
     assert (fault.code, fault.joint) == ("hardware_error", "lift")
-    assert "overloaded" in fault.sentence
+    assert "overloaded" in fault.detail
 
 
 def test_low_voltage_is_warned_of_and_too_low_a_one_is_a_fault(arm, emulator):
@@ -276,8 +276,8 @@ def test_one_damaged_answer_in_a_hundred_is_no_matter_and_many_are_a_fault(emula
     port.latency_s = latency_s
     emulator.faults = WireFaults(damaged=share, seed=5)
     faults = [arm.fault_of_answers(arm.measured()) for _ in range(90)]
-    told = {fault.sentence for fault in faults if fault is not None and fault.code != "joint_silent"}
-    assert all("exchanges on the bus were damaged, allowed 20%: check" in sentence for sentence in told)
+    told = {fault.detail for fault in faults if fault is not None and fault.code != "joint_silent"}
+    assert all("exchanges on the bus were damaged, allowed 20%: check" in detail for detail in told)
     assert bool(told) is noisy
 
 

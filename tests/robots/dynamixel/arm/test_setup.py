@@ -91,7 +91,7 @@ def test_an_arm_that_everybody_assembles_differently_is_not_armed_uncalibrated(t
         person.arms()
         person.hears_until(lambda: person.safety.faults)
         assert person.codes() == [("not_calibrated", "")]
-        assert "`paramove arm calibrate`" in person.safety.faults[0].sentence
+        assert "`paramove arm calibrate`" in person.safety.faults[0].detail
 
 
 def test_in_simulation_its_zeros_are_those_of_the_description(tmp_path):

@@ -150,7 +150,7 @@ def test_a_joint_that_jumps_is_a_fault_and_keeps_its_angle(emulator, port, still
     np.testing.assert_array_equal(reading.counts, before)
     fault = arm.fault_of_answers(reading)
     assert (fault.code, fault.joint) == ("joint_jumped", ROBOT.joint_names[1])
-    assert re.search(r"jumped by 167\.0 deg, from 1500 to 3400 pulses, within [0-9.]+ ms, allowed", fault.sentence)
+    assert re.search(r"jumped by 167\.0 deg, from 1500 to 3400 pulses, within [0-9.]+ ms, allowed", fault.detail)
     assert arm.fault_of_answers(arm.measured()) is None
     emulator.faults = OneElsewhere(12, 1900)
     assert [fault.code for fault in arm.check()] == ["joint_jumped"]
@@ -164,5 +164,5 @@ def test_an_arm_is_not_held_where_another_servo_stands(emulator, port, still):
     emulator.faults = OneElsewhere(12, 1900)
     (fault,) = arm.take_hold()
     assert (fault.code, fault.joint) == ("servo_refused", ROBOT.joint_names[1])
-    assert "from 1500 to 3400 pulses" in fault.sentence
+    assert "from 1500 to 3400 pulses" in fault.detail
     assert emulator.bus.servos[1].memory["Torque Enable"] == 0

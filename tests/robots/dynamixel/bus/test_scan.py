@@ -2,7 +2,7 @@
 
 import pytest
 
-from paramove.robots.dynamixel.bus.hardware_error import in_words
+from paramove.robots.dynamixel.bus.hardware_error import error_text
 from paramove.robots.dynamixel.bus.packets import Instruction, Packet, PacketReader
 from paramove.robots.dynamixel.bus.scan import USUAL_BAUD_RATES, BusScan, scan_bus
 from paramove.robots.dynamixel.bus.servo_chain import ServoChain
@@ -72,7 +72,7 @@ def test_servos_of_all_baud_rates_are_found():
     assert [one.torque for one in found.servos] == [False, False, True]
     assert found.servos[0].voltage == pytest.approx(11.1)
     assert (found.servos[0].temperature, found.servos[0].firmware) == (30, 46)
-    assert in_words(found.servos[1].hardware_error) == "overheated, overloaded"
+    assert error_text(found.servos[1].hardware_error) == "overheated, overloaded"
     assert (found.asked, found.findings()) == (list(USUAL_BAUD_RATES), [])
 
 
@@ -99,7 +99,7 @@ def test_two_servos_of_one_id_are_told():
     servos = [EmulatedServo(XL330_M288, number, RATE) for number in (1, 2, 2)]
     servos[2].temperature, servos[2].voltage = 41.0, 4.6
     found = scanned(servos, (RATE,), range(5))
-    assert [(one.number, one.is_shared) for one in found.servos] == [(1, False), (2, True)]
+    assert [(one.number, one.has_duplicate_id) for one in found.servos] == [(1, False), (2, True)]
     (finding,) = found.findings()
     assert finding.startswith(f"ID 2 at {RATE} {PROBABLY}")
     assert "connect one of them alone and give it another ID" in finding
@@ -108,7 +108,7 @@ def test_two_servos_of_one_id_are_told():
 def test_two_models_of_one_id_are_told():
     """Already a ping is damaged, so IDs are asked one by one."""
     found = scanned([EmulatedServo(model, number, RATE) for model, number in PAIRED], (RATE,), range(5))
-    assert [(one.number, one.is_shared) for one in found.servos] == [(1, False), (3, True)]
+    assert [(one.number, one.has_duplicate_id) for one in found.servos] == [(1, False), (3, True)]
     assert (found.servos[1].name, found.servos[1].model_number) == ("unknown model", 0)
 
 
@@ -202,12 +202,12 @@ def test_an_echo_is_no_answer():
 def test_a_baud_rate_that_the_adapter_does_not_have_is_passed_over(monkeypatch):
     set_rate = ServoPort.setBaudRate
 
-    def refuse(port, rate):
+    def reject(port, rate):
         if rate == 4_000_000:
             raise ValueError("Failed to set custom baud rate (4000000)")
         return set_rate(port, rate)
 
-    monkeypatch.setattr(ServoPort, "setBaudRate", refuse)
+    monkeypatch.setattr(ServoPort, "setBaudRate", reject)
     found = scanned([EmulatedServo(XL330_M288, 1, 1_000_000)], (4_000_000, 1_000_000))
     assert ([one.number for one in found.servos], found.asked) == ([1], [RATE])
 
@@ -217,5 +217,5 @@ def test_a_silent_bus_has_no_servos():
 
 
 def test_unknown_bits_of_the_error_are_named():
-    assert in_words(0) == ""
-    assert in_words(0x81) == "input voltage out of its limits, unknown error, bit 7"
+    assert error_text(0) == ""
+    assert error_text(0x81) == "input voltage out of its limits, unknown error, bit 7"

@@ -10,7 +10,7 @@ from paramove.robots.dynamixel.bus.servo_chain import (
     PingedServo,
     ServoChain,
     ServoRejectedError,
-    ServoSilentError,
+    ServoTimeoutError,
 )
 from paramove.robots.dynamixel.bus.servo_models import XL330_M288, XL430_W250
 from paramove.robots.dynamixel.bus.servo_port import ServoPort
@@ -90,7 +90,7 @@ def test_a_servo_with_a_hardware_error_refuses_torque_and_what_clears_it_is_told
 
 
 def test_a_silent_servo_is_told_with_the_remedy(chain):
-    with pytest.raises(ServoSilentError, match=r"servo 7 did not answer \(read ID, 3 attempts\).*scan"):
+    with pytest.raises(ServoTimeoutError, match=r"servo 7 did not answer \(read ID, 3 attempts\).*scan"):
         impatient(chain).read(7, REGISTERS["ID"])
 
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from paramove.robots.dynamixel.bus.servo_chain import ServoSilentError
+from paramove.robots.dynamixel.bus.servo_chain import ServoTimeoutError
 from paramove.robots.dynamixel.bus.servo_reboot import (
     ServoLoadedError,
     check_unloaded,
-    reboot_sentences,
+    reboot_messages,
     reboot_servo,
     servo_before_reboot,
 )
@@ -26,10 +26,10 @@ def test_the_error_is_told_and_cleared_and_the_others_hold(arm):
     with arm.emulator.lock:
         arm.emulator.bus.servos[1].memory["Hardware Error Status"] = 0x20
     servo = servo_before_reboot(arm.chain, 2)
-    assert reboot_sentences(servo) == ["servo 2: overloaded; take the load off; look for what blocked the joint"]
+    assert reboot_messages(servo) == ["servo 2: overloaded; take the load off; look for what blocked the joint"]
     after = reboot_servo(arm.chain, 2)
     assert (after.hardware_error, after.torque) == (0, False)
-    assert reboot_sentences(after) == ["servo 2: no hardware error"]
+    assert reboot_messages(after) == ["servo 2: no hardware error"]
     assert [arm.memory(joint)["Torque Enable"] for joint in ("pan", "lift", "elbow")] == [1, 0, 1]
 
 
@@ -48,8 +48,8 @@ def test_a_loaded_joint_is_refused(arm, number, name, load, monkeypatch):
 
 def test_a_silent_servo_is_told(arm):
     arm.chain.port.latency_s = 0.03
-    with pytest.raises(ServoSilentError, match="servo 9 does not answer"):
+    with pytest.raises(ServoTimeoutError, match="servo 9 does not answer"):
         servo_before_reboot(arm.chain, 9)
     arm.chain.reboot(1)
-    with pytest.raises(ServoSilentError, match=r"servo 1 (does|did) not answer"):
+    with pytest.raises(ServoTimeoutError, match=r"servo 1 (does|did) not answer"):
         reboot_servo(arm.chain, 1, timeout_s=0.05)

@@ -137,10 +137,10 @@ def test_a_file_that_contradicts_itself_is_refused(path, old, new, told):
 )
 def test_a_file_of_something_else_is_told_in_plain_words(path, text, told):
     path.write_text(text)
-    with pytest.raises(CalibrationError, match=told) as refused:
+    with pytest.raises(CalibrationError, match=told) as rejected:
         ArmCalibration.load(path, SERIAL)
-    assert str(refused.value).startswith(str(path))
-    assert "run `paramove arm calibrate`" in str(refused.value)
+    assert str(rejected.value).startswith(str(path))
+    assert "run `paramove arm calibrate`" in str(rejected.value)
 
 
 def test_a_cut_file_is_never_taken_for_a_whole_one(path):

@@ -24,8 +24,8 @@ class Hands:
         self.arm, self.wrong, self.angles = arm, wrong, angles or swept()
         self.told, self.asked, self.shown = [], [], []
 
-    def tell(self, sentence):
-        self.told.append(sentence)
+    def tell(self, detail):
+        self.told.append(detail)
 
     def until_done(self, request, look):
         self.asked.append(request)
@@ -73,8 +73,8 @@ def test_an_arm_is_calibrated(arm):
     assert hands.asked[0].startswith("Hold the arm, it becomes limp")
     assert hands.asked[3].startswith("Move pan by 10 deg or more so that pan goes up")
     assert hands.shown == ["pan: 28.7 deg", "lift: -14.3 deg", "elbow: 57.3 deg"]
-    assert any("lift crosses the seam of its encoder" in sentence for sentence in hands.told)
-    assert any("joint lift" in sentence and "mounted mirrored" in sentence for sentence in hands.told)
+    assert any("lift crosses the seam of its encoder" in detail for detail in hands.told)
+    assert any("joint lift" in detail and "mounted mirrored" in detail for detail in hands.told)
 
 
 def test_a_joint_whose_posture_is_an_end_of_its_range_is_shown_the_other_way(arm):

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from paramove.robots.dynamixel.bus.servo_chain import ServoSilentError
+from paramove.robots.dynamixel.bus.servo_chain import ServoTimeoutError
 from paramove.robots.dynamixel.calibration.arm_calibration import CalibrationError
 from paramove.robots.dynamixel.calibration.servo_settings import (
     DESCRIPTION,
@@ -116,19 +116,19 @@ def test_the_servos_settings_can_be_taken_over(arm):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "sentence"),
+    ("name", "value", "detail"),
     [
         ("Homing Offset", 5, "lift: servo 2 has Homing Offset 5, and a calibration has none.*verify --write"),
         ("Operating Mode", 1, "lift: servo 2 has operating mode 1, not 3 to 5"),
         ("Operating Mode", 3, "lift: expected|joint lift"),
     ],
 )
-def test_settings_that_no_calibration_can_have_are_not_taken_over(arm, name, value, sentence):
+def test_settings_that_no_calibration_can_have_are_not_taken_over(arm, name, value, detail):
     calibrated = calibration()
     write_all(arm, calibrated)
     with arm.emulator.lock:
         arm.emulator.bus.servos[1].memory[name] = value
-    with pytest.raises(CalibrationError, match=sentence):
+    with pytest.raises(CalibrationError, match=detail):
         adopted(arm.chain, calibrated)
 
 
@@ -141,5 +141,5 @@ def test_a_servo_with_torque_keeps_its_settings(arm):
 
 def test_a_silent_servo_is_told(arm):
     joint = calibration().joints["pan"].model_copy(update={"id": 8})
-    with pytest.raises(ServoSilentError, match="servo 8 does not answer"):
+    with pytest.raises(ServoTimeoutError, match="servo 8 does not answer"):
         write_settings(arm.chain, joint)

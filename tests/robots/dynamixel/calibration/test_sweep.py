@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paramove.robots.dynamixel.bus.scan import FoundServo
+from paramove.robots.dynamixel.bus.scan import DetectedServo
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     COUNTS_PER_RAD,
@@ -27,7 +27,7 @@ from paramove.robots.dynamixel.calibration.sweep import (
     remarks,
 )
 
-SERVO = FoundServo(3, "xl330_m288", 1200, 45, 1_000_000)
+SERVO = DetectedServo(3, "xl330_m288", 1200, 45, 1_000_000)
 RANGE = np.deg2rad((-90.0, 60.0))
 HALF_COUNT = 0.5 / COUNTS_PER_RAD
 

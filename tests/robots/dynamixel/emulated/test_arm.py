@@ -54,9 +54,9 @@ def test_joints_have_their_names_at_the_control_socket(tmp_path):
     with EmulatedArm(KOCH, control=tmp_path / "control") as arm:
         tell(tmp_path / "control", "block elbow_flex")
         assert [servo.blocked for servo in arm.emulator.bus.servos] == [False, False, True, False, False, False]
-        assert "koch_v1_1 at /dev/" in arm.sentence
+        assert "koch_v1_1 at /dev/" in arm.detail
         tell(tmp_path / "control", "unplug")
-        assert "unplugged" in arm.sentence
+        assert "unplugged" in arm.detail
 
 
 def test_what_cannot_be_emulated_is_told(tmp_path):

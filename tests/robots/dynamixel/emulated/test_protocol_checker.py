@@ -75,7 +75,7 @@ def test_a_step_is_as_large_as_rate_and_time_allow():
     bus.receive(write(GOAL, 2170 + 23, 4), BAUD, 1.05)
     (found,) = bus.judge.findings
     assert (found.id, found.kind) == (1, "step")
-    assert found.sentence == "Goal Position goes from 2170 to 2193 within 20 ms: 1000 pulses/s allow 22 of these 23"
+    assert found.detail == "Goal Position goes from 2170 to 2193 within 20 ms: 1000 pulses/s allow 22 of these 23"
     bus.receive(write(GOAL, 2193 + int(1000 * RATE_WINDOW_S) + 3, 4), BAUD, 9.0)  # a pause allows no jump
     assert kinds(bus) == ["step", "step"]
 
@@ -130,7 +130,7 @@ def test_goals_beyond_limits_are_found():
     for data in (write(GOAL, 3001, 4), write(GOAL, -1, 4), write(VELOCITY, -266, 4), write(100, 886, 2)):
         bus.receive(data, BAUD, 1.0)
     assert kinds(bus) == ["limit"] * 4
-    assert bus.judge.findings[0].sentence == "Goal Position 3001 is outside of 0 to 3000"
+    assert bus.judge.findings[0].detail == "Goal Position 3001 is outside of 0 to 3000"
 
 
 def test_torque_must_not_come_on_with_the_goal_elsewhere():
@@ -138,7 +138,7 @@ def test_torque_must_not_come_on_with_the_goal_elsewhere():
     bus.receive(write(GOAL, 2200, 4), BAUD, 1.0)
     bus.receive(write(TORQUE, 1), BAUD, 1.1)
     assert kinds(bus) == ["torque"]
-    assert "152 pulses away" in bus.judge.findings[0].sentence
+    assert "152 pulses away" in bus.judge.findings[0].detail
     bus.receive(write(TORQUE, 1), BAUD, 1.2)  # is on already
     assert kinds(bus) == ["torque"]
 

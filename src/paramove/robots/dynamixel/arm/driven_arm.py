@@ -75,9 +75,9 @@ class DrivenArm:
         self._loop.__exit__(kind, error, where)
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """The state of the arm, for people."""
-        return self._driver.sentence
+        return self._driver.detail
 
     @property
     def trouble(self) -> str:

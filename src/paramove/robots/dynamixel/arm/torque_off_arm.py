@@ -7,7 +7,7 @@ import numpy as np
 from paramove.documents import Floats
 from paramove.robots import RobotDescription
 from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 
 GIVES_UP = 25
@@ -59,7 +59,7 @@ class TorqueOffArm:
         missing = [number for number in self._numbers if number not in answers]
         self._misses = self._misses + 1 if missing else 0
         if self._misses > GIVES_UP:
-            raise ServoSilentError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
+            raise ServoTimeoutError(missing[0], f"servo {missing[0]} no longer answers: check its cable and its power")
         if missing:
             return None
         positions = np.array([answers[number].values[POSITION] for number in self._numbers], dtype=np.float64)

@@ -36,6 +36,6 @@ def hardware_errors(status: int) -> tuple[HardwareError, ...]:
     return tuple(HARDWARE_ERRORS.get(bit, HardwareError(f"unknown error, bit {bit}", unknown)) for bit in bits)
 
 
-def in_words(status: int) -> str:
+def error_text(status: int) -> str:
     """One line, "" without an error."""
     return ", ".join(one.words for one in hardware_errors(status))

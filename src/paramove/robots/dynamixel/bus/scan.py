@@ -35,7 +35,7 @@ LOOKED_AT = (
 
 
 @dataclass(frozen=True)
-class FoundServo:
+class DetectedServo:
     """What a servo, or several with the same ID, reported.
 
     Attributes:
@@ -92,7 +92,7 @@ class FoundServo:
         return None if state is None else bool(state)
 
     @property
-    def is_shared(self) -> bool:
+    def has_duplicate_id(self) -> bool:
         """Whether two servos, or more, most likely have this ID."""
         return self.garbled or self.at_once > 1
 
@@ -111,7 +111,7 @@ class FoundServo:
     @property
     def remedy(self) -> str:
         """For the fault."""
-        if self.is_shared:
+        if self.has_duplicate_id:
             return "connect one of them alone and give it another ID with `paramove arm setup`"
         return "connect it alone and scan again, then with another cable"
 
@@ -127,7 +127,7 @@ class BusScan:
         foreign: Of these, those with bytes that are no reply of a servo.
     """
 
-    servos: list[FoundServo] = field(default_factory=list)
+    servos: list[DetectedServo] = field(default_factory=list)
     asked: list[int] = field(default_factory=list)
     damaged: list[int] = field(default_factory=list)
     foreign: list[int] = field(default_factory=list)
@@ -205,7 +205,7 @@ def _scan_rate(chain: ServoChain, ids: Sequence[int], scan: BusScan) -> None:
         scan.foreign.append(chain.port.baud_rate)
 
 
-def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[FoundServo]:
+def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[DetectedServo]:
     """Servos of these IDs; ends where bytes that are not understood come from a device that was not asked."""
     for number in ids:
         servo = _servo_with_id(chain, number)
@@ -215,7 +215,7 @@ def _one_by_one(chain: ServoChain, ids: Sequence[int]) -> Iterator[FoundServo]:
             yield servo
 
 
-def _servo_with_id(chain: ServoChain, number: int) -> FoundServo | None:
+def _servo_with_id(chain: ServoChain, number: int) -> DetectedServo | None:
     """None if nothing comes."""
     for _ in range(READS):
         before = _not_understood(chain)
@@ -224,7 +224,7 @@ def _servo_with_id(chain: ServoChain, number: int) -> FoundServo | None:
             return looked_at(chain, pinged)
         if _not_understood(chain) == before:
             return None
-    return FoundServo(number, "", 0, 0, chain.port.baud_rate, garbled=True)
+    return DetectedServo(number, "", 0, 0, chain.port.baud_rate, garbled=True)
 
 
 def _not_understood(chain: ServoChain) -> int:
@@ -240,7 +240,7 @@ def _quick_ping(chain: ServoChain, number: int) -> PingedServo | None:
         chain.port.latency_s = latency_s
 
 
-def looked_at(chain: ServoChain, pinged: PingedServo) -> FoundServo:
+def looked_at(chain: ServoChain, pinged: PingedServo) -> DetectedServo:
     """A servo that replied to a ping, with its registers. Raises PortLostError."""
     registers, before = _registers(pinged.model_number), _not_understood(chain)
     values, failed = dict[str, int](), 0
@@ -249,7 +249,7 @@ def looked_at(chain: ServoChain, pinged: PingedServo) -> FoundServo:
         answer = chain.read_once([pinged.number], registers).get(pinged.number)
         failed += answer is None or chain.counts.damaged > damaged
         values = values if answer is None else answer.values
-    return FoundServo(
+    return DetectedServo(
         pinged.number, model_name(pinged.model_number), pinged.model_number, pinged.firmware, chain.port.baud_rate,
         failed=failed, garbled=failed == READS and not values and _not_understood(chain) > before, values=values,
     )  # fmt: skip

@@ -62,7 +62,7 @@ class ServoError(Exception):
         self.number = number
 
 
-class ServoSilentError(ServoError):
+class ServoTimeoutError(ServoError):
     """No reply, or none that could be read."""
 
 
@@ -333,12 +333,12 @@ def _check(number: int, packet: Packet, what: str) -> None:
         raise ServoRejectedError(number, f"servo {number} {why}: {what}")
 
 
-def _no_reply(number: int, what: str) -> ServoSilentError:
+def _no_reply(number: int, what: str) -> ServoTimeoutError:
     message = (
         f"servo {number} did not answer ({what}, {len(ATTEMPTS_S)} attempts): check its cable, its power and the baud "
         "rate; `paramove arm scan` looks for it"
     )
-    return ServoSilentError(number, message)
+    return ServoTimeoutError(number, message)
 
 
 def _pinged(packet: Packet) -> PingedServo:

@@ -28,7 +28,7 @@ TRIPPED = 0xFF
 """Of Bus Watchdog (98), which reads -1."""
 
 
-class RefusedError(Exception):
+class RejectedError(Exception):
     """A request that a servo rejects, with the error number of its reply."""
 
     def __init__(self, error: StatusError) -> None:
@@ -116,7 +116,7 @@ class ServoMemory:
     def read(self, address: int, size: int) -> bytes:
         """Raises RefusedError beyond the end of the table."""
         if size == 0 or address + size > len(self._bytes):
-            raise RefusedError(StatusError.ACCESS)
+            raise RejectedError(StatusError.ACCESS)
         if address + size <= FIRST_INDIRECT:
             return bytes(self._bytes[address : address + size])
         return bytes(self._bytes[self._meant(byte_address)] for byte_address in range(address, address + size))
@@ -127,7 +127,7 @@ class ServoMemory:
         Bytes of the indirect access are judged by what they stand for.
         """
         if not data or address + len(data) > len(self._bytes):
-            raise RefusedError(StatusError.ACCESS)
+            raise RejectedError(StatusError.ACCESS)
         written: dict[int, int] = {}
         indirect: dict[int, int] = {}
         for byte_address, byte in zip(range(address, address + len(data)), data, strict=True):
@@ -155,12 +155,12 @@ class ServoMemory:
     def _check_indirect(self, written: dict[int, int]) -> None:
         """Indirect addresses are of two bytes, and lead to RAM. Raises RefusedError if these cannot be written."""
         if written and self["Torque Enable"]:
-            raise RefusedError(StatusError.ACCESS)
+            raise RejectedError(StatusError.ACCESS)
         for byte_address, byte in written.items():
             if byte_address ^ 1 not in written:
-                raise RefusedError(StatusError.DATA_LENGTH)
+                raise RejectedError(StatusError.DATA_LENGTH)
             if byte_address % 2 == 0 and not RAM_BEGINS <= byte + 256 * written[byte_address + 1] < len(self._bytes):
-                raise RefusedError(StatusError.DATA_RANGE)
+                raise RejectedError(StatusError.DATA_RANGE)
 
     def _touched(self, written: dict[int, int]) -> list[Register]:
         touched: dict[str, Register] = {}
@@ -169,32 +169,32 @@ class ServoMemory:
                 continue  # data of the indirect access that stand for nothing else
             register = self._at.get(byte_address)
             if register is None or not register.writable:
-                raise RefusedError(StatusError.ACCESS)
+                raise RejectedError(StatusError.ACCESS)
             if register.address < RAM_BEGINS and self["Torque Enable"]:
-                raise RefusedError(StatusError.ACCESS)
+                raise RejectedError(StatusError.ACCESS)
             touched[register.name] = register
         return list(touched.values())
 
     def _checked(self, register: Register, written: dict[int, int]) -> tuple[Register, int]:
         addresses = range(register.address, register.address + register.size)
         if any(byte_address not in written for byte_address in addresses):
-            raise RefusedError(StatusError.DATA_LENGTH)
+            raise RejectedError(StatusError.DATA_LENGTH)
         value = int.from_bytes(
             bytes(written[byte_address] for byte_address in addresses), "little", signed=register.signed
         )
         assert register.allowed is not None
         low, high = register.allowed
         if (low is not None and value < low) or (high is not None and value > high):
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         if register.name == "Operating Mode" and value not in self.model.modes:
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         if register.name == "Bus Watchdog":
             return register, value
         if register.name.startswith("Goal") and self["Bus Watchdog"] == TRIPPED:  # tripped: goals are read only
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         low, high = self._limits(register.name)
         if (low is not None and value < low) or (high is not None and value > high):
-            raise RefusedError(StatusError.DATA_LIMIT)
+            raise RejectedError(StatusError.DATA_LIMIT)
         return register, value
 
     def _limits(self, name: str) -> tuple[int | None, int | None]:

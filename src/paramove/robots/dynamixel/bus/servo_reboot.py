@@ -6,8 +6,8 @@ import time
 
 from paramove.documents import InputError
 from paramove.robots.dynamixel.bus.hardware_error import hardware_errors
-from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.scan import DetectedServo, looked_at
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 
 TIMEOUT_S = 3.0
 LOADED_FRACTION = 0.05
@@ -20,17 +20,17 @@ class ServoLoadedError(InputError):
     """The servo holds its joint, which would fall when it reboots."""
 
 
-def servo_before_reboot(chain: ServoChain, number: int) -> FoundServo:
+def servo_before_reboot(chain: ServoChain, number: int) -> DetectedServo:
     """The servo as it is. Raises ServoSilentError if it does not answer."""
     pinged = chain.ping(number)
     if pinged is None:
-        raise ServoSilentError(
+        raise ServoTimeoutError(
             number, f"servo {number} does not answer; `paramove arm scan` lists the servos of the bus"
         )
     return looked_at(chain, pinged)
 
 
-def reboot_sentences(servo: FoundServo) -> list[str]:
+def reboot_messages(servo: DetectedServo) -> list[str]:
     """Its hardware errors in words, each with what helps."""
     if servo.hardware_error is None:
         return [f"servo {servo.number}: its hardware error cannot be read"]
@@ -39,7 +39,7 @@ def reboot_sentences(servo: FoundServo) -> list[str]:
     return messages or [f"servo {servo.number}: no hardware error"]
 
 
-def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
+def check_unloaded(chain: ServoChain, servo: DetectedServo) -> None:
     """Raises ServoLoadedError while the servo holds something up, and ServoError."""
     model = servo.table
     if model is None or not servo.torque:
@@ -56,7 +56,7 @@ def check_unloaded(chain: ServoChain, servo: FoundServo) -> None:
         )
 
 
-def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -> FoundServo:
+def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -> DetectedServo:
     """Reboot it and wait until it answers again: torque off, errors cleared. Raises ServoError."""
     chain.reboot(number)
     end_s = time.monotonic() + timeout_s
@@ -64,4 +64,4 @@ def reboot_servo(chain: ServoChain, number: int, timeout_s: float = TIMEOUT_S) -
         pinged = chain.ping(number, retry=False)
         if pinged is not None:
             return looked_at(chain, pinged)
-    raise ServoSilentError(number, f"servo {number} does not answer {timeout_s:g} s after its reboot: check its power")
+    raise ServoTimeoutError(number, f"servo {number} does not answer {timeout_s:g} s after its reboot: check its power")

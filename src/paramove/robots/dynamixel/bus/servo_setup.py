@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Sequence
 
 from paramove.documents import InputError
-from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, FoundServo, listed, scan_bus
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.scan import ALL_IDS, USUAL_BAUD_RATES, DetectedServo, listed, scan_bus
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, ServoModel
 
 NO_DELAY = 0
@@ -16,7 +16,7 @@ NO_DELAY = 0
 
 def only_servo(
     chain: ServoChain, baud_rates: Sequence[int] = USUAL_BAUD_RATES, ids: Sequence[int] = ALL_IDS
-) -> FoundServo:
+) -> DetectedServo:
     """The one servo that is connected, whatever its ID and baud rate; see `scan_bus`.
 
     Raises:
@@ -28,13 +28,15 @@ def only_servo(
         raise InputError(
             f"expected exactly one servo on the bus, found none at {listed(baud_rates)}: {why}", missing=True
         )
-    if len(scan.servos) > 1 or scan.servos[0].is_shared:
-        servos = ", ".join(f"ID {one.number} ({one.fault if one.is_shared else one.name})" for one in scan.servos)
+    if len(scan.servos) > 1 or scan.servos[0].has_duplicate_id:
+        servos = ", ".join(
+            f"ID {one.number} ({one.fault if one.has_duplicate_id else one.name})" for one in scan.servos
+        )
         raise InputError(f"expected exactly one servo on the bus, found {servos}: connect one alone")
     return scan.servos[0]
 
 
-def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, model: str = "") -> FoundServo:
+def set_up(chain: ServoChain, servo: DetectedServo, number: int, baud_rate: int, model: str = "") -> DetectedServo:
     """Give the only servo on the bus its ID and baud rate, and no delay before its replies; its torque goes off.
 
     Args:
@@ -58,7 +60,7 @@ def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, mo
         chain.write(servo.number, registers["ID"], number)
     chain.write(number, registers["Return Delay Time"], NO_DELAY)
     if servo.baud_rate != baud_rate:
-        with contextlib.suppress(ServoSilentError):  # it may reply at the new rate already; see what is read back
+        with contextlib.suppress(ServoTimeoutError):  # it may reply at the new rate already; see what is read back
             chain.write(number, registers["Baud Rate"], BAUD_RATES.index(baud_rate))
         chain.port.setBaudRate(baud_rate)
     expected = {"ID": number, "Baud Rate": BAUD_RATES.index(baud_rate), "Return Delay Time": NO_DELAY}
@@ -69,7 +71,7 @@ def set_up(chain: ServoChain, servo: FoundServo, number: int, baud_rate: int, mo
     return only_servo(chain, [baud_rate])
 
 
-def _checked(servo: FoundServo, number: int, baud_rate: int, model: str) -> ServoModel:
+def _checked(servo: DetectedServo, number: int, baud_rate: int, model: str) -> ServoModel:
     if model and servo.model != model:
         raise InputError(f"expected a servo {model} for ID {number}, found {servo.name}: connect the right one")
     table = servo.table

@@ -23,7 +23,7 @@ def calibration_path(serial: str, data: Path | None = None) -> Path:
     return folder / "calibration" / f"arm_{re.sub(r'[^A-Za-z0-9.-]', '_', serial)}.yaml"
 
 
-def check_can_be_kept(path: Path) -> None:
+def check_writable(path: Path) -> None:
     """Check that a calibration can be written there, before a person begins it. Raises OSError."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from paramove.robots.dynamixel.bus.position_watch import POSITION, PositionWatch
-from paramove.robots.dynamixel.bus.scan import FoundServo, looked_at
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.scan import DetectedServo, looked_at
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, model_named
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     COUNTS_PER_RAD,
@@ -75,7 +75,7 @@ class ArmCalibrator:
         bus = CalibratedBus(serial=self._serial, baud_rate=self._plan.baud_rate)
         return ArmCalibration(created=created, tool=tool, robot=self._plan.robot, bus=bus, joints=joints)
 
-    def _detected(self) -> dict[str, FoundServo]:
+    def _detected(self) -> dict[str, DetectedServo]:
         """The servos by joint. Raises CalibrationError with all that are missing or of another model."""
         detected, wrong = {}, []
         for servo in self._plan.servos:
@@ -112,7 +112,7 @@ class ArmCalibrator:
         self._misses = 0 if len(answers) == len(numbers) else self._misses + 1
         if self._misses > GIVES_UP:
             missing = next(number for number in numbers if number not in answers)
-            raise ServoSilentError(missing, f"servo {missing} no longer answers: check its cable and its power")
+            raise ServoTimeoutError(missing, f"servo {missing} no longer answers: check its cable and its power")
         return {number: answer.values[POSITION] for number, answer in answers.items()}
 
     def _all_positions(self) -> dict[int, int]:

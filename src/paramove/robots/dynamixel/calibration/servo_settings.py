@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from paramove.robots.dynamixel.bus.scan import model_name
-from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoSilentError
+from paramove.robots.dynamixel.bus.servo_chain import ServoChain, ServoTimeoutError
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN, Register, model_named
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     CURRENT_BASED,
@@ -78,7 +78,7 @@ def write_settings(chain: ServoChain, joint: JointCalibration) -> dict[str, tupl
     """
     pinged, model = chain.ping(joint.id), model_named(joint.model)
     if pinged is None:
-        raise ServoSilentError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
+        raise ServoTimeoutError(joint.id, f"servo {joint.id} does not answer; `paramove arm scan` looks for it")
     if pinged.model_number != model.number:
         found = model_name(pinged.model_number) or pinged.model_number
         raise CalibrationError(f"servo {joint.id} is a {found}, expected {joint.model}: nothing was written to it")
@@ -117,7 +117,7 @@ def adopted(chain: ServoChain, calibration: ArmCalibration) -> ArmCalibration:
     for name, joint in calibration.joints.items():
         pinged = chain.ping(joint.id)
         if pinged is None:
-            raise ServoSilentError(joint.id, f"joint {name}: servo {joint.id} does not answer")
+            raise ServoTimeoutError(joint.id, f"joint {name}: servo {joint.id} does not answer")
         if pinged.model_number != model_named(joint.model).number:
             found = model_name(pinged.model_number) or pinged.model_number
             raise CalibrationError(

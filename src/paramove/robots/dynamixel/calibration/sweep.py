@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from paramove.robots.dynamixel.bus.position_watch import difference
-from paramove.robots.dynamixel.bus.scan import FoundServo
+from paramove.robots.dynamixel.bus.scan import DetectedServo
 from paramove.robots.dynamixel.bus.servo_models import PULSES_PER_TURN
 from paramove.robots.dynamixel.calibration.arm_calibration import (
     COUNTS_PER_RAD,
@@ -94,7 +94,7 @@ class JointSweep:
 
 
 def calibrated_joint(
-    servo: FoundServo, planned: PlannedServo, travel: Travel, held: int, step: int
+    servo: DetectedServo, planned: PlannedServo, travel: Travel, held: int, step: int
 ) -> JointCalibration:
     """A joint's calibration from the person's movements.
 

@@ -90,7 +90,7 @@ class EmulatedArm:
         self._open.close()
 
     @property
-    def sentence(self) -> str:
+    def detail(self) -> str:
         """What there is, in a few words."""
         port = self._link or self.emulator.port
         plugged = f"at {port}" if self.emulator.plugged_in else f"unplugged from {port}"

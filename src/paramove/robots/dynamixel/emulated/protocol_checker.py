@@ -46,7 +46,7 @@ class Finding:
     time_s: float
     id: int
     kind: str
-    sentence: str
+    detail: str
 
 
 @dataclass(frozen=True)
@@ -249,17 +249,17 @@ class ProtocolChecker:
         fastest = self.fastest.get(servo.id, servo.model.top_speed * PULSES_PER_MINUTE_TO_SECOND)
         step, allowed = abs(goal - last.goal), fastest * elapsed_s + ROUNDING
         if step > allowed:
-            sentence = (
+            detail = (
                 f"Goal Position goes from {last.goal:.0f} to {goal} within {1e3 * elapsed_s:.0f} ms: "
                 f"{fastest:.0f} pulses/s allow {allowed:.0f} of these {step:.0f}"
             )
-            self._find("step", sentence, servo.id)
+            self._find("step", detail, servo.id)
         self._courses[servo.id] = _Course(goal, self._now_s)
 
-    def _find(self, kind: str, sentence: str, number: int = -1) -> None:
+    def _find(self, kind: str, detail: str, number: int = -1) -> None:
         self.counts[kind] += 1
         if len(self.findings) < MAX_FINDINGS:
-            self.findings.append(Finding(self._now_s, number, kind, sentence))
+            self.findings.append(Finding(self._now_s, number, kind, detail))
 
 
 def _word(data: bytes) -> int:

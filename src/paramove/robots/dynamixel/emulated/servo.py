@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from paramove.robots.dynamixel.bus.packets import ALERT, Instruction, StatusError
-from paramove.robots.dynamixel.bus.servo_memory import GOALS, POSITION_MODE, RefusedError
+from paramove.robots.dynamixel.bus.servo_memory import GOALS, POSITION_MODE, RejectedError
 from paramove.robots.dynamixel.bus.servo_models import BAUD_RATES, PULSES_PER_TURN, RAM_BEGINS, ServoModel
 from paramove.robots.dynamixel.emulated.body import REVERSE, ServoBody
 from paramove.robots.dynamixel.emulated.loops import VELOCITY_UNIT
@@ -78,19 +78,19 @@ class EmulatedServo(ServoBody):
         alert = ALERT if self.memory["Hardware Error Status"] else 0  # also in the last answer before a reboot
         try:
             return Answer(alert, self._done(instruction, parameters))
-        except RefusedError as refused:
-            return Answer(alert | refused.error)
+        except RejectedError as rejected:
+            return Answer(alert | rejected.error)
 
     def _done(self, instruction: int, parameters: bytes) -> bytes:
         if instruction == Instruction.PING:
             return self.memory["Model Number"].to_bytes(2, "little") + bytes([self.memory["Firmware Version"]])
         if instruction == Instruction.READ:
             if len(parameters) != 4:
-                raise RefusedError(StatusError.INSTRUCTION)
+                raise RejectedError(StatusError.INSTRUCTION)
             return self.memory.read(_word(parameters), _word(parameters[2:]))
         if instruction in (Instruction.WRITE, Instruction.REG_WRITE):
             if len(parameters) < 3:
-                raise RefusedError(StatusError.INSTRUCTION)
+                raise RejectedError(StatusError.INSTRUCTION)
             address, data = _word(parameters), parameters[2:]
             self.memory.check(address, data)
             if instruction == Instruction.WRITE:
@@ -100,7 +100,7 @@ class EmulatedServo(ServoBody):
                 self.memory["Registered Instruction"] = 1
         elif instruction == Instruction.ACTION:
             if self._registered is None:
-                raise RefusedError(StatusError.INSTRUCTION)
+                raise RejectedError(StatusError.INSTRUCTION)
             address, data = self._registered
             self._registered, self.memory["Registered Instruction"] = None, 0
             self.memory.check(address, data)
@@ -114,7 +114,7 @@ class EmulatedServo(ServoBody):
         elif instruction == Instruction.BACKUP:
             self._back_up(parameters)
         else:
-            raise RefusedError(StatusError.INSTRUCTION)
+            raise RejectedError(StatusError.INSTRUCTION)
         return b""
 
     def _write(self, address: int, data: bytes) -> None:
@@ -122,7 +122,7 @@ class EmulatedServo(ServoBody):
         if self.is_shut_down and any(
             register.name == "Torque Enable" and value for register, value in self.memory.check(address, data)
         ):
-            raise RefusedError(StatusError.RESULT_FAIL)  # which number it is, the manual does not tell
+            raise RejectedError(StatusError.RESULT_FAIL)  # which number it is, the manual does not tell
         written = self.memory.write(address, data)
         memory = self.memory
         if (memory["Drive Mode"] ^ before["Drive Mode"]) & REVERSE:
@@ -160,7 +160,7 @@ class EmulatedServo(ServoBody):
 
     def _factory_reset(self, parameters: bytes) -> None:
         if len(parameters) != 1 or parameters[0] not in KEPT:
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         kept = {name: self.memory[name] for name in KEPT[parameters[0]]}
         self.memory.reset(0)
         for name, value in kept.items():
@@ -169,21 +169,21 @@ class EmulatedServo(ServoBody):
 
     def _back_up(self, parameters: bytes) -> None:
         if parameters not in (STORE, RESTORE):
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         if self.memory["Torque Enable"]:
-            raise RefusedError(StatusError.RESULT_FAIL)
+            raise RejectedError(StatusError.RESULT_FAIL)
         if parameters == STORE:
             self.memory.back_up()
         elif self.memory.restore_eeprom():
             self.reboot()
         else:
-            raise RefusedError(StatusError.RESULT_FAIL)
+            raise RejectedError(StatusError.RESULT_FAIL)
 
     def _clear(self, parameters: bytes) -> None:
         if parameters != CLEAR_MULTI_TURN:
-            raise RefusedError(StatusError.DATA_RANGE)
+            raise RejectedError(StatusError.DATA_RANGE)
         if round(self.velocity / VELOCITY_UNIT) != 0:
-            raise RefusedError(StatusError.RESULT_FAIL)
+            raise RejectedError(StatusError.RESULT_FAIL)
         self._settle()
 
 
