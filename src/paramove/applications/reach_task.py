@@ -108,7 +108,7 @@ class ReachTask:
         InputError: A step cannot be executed; the message has the step, the reason and what would work.
 
     Attributes:
-        sentence: What it does, as text.
+        detail: What it does, as text.
         failure: Why it cannot go on; empty while it can.
         finished: Whether all is done.
     """

@@ -38,7 +38,7 @@ class Relocator:
 
     Attributes:
         state: Name of the state.
-        sentence: Text of the last speech message.
+        detail: Text of the last speech message.
         placed: Positions at which the object was put.
     """
 

@@ -51,7 +51,7 @@ class LockstepBarrier:
         members: Nodes that time waits for at present.
         lost: Nodes that have left, in order.
         tick: Number of the latest tick. 0 is the handshake.
-        refused: How many answers were rejected because they did not come from a member.
+        rejected: How many answers were rejected because they did not come from a member.
     """
 
     def __init__(self, bus: Bus, members: tuple[str, ...] | None = None) -> None:

@@ -115,7 +115,7 @@ def unpack(header: bytes, payload: bytes, schema: int, max_bytes: int) -> Envelo
         max_bytes: Largest payload of the topic.
 
     Raises:
-        RefusedError: with the first check that fails.
+        RejectedError: with the first check that fails.
     """
     if len(header) != SIZE:
         raise RejectedError(Reason.SIZE, f"header has {len(header)} bytes, expected {SIZE}")

@@ -45,7 +45,7 @@ class Measurement:
         welcomed: Whether the publisher answered.
         messages: How many were received; a latched value that was published before counts, too.
         lost: Gaps in the sequence.
-        refused: Messages that were rejected.
+        rejected: Messages that were rejected.
         sequence: Of the latest message of the publisher.
         epoch: Of the publisher.
         bytes_total: Of the payloads.

@@ -60,7 +60,7 @@ class RecordedBus:
     Attributes:
         published: Everything the node published, in order.
         states: States and their messages in order, such as ("ready", "tracking 4 colours").
-        refused: Topic and unsound number of each message that was rejected.
+        rejected: Topic and unsound number of each message that was rejected.
         now_ns: Publish time of the latest message or time of the latest tick.
     """
 

@@ -30,7 +30,7 @@ class SequenceCounter:
         messages: Messages received, each counted once.
         lost: Messages published and not received.
         repeated: Messages that came again.
-        refused: How many messages were rejected, by reason.
+        rejected: How many messages were rejected, by reason.
         epochs: How many publishers followed each other.
     """
 

@@ -188,7 +188,7 @@ class Subscriber:
         self.socket.setsockopt(zmq.SUBSCRIBE, self._frame)
 
     def _read(self) -> tuple[Envelope, bytes]:
-        """The next message, its sequence and content unchecked; raises RefusedError."""
+        """The next message, its sequence and content unchecked; raises RejectedError."""
         socket = self.socket
         head = socket.recv(_NOBLOCK)
         frames = 1

@@ -39,7 +39,7 @@ class Verdict:
 
     Attributes:
         status: HTTP status of a rejection.
-        sentence: Why it is rejected, for a person; has nothing of the request.
+        detail: Why it is rejected, for a person; has nothing of the request.
         file: Name of the requested file.
         by_token: The page was requested with the token, which is used up now.
     """

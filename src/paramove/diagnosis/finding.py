@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
+from paramove.documents import renamed_attribute
+
 
 class Level(StrEnum):
     """Severity. Only with a problem something cannot work."""
@@ -47,7 +49,7 @@ class Finding:
 
     Attributes:
         subject: The thing, in a word or two.
-        sentence: The result, with its cause.
+        detail: The result, with its cause.
         remedy: Lines that fix it: commands for a shell, or what a person has to do.
         fix: The same by a call, where the user may do it.
         facts: Numbers and names of the message, for programs; unit in the name.
@@ -59,6 +61,7 @@ class Finding:
     remedy: tuple[str, ...] = ()
     fix: Fix | None = None
     facts: Mapping[str, object] = field(default_factory=dict)
+    sentence = renamed_attribute("sentence", "detail")
 
 
 @dataclass(frozen=True)

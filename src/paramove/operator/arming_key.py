@@ -15,7 +15,7 @@ class ArmingKey:
     """Call `press`, `handle` with the gate's states, and `tick` often: it is true when the request is to be sent.
 
     Attributes:
-        sentence: Result of the last press, or why the gate has stopped the arm.
+        detail: Result of the last press, or why the gate has stopped the arm.
     """
 
     def __init__(self) -> None:

@@ -26,7 +26,7 @@ class Jogging:
     Attributes:
         chosen: Index of the joint that is moved.
         angles: Measured, by joint, rad; empty before the driver publishes them.
-        sentence: Result of the last step.
+        detail: Result of the last step.
     """
 
     def __init__(self, name: str, step: float) -> None:

@@ -34,7 +34,7 @@ def request_arming(folder: Path, armed: bool, timeout_s: float) -> SafetyState |
         TopicTakenError: Another program publishes the topic, such as the operator of a simulated run.
         BusFolderError: The folder cannot be used.
     """
-    with BusVisitor(folder, "arm_by_word") as bus:
+    with BusVisitor(folder, "request_arming") as bus:
         publisher, gate = bus.publisher(topics.OPERATOR_ARM), bus.subscriber(topics.ARM_SAFETY)
         before = _until(gate, timeout_s, lambda state: True)
         if before is None or obeyed(before, armed):

@@ -72,7 +72,7 @@ def check_trajectory(
             faded out.
 
     Raises:
-        TrajectoryRefusedError: With the point, the joint, the requested value and what is allowed.
+        TrajectoryRejectedError: With the point, the joint, the requested value and what is allowed.
     """
     indices = _indices(joints, limits)
     points = _points(joints, positions)

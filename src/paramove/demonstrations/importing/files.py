@@ -33,7 +33,7 @@ class Imported:
         takes: In metres, x forward, y left, z up.
         parameter_names: Of theta, as the file has them; () if it has no labels.
         remarks: What was left out or will be filled.
-        refused: Labelled movements in which a point is lost for too long; they are not among the labels.
+        rejected: Labelled movements in which a point is lost for too long; they are not among the labels.
     """
 
     takes: tuple[Take, ...]

@@ -71,8 +71,8 @@ class StreamReader:
     Attributes:
         epoch: Of the stream being played; 0 before any.
         next_index: Of the frame to be played next.
-        refused_batches: How many batches were rejected.
-        refusal: Why the latest of them was.
+        rejected_batches: How many batches were rejected.
+        rejection: Why the latest of them was.
     """
 
     def __init__(self, description: RobotDescription, held_counts: Frames) -> None:

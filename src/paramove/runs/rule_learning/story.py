@@ -30,7 +30,7 @@ class RobotState:
 
     Attributes:
         stage: "calibrate", "learn", "apply", "done" or "".
-        sentence: Text of the last speech message.
+        detail: Text of the last speech message.
         rules: Object -> estimated opening (x, y), m.
         goal: The goal under way, else None; `phase` of its motion.
         gesture: The latest gesture if it is fresh, else None.

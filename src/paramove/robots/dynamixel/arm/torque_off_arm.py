@@ -53,7 +53,7 @@ class TorqueOffArm:
         None while a reply is missing, or has a position that cannot be true.
 
         Raises:
-            ServoSilentError: A servo has not replied for long.
+            ServoTimeoutError: A servo has not replied for long.
         """
         answers = self._watch.read(self._chain)
         missing = [number for number in self._numbers if number not in answers]

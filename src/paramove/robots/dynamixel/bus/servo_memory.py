@@ -114,7 +114,7 @@ class ServoMemory:
         self._values[name] = int.from_bytes(data, "little", signed=register.signed)
 
     def read(self, address: int, size: int) -> bytes:
-        """Raises RefusedError beyond the end of the table."""
+        """Raises RejectedError beyond the end of the table."""
         if size == 0 or address + size > len(self._bytes):
             raise RejectedError(StatusError.ACCESS)
         if address + size <= FIRST_INDIRECT:
@@ -122,7 +122,7 @@ class ServoMemory:
         return bytes(self._bytes[self._meant(byte_address)] for byte_address in range(address, address + size))
 
     def check(self, address: int, data: bytes) -> list[tuple[Register, int]]:
-        """The registers that would be written and their values. Raises RefusedError if one of them cannot be.
+        """The registers that would be written and their values. Raises RejectedError if one of them cannot be.
 
         Bytes of the indirect access are judged by what they stand for.
         """
@@ -153,7 +153,7 @@ class ServoMemory:
         return written
 
     def _check_indirect(self, written: dict[int, int]) -> None:
-        """Indirect addresses are of two bytes, and lead to RAM. Raises RefusedError if these cannot be written."""
+        """Indirect addresses are of two bytes, and lead to RAM. Raises RejectedError if these cannot be written."""
         if written and self["Torque Enable"]:
             raise RejectedError(StatusError.ACCESS)
         for byte_address, byte in written.items():

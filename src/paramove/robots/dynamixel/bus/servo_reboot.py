@@ -21,7 +21,7 @@ class ServoLoadedError(InputError):
 
 
 def servo_before_reboot(chain: ServoChain, number: int) -> DetectedServo:
-    """The servo as it is. Raises ServoSilentError if it does not answer."""
+    """The servo as it is. Raises ServoTimeoutError if it does not answer."""
     pinged = chain.ping(number)
     if pinged is None:
         raise ServoTimeoutError(

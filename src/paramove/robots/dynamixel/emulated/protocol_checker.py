@@ -40,7 +40,7 @@ class Finding:
         id: Of the servo that is meant; -1 where none is.
         kind: A word: noise, incomplete, length, checksum, stuffing, instruction, register, eeprom, limit, step, torque,
             watchdog or shut_down.
-        sentence: What was found and what would have been right.
+        detail: What was found and what would have been right.
     """
 
     time_s: float
