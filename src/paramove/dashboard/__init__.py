@@ -1,4 +1,4 @@
-"""The live page: what a running application sees, believes and does, in a browser, and a stop button."""
+"""The live page: camera image, estimates and actions of a running application in a browser, and a stop button."""
 
 import lazy_loader
 

@@ -40,7 +40,7 @@ class Recovery:
         lost: Messages that are known to be lost: counted by the indexes that are left.
         lost_is_exact: Whether no more than these can be lost.
         seconds_kept: From the first to the last recovered message, without gaps that damages left.
-        seconds_lost: Of those gaps, and at the end as far as the file tells.
+        seconds_lost: Of those gaps, and at the end as far as it is known.
         damages: Where bytes could not be used.
         known_until_s: Time of the last message in a recording that was never finished, so that later ones may be lost;
             None if it was finished.

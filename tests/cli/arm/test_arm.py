@@ -101,7 +101,7 @@ def test_setup_that_ends_before_tells_how_to_go_on(desk):
     desk.plug_in()
     done = desk.arm("setup", "--robot", KOCH, "--joint", "elbow_flex", "--joint", "gripper", steps=[(rest, "q\n")])
     assert done.exit_code == 1
-    assert "go on with --joint elbow_flex --joint gripper" in done.stderr
+    assert "continue with --joint elbow_flex --joint gripper" in done.stderr
     done = desk.arm("setup", "--robot", KOCH, "--joint", "tail")
     assert done.exit_code == 78
     assert "koch_v1_1 has no joint 'tail', found shoulder_pan" in done.stderr

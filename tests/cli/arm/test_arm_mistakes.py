@@ -30,7 +30,7 @@ def test_ctrl_c_tells_how_to_go_on_and_what_was_not_saved(desk):
 
     done = desk.arm("setup", "--robot", KOCH, "--joint", "gripper", steps=[(interrupted, "")])
     assert done.exit_code == 130
-    assert "go on with --joint gripper" in done.stderr
+    assert "continue with --joint gripper" in done.stderr
     done = desk.arm("calibrate", "--robot", KOCH, steps=[*hands(desk.emulator)[:-1], (interrupted, "")])
     assert done.exit_code == 130
     assert "nothing was saved" in done.stderr

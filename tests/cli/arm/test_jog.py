@@ -172,7 +172,7 @@ def test_a_terminal_that_takes_nothing_keeps_no_key_from_the_arm(folder):
 
 
 def test_a_driver_that_is_gone_is_told(folder, monkeypatch):
-    monkeypatch.setattr("paramove.cli.arm.jog.SILENT_S", 0.0)
+    monkeypatch.setattr("paramove.cli.arm.jog.NO_DATA_S", 0.0)
     with running(folder, ["q"]) as arm:
         done = jogged(monkeypatch, arm, "a")
     assert "no data" in done.stdout

@@ -108,9 +108,9 @@ def _lead(torque_off: TorqueOffArm, teacher: KinestheticTeacher, person: Termina
     due_s = time.monotonic()
     with person.pressing() as pressed:
         while True:
-            heard = torque_off.measured()
-            if heard is not None:
-                teacher.handle(*heard)
+            sample = torque_off.measured()
+            if sample is not None:
+                teacher.handle(*sample)
             due_s = max(due_s + PERIOD_S, time.monotonic())
             _press(pressed(max(0.0, due_s - time.monotonic())), teacher)
 
