@@ -140,5 +140,5 @@ def test_an_interrupted_check_leaves_the_model(trained, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("paramove.training.training.leave_out", interrupted)
-    assert "but not how well it does" in rejected(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
+    assert "but not its accuracy" in rejected(130, trained.table, "--out", tmp_path / "a.npz", *QUICK)
     assert np.isfinite(ParametricHMM.load(tmp_path / "a.npz").state_means([0.1, 0.0])).all()

@@ -153,9 +153,9 @@ def test_log_of_events_goes_on_when_there_is_space_again(tmp_path):
         filler = fill(disk)
         os.truncate(filler, filler.stat().st_size - 4096)  # room for one block: a line is cut off in it
         for number in range(200):
-            events.write("ready", detail=str(number))
+            events.write("ready", sentence=str(number))
         filler.unlink()
-        events.write("ended", detail="the last")
+        events.write("ended", sentence="the last")
         *whole, cut, last = (disk / "events.jsonl").read_text().splitlines()
     assert [json.loads(line)["sentence"] for line in whole] == [str(number) for number in range(len(whole))]
     assert not cut.endswith("}")

@@ -61,7 +61,7 @@ class Finding:
     remedy: tuple[str, ...] = ()
     fix: Fix | None = None
     facts: Mapping[str, object] = field(default_factory=dict)
-    detail = renamed_attribute("sentence", "detail")
+    sentence = renamed_attribute("sentence", "detail")
 
 
 @dataclass(frozen=True)

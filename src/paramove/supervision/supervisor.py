@@ -114,7 +114,7 @@ class Supervisor:
             self._events.write("run_begins", pid=os.getpid())
             try:
                 outcome = self._supervise(statuses)
-                self._events.write("run_stops", detail=outcome.reason, exit_code=outcome.code)
+                self._events.write("run_stops", sentence=outcome.reason, exit_code=outcome.code)
                 self._stop_all(statuses)
             finally:
                 self._kill_all()
@@ -122,7 +122,7 @@ class Supervisor:
                 self._view.close()
             if self._file.after_run and self._interrupts.first is None and outcome.code not in exit_codes.INTERRUPTED:
                 outcome = self._judge(self._file.after_run, outcome)
-            self._events.write("run_ends", detail=outcome.reason, exit_code=outcome.code)
+            self._events.write("run_ends", sentence=outcome.reason, exit_code=outcome.code)
         return outcome
 
     def _by_hand(self, request: dict[str, Any]) -> Answer:
@@ -135,7 +135,7 @@ class Supervisor:
             node.event,
             node=node.name,
             state=node.state.value,
-            detail=node.detail,
+            sentence=node.detail,
             pid=node.pid or None,
             exit_code=code,
             signal=signal_name(code),
