@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 from paramove.applications.rule_learner import RuleLearner
 from paramove.applications.stage import RuleLearnerOptions
-from paramove.applications.table import Surface
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick
@@ -21,9 +20,7 @@ MOTION_S = 4.0
 CORNERS = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
 OPENINGS = {"yellow": (0.135, -0.038), "green": (0.135, -0.095), "blue": (0.135, 0.019)}
 PLACES = {"yellow": (0.170, 0.05), "green": (0.180, -0.08), "blue": (0.175, -0.02)}
-OPTIONS = RuleLearnerOptions(
-    ("yellow", "green", "blue"), CORNERS, (0.155, -0.02, -0.05), -0.098, Surface((0.10, 0.24), (-0.17, 0.13))
-)
+OPTIONS = RuleLearnerOptions()
 SUCCEEDED, FAILED, REJECTED = (
     RelocationStatus.STATE_SUCCEEDED,
     RelocationStatus.STATE_FAILED,

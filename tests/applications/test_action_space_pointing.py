@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
+from paramove.applications.stage import RuleLearnerOptions
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
-from tests.applications.story import OPTIONS, PLACES, Place, Story
+from tests.applications.story import PLACES, Place, Story
 
 APPLY = ApplicationStage.STAGE_APPLY
 BETWEEN = (0.177, -0.047)
@@ -22,7 +21,7 @@ class ArmStory(Story):
     """
 
     def __init__(self) -> None:
-        super().__init__(options=replace(OPTIONS, pointing="action_space"))
+        super().__init__(options=RuleLearnerOptions(pointing="action_space"))
         self.places_said: list[Place | None] = []
 
     def _point_at(self, name: str | None) -> None:

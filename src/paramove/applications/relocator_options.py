@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pydantic import ConfigDict, Field
 
-from paramove.applications.stage import Place
+from paramove.applications.stage import Place, Range
 from paramove.applications.table import Surface
 from paramove.documents import OldNames
-
-Range = tuple[float, float]
 
 
 class RelocatorOptions(OldNames):
