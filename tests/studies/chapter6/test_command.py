@@ -82,7 +82,7 @@ def test_finished_tracks_are_kept_when_it_is_interrupted(synthetic: Path, monkey
     arguments = ("--kind", "pointing", "--quick", "--jobs", "1", "--out", str(synthetic / "out"))
     answer = run(*arguments)
     assert answer.exit_code == 130
-    assert "kept in" in answer.output
+    assert str(synthetic) in answer.output
     assert run(*arguments).exit_code == 0
     assert len(calls) == 3, "the first track is not computed again"
 

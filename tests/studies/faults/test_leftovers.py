@@ -42,12 +42,13 @@ def test_a_living_process_of_the_domain_is_found(runtime: Path) -> None:
     assert left_over(DOMAIN, runtime) == []
 
 
-def test_a_socket_that_is_listened_at_is_found_and_a_stale_one_is_not(runtime: Path) -> None:
+def test_an_open_socket_is_reported_and_a_stale_one_is_not(runtime: Path) -> None:
     path = runtime / DOMAIN / "clock"
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(str(path))
         listener.listen()
-        assert left_over(DOMAIN, runtime) == ["socket clock is listened at"]
+        (message,) = left_over(DOMAIN, runtime)
+        assert "socket clock" in message
     assert path.is_socket()
     assert left_over(DOMAIN, runtime) == []
 
