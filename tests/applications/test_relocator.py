@@ -49,7 +49,7 @@ def test_nothing_is_put_down_before_somebody_points():
     assert story.of(PUT) == []
     asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_POINT_AT_PLACE]
     assert len(asked) == 4
-    assert "I have not seen you point" in asked[-1].detail
+    assert "I have not seen you point" in asked[-1].text
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_place_that_is_of_no_use_is_asked_for_again_with_the_reason(place, cer
     assert places(story.of(PUT), "to") == [(0.13, -0.08)]
     asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_POINT_AT_PLACE]
     assert len(asked) == 2
-    assert asked[1].detail.endswith("Please point at the place where I shall put it.")
+    assert asked[1].text.endswith("Please point at the place where I shall put it.")
 
 
 def test_a_place_in_another_frame_is_not_taken_for_one_in_its_own():
@@ -179,7 +179,7 @@ def test_what_it_cannot_do_alone_it_asks_help_for_and_goes_on_from_the_start(kin
     assert story.run()
     help_asked = [speech for speech in story.speech if speech.request == Speech.REQUEST_HELP]
     assert len(help_asked) == 1
-    assert help_asked[0].detail == f"{words}. Please stand it at (16.5, −2.0) cm."
+    assert help_asked[0].text == f"{words}. Please stand it at (16.5, −2.0) cm."
     assert places(story.of(FETCH), "from")[-1] == DEFAULT.start
 
 

@@ -86,11 +86,11 @@ def test_rules_are_told_in_a_sentence_with_place_and_time() -> None:
     yellow = final.rules[2]
     assert (yellow.x, yellow.y) == OPENINGS["yellow"]
     seen_s = yellow.seen.ToNanoseconds() * 1e-9
-    assert yellow.detail == f"yellow belongs to the opening at (13.5, −3.8) cm, seen going in at {seen_s:.1f} s"
+    assert yellow.text == f"yellow belongs to the opening at (13.5, −3.8) cm, seen going in at {seen_s:.1f} s"
     assert re.fullmatch(
-        r"yellow belongs to the opening at \(13\.5, −3\.8\) cm, seen going in at \d+\.\d s", yellow.detail
+        r"yellow belongs to the opening at \(13\.5, −3\.8\) cm, seen going in at \d+\.\d s", yellow.text
     )
-    assert yellow.detail in story.sentences()
+    assert yellow.text in story.sentences()
     assert yellow.observations == 1
 
 
@@ -235,7 +235,7 @@ def test_after_three_failures_it_asks_for_help_and_goes_on_when_helped() -> None
     assert story.requests().count("HELP") == 1
     asked = next(speech for speech in story.speech if speech.request == Speech.REQUEST_HELP)
     assert asked.object == "yellow"
-    assert "I tried 3 times to put yellow away: felt nothing." in asked.detail
+    assert "I tried 3 times to put yellow away: felt nothing." in asked.text
     assert [goal.attempt for goal in story.relocations()] == [1, 2, 3, 1, 1, 1]
     assert (story.stages[-1].stage, story.stages[-1].retries) == (DONE, 2)
 
@@ -245,8 +245,8 @@ def test_a_refusal_is_told_and_help_is_asked_for() -> None:
     story.outcomes = [(REJECTED, "the forearm would come within 2.0 mm of standing_0", None)]
     assert story.run(), story.learner.detail
     asked = next(speech for speech in story.speech if speech.request == Speech.REQUEST_HELP)
-    assert "the forearm would come within 2.0 mm of standing_0." in asked.detail
-    assert asked.detail.startswith("I cannot reach yellow at (17.0, 5.0) cm")
+    assert "the forearm would come within 2.0 mm of standing_0." in asked.text
+    assert asked.text.startswith("I cannot reach yellow at (17.0, 5.0) cm")
     assert [goal.attempt for goal in story.relocations()] == [1, 1, 1, 1]
 
 
