@@ -33,7 +33,7 @@ GOOD = "begin: point(a)\nafter:\n  point(a): point(b)\n"
         ("begin: point(a)\nafter:\n  point(a):\n    - {point(a): 1, b(a): 2}\n", "g.yaml:4:7: expected one step with"),
         ("begin: [1]\nafter:\n  point(a): point(b)\n", "g.yaml:1:9: expected a step with its places"),
         ("begin: point(a)\nbegin: point(a)\n", "g.yaml:2:1: duplicate key 'begin'"),
-        ("begin: &x point(a)\n", "anchor '&x' is refused"),
+        ("begin: &x point(a)\n", "anchor '&x' is rejected"),
     ],
 )
 def test_errors_have_positions(text, message):

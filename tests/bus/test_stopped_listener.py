@@ -49,7 +49,7 @@ while subscriber.counter.sequence < last:
         pass
     subscriber.revive()
 counter = subscriber.counter
-tell([counter.messages, counter.lost, counter.repeated, counter.refused.total()])
+tell([counter.messages, counter.lost, counter.repeated, counter.rejected.total()])
 """
 
 

@@ -20,7 +20,7 @@ from paramove.demonstrations import (
 )
 from paramove.demonstrations.blending import phase
 from paramove.phmm import InterpolativePHMM
-from studies.chapter4.redirect import place_misses
+from studies.chapter4.redirect import target_misses
 
 exact = Demonstrator(variation=Variation.none())
 
@@ -66,13 +66,13 @@ def test_redirect_points_at_its_start_and_then_at_its_end(pair: list[float]) -> 
     shown = redirect_demonstrations(pair, np.random.default_rng(0), demonstrator=exact)
     assert shown.sequences[0].shape == (80, 3 * len(POINT_NAMES))
     assert shown.description.parameter_names == ("start_u", "start_v", "end_u", "end_v")
-    assert max(place_misses(shown.sequences[0], np.array(pair))) < 0.005
+    assert max(target_misses(shown.sequences[0], np.array(pair))) < 0.005
     assert_allclose(shown.sequences[0][0], shown.sequences[0][-1], rtol=0.0, atol=1e-9)
 
 
 def test_movements_of_different_speed_and_noise_are_blended_too() -> None:
     shown = redirect_demonstrations(corner_pairs(), np.random.default_rng(0))
-    misses = np.array([place_misses(one, pair) for one, pair in zip(shown.sequences, shown.theta, strict=True)])
+    misses = np.array([target_misses(one, pair) for one, pair in zip(shown.sequences, shown.theta, strict=True)])
     assert misses.mean() < 0.01  # the person misses by 0.8 cm on average
     steps = [np.linalg.norm(np.diff(one, axis=0), axis=1).max() for one in shown.sequences]
     assert max(steps) < 0.25  # m of 21 coordinates in 1/80 of the movement: no jumps
@@ -80,7 +80,7 @@ def test_movements_of_different_speed_and_noise_are_blended_too() -> None:
 
 def test_the_pointing_models_redirect_reaches_both_places(pointing: InterpolativePHMM) -> None:
     shown = redirect_from_model(pointing, corner_pairs())
-    misses = np.array([place_misses(one, pair) for one, pair in zip(shown.sequences, shown.theta, strict=True)])
+    misses = np.array([target_misses(one, pair) for one, pair in zip(shown.sequences, shown.theta, strict=True)])
     assert misses.max() < 0.01
 
 

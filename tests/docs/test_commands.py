@@ -146,7 +146,7 @@ def check_paramove(words):
     if words[1] == "launch":
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(ROOT)
-            patch.setattr(parameters, "_ask", asked_here)
+            patch.setattr(parameters, "_check_in_process", asked_here)
             answer = CliRunner().invoke(build("launch"), [*words[1:], "--check"])
         assert answer.exit_code == 0, answer.output
 

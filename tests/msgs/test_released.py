@@ -15,13 +15,25 @@ from tests.msgs.released import FOLDER, classes_of, is_repeated, present_schemas
 RELEASES = sorted(path for path in FOLDER.iterdir() if path.is_dir())
 MESSAGES = [(path.parent.name, path) for release in RELEASES for path in sorted(release.glob("*.*.binpb"))]
 RENAMED = {
-    ("paramove.msgs.Clock", "said"): "published",
-    ("paramove.msgs.TickDone", "said"): "published",
-    ("paramove.msgs.NodeStatus", "said"): "published",
-    ("paramove.msgs.NodeStatus", "heard"): "received",
-    ("paramove.msgs.Motor", "heard"): "responding",
+    "ActionBelief": "ActionProbability",
+    "ActionEstimate.sentence": "detail",
+    "ApplicationStage.sentence": "detail",
+    "Clock.said": "published",
+    "Hoap3State.refusal": "rejection",
+    "Hoap3State.refused_batches": "rejected_batches",
+    "Motor.heard": "responding",
+    "NodeStatus.heard": "received",
+    "NodeStatus.said": "published",
+    "NodeStatus.sentence": "detail",
+    "Rule.sentence": "text",
+    "STATE_REFUSED": "STATE_REJECTED",
+    "SafetyFault.sentence": "detail",
+    "SafetyState.refused_trajectories": "rejected_trajectories",
+    "Speech.sentence": "text",
+    "TickDone.said": "published",
+    "TopicCount.refused": "rejected",
 }
-"""Fields with another name and the same number, type and meaning, which are all that travels: message and old name."""
+"""What has another name and the same number, type and meaning, which are all that travels."""
 PRESENT = {str(kind.DESCRIPTOR.full_name): kind for kind in present_types()}
 
 
@@ -30,9 +42,11 @@ def released_class(version: str, name: str) -> Any:
     return classes_of(descriptor_pb2.FileDescriptorSet.FromString(content))[name]
 
 
-def name_of(field: Any) -> str:
-    """The name that a field of any release has now."""
-    return RENAMED.get((field.containing_type.full_name, field.name), str(field.name))
+def name_of(descriptor: Any) -> str:
+    """The name that a field, a type or a value of any release has now."""
+    return RENAMED.get(
+        getattr(descriptor, "full_name", descriptor.name).removeprefix("paramove.msgs."), str(descriptor.name)
+    )
 
 
 def values(message: Any) -> dict[str, Any]:
@@ -60,15 +74,15 @@ def types_within(descriptor: Any, seen: set[str] | None = None) -> Iterator[Any]
 def meaning(field: Any) -> tuple[Any, ...]:
     """What both sides must agree on: enum and 32-bit integer are one on the wire, but not to a reader."""
     inner = field.message_type or field.enum_type
-    return name_of(field), field.type, is_repeated(field), inner.full_name if inner else ""
+    return name_of(field), field.type, is_repeated(field), name_of(inner) if inner else ""
 
 
 def incompatible(old: Any, new: Any) -> list[str]:
     """Fields of the old schema that mean something else in the new one or are gone without being reserved."""
-    new_types = {kind.full_name: kind for kind in types_within(new)}
+    new_types = {kind.name: kind for kind in types_within(new)}
     found = []
     for kind in types_within(old):
-        successor = new_types.get(kind.full_name)
+        successor = new_types.get(name_of(kind))
         if successor is None:
             continue  # the field that led to it is gone or changed, which is reported there
         proto = descriptor_pb2.DescriptorProto()
@@ -85,7 +99,7 @@ def incompatible(old: Any, new: Any) -> list[str]:
                 found += [
                     f"{field.enum_type.full_name}: {value.name} = {value.number} is {names.get(value.number)}"
                     for value in field.enum_type.values
-                    if names.get(value.number, value.name) != value.name
+                    if names.get(value.number, name_of(value)) != name_of(value)
                 ]
     return found
 

@@ -66,8 +66,8 @@ def test_unknown_joint_names_the_nearest() -> None:
         ("kpp: 12", "kpp: [", "robot.yaml"),
         ("joint: right_fingers", "joint: right_finger", "unknown joints: right_finger"),
         ("name: hoap3", "nam: hoap3", r"name is missing; .*nam: extra inputs are not permitted, found 'hoap3'"),
-        ("lower_deg: -91,", "lower_deg: .nan,", r"yaml:8:64: '\.nan' is refused"),
-        ("upper_deg: 31,", "upper_deg: .inf,", r"yaml:8:81: '\.inf' is refused"),
+        ("lower_deg: -91,", "lower_deg: .nan,", r"yaml:8:64: '\.nan' is rejected"),
+        ("upper_deg: 31,", "upper_deg: .inf,", r"yaml:8:81: '\.inf' is rejected"),
         ("upper_deg: 31,", "upper_deg: '31 deg',", r"valid number.*found '31 deg'"),
         (
             "upper_deg: 31,",

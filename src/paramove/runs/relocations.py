@@ -15,7 +15,11 @@ from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage
 from paramove.runs.recorded_run import RecordedRun
 
-_LAST = (RelocationStatus.STATE_SUCCEEDED, RelocationStatus.STATE_FAILED, RelocationStatus.STATE_REJECTED)
+_LAST: dict[int, str] = {
+    RelocationStatus.STATE_SUCCEEDED: "succeeded",
+    RelocationStatus.STATE_FAILED: "failed",
+    RelocationStatus.STATE_REJECTED: "refused",
+}
 _HULLS: dict[int, str] = {RelocationStatus.HULL_INSIDE: "inside", RelocationStatus.HULL_OUTSIDE: "outside"}
 
 
@@ -141,7 +145,7 @@ def _relocation(goal: Any, stage: str, begun_s: float, statuses: list[Any], end_
         stage=stage,
         begun_s=begun_s,
         ended_s=last.publish_ns * 1e-9 if last is not None else end_s,
-        result=RelocationStatus.State.Name(last.message.state).removeprefix("STATE_").lower() if last else "unfinished",
+        result=_LAST[last.message.state] if last else "unfinished",
         reason=last.message.reason if last is not None else "",
         held=any(status.phase == "carry" and status.holding for status in executing),
         elbow_turn_rad=max((r.message.elbow_turn_rad for r in statuses), default=0.0),

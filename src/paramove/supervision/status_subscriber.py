@@ -48,7 +48,7 @@ class StatusSubscriber:
         if received.topic.type is NodeStatus:
             self._on_status(received.message)
         elif received.topic is topics.SPEECH:
-            self._on_story(f'robot: "{received.message.detail}"')
+            self._on_story(f'robot: "{received.message.text}"')
         else:
             stage = received.message.Stage.Name(received.message.stage).removeprefix("STAGE_").lower()
             if stage != self._stage:
