@@ -112,7 +112,7 @@ def test_an_arm_with_a_joint_at_its_stop_a_little_beyond_its_range_moves(person)
 def test_nothing_moves_before_it_is_armed(person):
     person.waits_for("DISARMED")
     person.sends(person.away())
-    assert person.is_told("REFUSED").code == "not_armed"
+    assert person.is_told("REJECTED").code == "not_armed"
     assert person.memory("Torque Enable") == [0] * 5
 
 
@@ -176,7 +176,7 @@ def test_a_stop_ends_the_movement_and_only_a_new_word_arms_again(person):
     rested = person.goals()
     assert rested != list(ROBOT.units.to_counts(person.away()))
     person.sends(person.away(), name="b")
-    assert person.is_told("REFUSED").code == "not_armed"
+    assert person.is_told("REJECTED").code == "not_armed"
     assert person.goals() == rested
     assert person.memory("Torque Enable") == [1] * 5
     person.arms()

@@ -129,7 +129,7 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
     with driven(emulator.port) as person:
         person.waits_for("DISARMED")
         person.publish("of before", ROBOT.joint_names, [(0.0, ROBOT.base_pose), (1.0, ROBOT.base_pose)])
-        assert person.is_told("REFUSED").code == "not_armed"
+        assert person.is_told("REJECTED").code == "not_armed"
         assert memory(emulator, "Present Position") == rested
         person.arms_and_waits()
         assert memory(emulator, "Goal Position") == rested
