@@ -6,8 +6,8 @@ import heapq
 import itertools
 from collections.abc import Callable
 
+from paramove.applications.options import RelocatorOptions
 from paramove.applications.relocator import Relocator
-from paramove.applications.relocator_options import RelocatorOptions
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick

@@ -6,8 +6,8 @@ import heapq
 import itertools
 from collections.abc import Callable, Sequence
 
+from paramove.applications.options import RuleLearnerOptions
 from paramove.applications.rule_learner import RuleLearner
-from paramove.applications.stage import RuleLearnerOptions
 from paramove.bus import topics
 from paramove.bus.subscriber import Received
 from paramove.bus.ticks import Tick

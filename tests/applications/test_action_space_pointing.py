@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from paramove.applications.stage import RuleLearnerOptions
+from paramove.applications.options import RuleLearnerOptions
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from tests.applications.story import PLACES, Place, Story

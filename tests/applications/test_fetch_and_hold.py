@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from paramove.applications.relocator_options import RelocatorOptions
+from paramove.applications.options import RelocatorOptions
 from paramove.motion.clear_plans import MIN_CLEARANCE, ClearPlans
 from paramove.msgs.relocation_pb2 import RelocationGoal
 from paramove.safety.trajectory_check import check_trajectory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from paramove.applications.relocator_options import RelocatorOptions
+from paramove.applications.options import RelocatorOptions
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech
 from paramove.msgs.safety_state_pb2 import SafetyState

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from paramove.applications.relocator_options import RelocatorOptions
+from paramove.applications.options import RelocatorOptions
 from paramove.msgs.rule_pb2 import Speech
 from sim import looks, tool_box
 from sim.arm_instructor import ELBOW, SHOULDER, TIP

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from paramove.applications.stage import ApplicationState, Place, Stage, cm
+from paramove.applications.options import Place
+from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationGoal, RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage, Speech

@@ -6,7 +6,8 @@ and its own targets give the homography.
 
 from __future__ import annotations
 
-from paramove.applications.stage import ApplicationState, Place, Stage, cm
+from paramove.applications.options import Place
+from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.applications.table import Sighting
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus

@@ -6,7 +6,8 @@ object disappears."
 
 from __future__ import annotations
 
-from paramove.applications.stage import ApplicationState, Place, Stage, cm
+from paramove.applications.options import Place
+from paramove.applications.stage import ApplicationState, Stage, cm
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.rule_pb2 import ApplicationStage, Rule, Rules, Speech
 
@@ -42,9 +43,8 @@ class Learning(Stage):
             self._going_in.pop(name, None)
             self._moved.discard(name)
             if name in self.app.rules:
-                del self.app.rules[
-                    name
-                ]  # it is back: the observed opening was wrong, or the person demonstrates it again
+                # It is back: the observed opening was wrong, or the person demonstrates it again.
+                del self.app.rules[name]
                 self._publish_rules()
         elif gesture.kind == Gesture.KIND_VANISHED and name in self._moved and gesture.located:
             self._moved.discard(name)

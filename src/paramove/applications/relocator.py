@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
-from paramove.applications.relocator_options import RelocatorOptions
-from paramove.applications.stage import Place, cm
+from paramove.applications.options import Place, RelocatorOptions
+from paramove.applications.stage import cm
 from paramove.msgs.action_estimate_pb2 import ActionEstimate
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import Position, RelocationGoal, RelocationStatus

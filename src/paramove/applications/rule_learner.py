@@ -7,7 +7,8 @@ from paramove.applications.arm_watch import ArmWatch
 from paramove.applications.calibrating import Calibrating
 from paramove.applications.conversation import GoalClient, Goals, OutgoingMessages
 from paramove.applications.learning import Learning
-from paramove.applications.stage import ApplicationState, RuleLearnerOptions, Stage
+from paramove.applications.options import RuleLearnerOptions
+from paramove.applications.stage import ApplicationState, Stage
 from paramove.msgs.gesture_pb2 import Gesture
 from paramove.msgs.relocation_pb2 import RelocationStatus
 from paramove.msgs.rule_pb2 import ApplicationStage

@@ -1,0 +1,110 @@
+"""Positions and timeouts of rule learning and relocation by pointing, as parameters of their processes."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from paramove.applications.table import Surface
+from paramove.documents import OldNames
+
+Place = tuple[float, float]
+Range = tuple[float, float]
+Pointing = Literal["nearness", "action_space"]
+
+
+class ApplicationOptions(OldNames):
+    """What both have. Positions in the right shoulder's frame, m; times in s.
+
+    Attributes:
+        grasp_z: Height at which a standing object is grasped.
+        attempts: Attempts to move an object before the robot asks a person for help.
+        ask_again_s: Time without an answer after which a request to a person is repeated.
+        arming_timeout_s: The application ends when the arm is not armed again for so long.
+        frame: Frame of all positions.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    old_names: ClassVar[tuple[tuple[str, str], ...]] = (("arm_patience_s", "arming_timeout_s"),)
+
+    grasp_z: float = -0.098
+    attempts: int = Field(3, ge=1)
+    ask_again_s: float = Field(25.0, gt=0)
+    arming_timeout_s: float = Field(10.0, gt=0)
+    frame: str = "right_shoulder"
+
+
+class RuleLearnerOptions(ApplicationOptions):
+    """Positions in the right shoulder's frame, m; times in s.
+
+    Attributes:
+        objects: Names (colours) of the objects.
+        corners: Where the robot places an object to learn how the camera sees its working area.
+        offer: Where the open hand waits for an object: x, y, and height of the gripper.
+        surface_x, surface_y: Range of the working surface.
+        pointing: How the object pointed at is recognised: by "nearness" of the hand, or by the target of an arm tracked
+            in "action_space".
+        settle_s: Time from when the arm has left until the view of an object counts.
+    """
+
+    objects: tuple[str, ...] = ("yellow", "green", "blue")
+    corners: tuple[Place, ...] = ((0.135, -0.10), (0.135, 0.076), (0.19, 0.076), (0.19, -0.10))
+    offer: tuple[float, float, float] = (0.155, -0.02, -0.05)
+    surface_x: Range = (0.100, 0.240)
+    surface_y: Range = (-0.170, 0.130)
+    pointing: Pointing = "nearness"
+    settle_s: float = Field(2.6, ge=0)
+
+    @property
+    def surface(self) -> Surface:
+        """The working surface."""
+        return Surface(self.surface_x, self.surface_y)
+
+
+class RelocatorOptions(ApplicationOptions):
+    """Positions in the right shoulder's frame, m; times in s.
+
+    Attributes:
+        object_name: Name of the object.
+        start: Where the object stands at first and after a person has helped.
+        hold: Where the robot holds it while it waits: out of the person's path, and reached without turning the elbow.
+        area_x, area_y: Working area; a target outside is rejected.
+        standing: Positions of other objects, which are not moved.
+        min_gap: Minimum distance between the centres of two objects.
+        places: Number of targets in a run.
+        aligns: Whether the person first points at the object, whose position is known. The tracker's offset from it is
+            subtracted from every target: it comes from small errors in the measured person and cameras.
+        max_offset: Maximum of this offset; a person who points farther away does not point at the object.
+        min_certainty: Minimum certainty of a target, 0 to 1; below, the robot asks again. 0.85: deviation of 1.5 cm.
+        hand_away: The person's hand has left when it is this far from the target.
+        hand_away_s: And has been for this time.
+    """
+
+    old_names = (
+        *ApplicationOptions.old_names,
+        ("patience_s", "ask_again_s"),
+        ("least_gap", "min_gap"),
+        ("most_offset", "max_offset"),
+        ("least_certainty", "min_certainty"),
+    )
+
+    object_name: str = "yellow"
+    start: Place = (0.165, -0.02)
+    hold: tuple[float, float, float] = (0.13, -0.12, -0.045)
+    area_x: Range = (0.125, 0.19)
+    area_y: Range = (-0.105, 0.07)
+    standing: tuple[Place, ...] = ()
+    min_gap: float = Field(0.05, ge=0)
+    places: int = Field(3, ge=1, le=1000)
+    aligns: bool = True
+    max_offset: float = Field(0.035, gt=0)
+    min_certainty: float = Field(0.85, ge=0, le=1)
+    hand_away: float = Field(0.08, gt=0)
+    hand_away_s: float = Field(0.3, ge=0)
+
+    @property
+    def area(self) -> Surface:
+        """The working area."""
+        return Surface(self.area_x, self.area_y)
