@@ -33,6 +33,7 @@ from paramove.msgs.joint_trajectory_pb2 import JointTrajectory  # noqa: E402
 from paramove.msgs.safety_state_pb2 import ArmRequest, SafetyState  # noqa: E402
 from paramove.robots import RobotDescription  # noqa: E402
 from paramove.robots.streaming import StreamReader  # noqa: E402
+from paramove.safety import minimum_jerk  # noqa: E402
 
 HOAP3 = RobotDescription.load(ROOT / "robot_description" / "hoap3")
 SWING_DEG = {"right_shoulder_pitch": -50.0, "right_elbow": -40.0}
@@ -101,7 +102,7 @@ def swing() -> JointTrajectory:
     message = JointTrajectory(id="one", joints=list(SWING_DEG))
     start = HOAP3.base_pose[HOAP3.indices(message.joints)]
     for u in np.linspace(0.0, 1.0, 301):
-        position = start + (10 * u**3 - 15 * u**4 + 6 * u**5) * np.deg2rad(list(SWING_DEG.values()))
+        position = start + minimum_jerk(u) * np.deg2rad(list(SWING_DEG.values()))
         message.points.add(time_s=3.0 * u, position_rad=position)
     return message
 

@@ -11,6 +11,7 @@ from .gate_io import SafetySettings as SafetySettings
 from .gate_io import State as State
 from .gate_io import Targets as Targets
 from .limits import MotionLimits as MotionLimits
+from .path_sampling import minimum_jerk as minimum_jerk
 from .self_collision import SelfCollision as SelfCollision
 from .stopping import longest_path_s as longest_path_s
 from .stopping import stop_ramp as stop_ramp

@@ -60,11 +60,16 @@ def runs(times_s: Floats) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
+def minimum_jerk(u: Floats) -> Floats:
+    """Progress 0 to 1 from rest to rest for u in 0 to 1 (Flash and Hogan 1985)."""
+    return np.asarray(10 * u**3 - 15 * u**4 + 6 * u**5)
+
+
 def _run(times_s: Floats, points: Floats, at_s: Floats) -> Floats:
     gaps = np.diff(times_s)
     if len(times_s) == 2 and gaps[0] > DENSE_UP_TO_S:
         u = ((at_s - times_s[0]) / gaps[0])[:, None]
-        return np.asarray(points[0] + (10 * u**3 - 15 * u**4 + 6 * u**5) * (points[1] - points[0]))
+        return np.asarray(points[0] + minimum_jerk(u) * (points[1] - points[0]))
     if gaps.max() <= LINEAR_UP_TO_S + 1e-9:
         segment = np.clip(np.searchsorted(times_s, at_s, side="right") - 1, 0, len(gaps) - 1)
         part = ((at_s - times_s[segment]) / gaps[segment])[:, None]

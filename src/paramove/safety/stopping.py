@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from paramove.documents import Floats
 from paramove.safety.limits import MotionLimits
+from paramove.safety.path_sampling import minimum_jerk
 
 
 def stop_ramp(last: Floats, path: Floats, limits: MotionLimits) -> Floats:
@@ -66,4 +67,4 @@ def straight_move(start: Floats, goal: Floats, limits: MotionLimits) -> Floats:
     )
     n_rows = max(1, int(np.ceil(slowest / limits.dt_s)))
     u = (np.arange(1, n_rows + 1) / n_rows)[:, None]
-    return np.asarray(start + (10 * u**3 - 15 * u**4 + 6 * u**5) * (goal - start))
+    return np.asarray(start + minimum_jerk(u) * (goal - start))

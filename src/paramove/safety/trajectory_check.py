@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paramove.documents import Floats
 from paramove.safety.limits import MotionLimits
-from paramove.safety.path_sampling import largest_detour, sample_path
+from paramove.safety.path_sampling import largest_detour, minimum_jerk, sample_path
 
 MAX_DURATION_S = 120.0
 MAX_DETOUR = np.deg2rad(1.0)
@@ -175,7 +175,7 @@ def _check_rows(rows: Floats, times: Floats, commanded: Floats, limits: MotionLi
 def _fade(n_rows: int, dt_s: float) -> Floats:
     """From 1 at the first row to 0 after `FADE_S` or at the last row, at rest at both ends, [N]."""
     u = np.clip(np.arange(n_rows) * dt_s / min(FADE_S, (n_rows - 1) * dt_s), 0.0, 1.0)
-    return np.asarray(1.0 - (10 * u**3 - 15 * u**4 + 6 * u**5))
+    return np.asarray(1.0 - minimum_jerk(u))
 
 
 def _deg(angle: float) -> str:
