@@ -117,7 +117,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_a_directory_at_the_place_of_a_socket_is_left_alone(context: zmq.Context[Any], folder: Path) -> None:
     (folder / "gestures").mkdir()
-    with pytest.raises(BusFolderError, match=r"is not a socket; .*move it away"):
+    with pytest.raises(BusFolderError, match="is not a socket; it is not touched, move it away"):
         Publisher(context, folder, topics.GESTURES, "recognizer")
     assert (folder / "gestures").is_dir()
 

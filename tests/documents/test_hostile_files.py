@@ -130,7 +130,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "directory": ("NPZ", lambda: b"PK\x05\x06" + struct.pack("<HHHHIIH", 0, 0, 1, 1, 3 * 10**9, 0, 0), "damaged"),
     "zeros by zstd": ("MCAP", zeros_by_zstd, "holds no pose"),
     "zeros by zstd, hidden": ("MCAP", lambda: zeros_by_zstd(1000), "holds no pose"),
-    "no message": ("MCAP", lambda: recording(b"\xff\xff\xff"), "message 7 on human/arm_pose"),
+    "no message": ("MCAP", lambda: recording(b"\xff\xff\xff"), "message 7 on human/arm_pose is not a paramove."),
     "large picture": ("png", lambda: picture(30_000, 30_000), "claims 30000 x 30000 px"),
     "huge picture": ("png", lambda: picture(60_000, 60_000), "claims 60000 x 60000 px"),
     "unknown picture": ("png", lambda: b"P6\n60000 60000\n255\n" + bytes(99), "is no PNG"),

@@ -142,7 +142,7 @@ def test_a_jump_is_more_than_one_and_a_half_times_what_motors_can() -> None:
     found = limits.first_violation(rows_of([0.0, 0.751]), REST)
     assert found is not None
     assert (found.code, found.row, found.allowed, found.unit) == ("jump", 1, "343.8 deg/s", "deg/s")
-    facts = "from 0 to 43.03 deg at row 1: requested 344.2 deg/s, allowed 343.8 deg/s"
+    facts = "joint shoulder jumps from 0 to 43.03 deg at row 1: requested 344.2 deg/s, allowed 343.8 deg/s"
     assert facts in found.message
 
 

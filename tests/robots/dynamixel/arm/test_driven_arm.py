@@ -422,7 +422,7 @@ def test_where_anything_is_wrong_it_does_not_go_to_rest_but_holds(emulator, capl
         before_the_end(person)
     assert person.memory("Torque Enable") == [1] * 5
     assert person.memory("Bus Watchdog") == [0] * 5
-    assert re.search(f"does not go to rest: {why}", caplog.text)
+    assert re.search(f"the arm holds its position and does not go to rest: {why}", caplog.text)
 
 
 def test_the_emergency_stop_wins_over_the_way_to_rest(emulator, tmp_path, caplog):

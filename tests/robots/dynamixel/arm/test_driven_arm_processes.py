@@ -38,7 +38,7 @@ with driven(sys.argv[1]) as person:
     moves(person)
     print("moves", flush=True)
     person.waits_for("HOLD")
-    print(json.dumps([[fault.code, fault.sentence] for fault in person.safety.faults]), flush=True)
+    print(json.dumps([[fault.code, fault.detail] for fault in person.safety.faults]), flush=True)
     person.arms_and_waits_again()
     moves(person)
     print("moves", flush=True)
@@ -119,7 +119,8 @@ def test_a_driver_that_is_stopped_or_killed_in_motion_leaves_servos_that_rest_an
         ((code, detail),) = json.loads(driver.stdout.readline())
         assert code == "watchdog_tripped"
         assert "servo 11 (joint1) has stopped by itself" in detail
-        assert "1000 ms" in detail
+        assert "without data for 1000 ms" in detail
+        assert detail.endswith("arm again, which clears its watchdog")
         assert memory(emulator, "Present Position") == rested
         assert driver.stdout.readline() == "moves\n"  # once it was armed again
         driver.kill()

@@ -95,7 +95,7 @@ def test_a_joint_that_is_put_back_before_its_direction_is_seen_is_asked_for_agai
 
     hands = Hesitating(arm)
     near(calibrated(arm, hands), calibration())
-    assert any(message.startswith("pan is back at its start") for message in hands.told)
+    assert any(message.startswith("pan is back at its start: leave it") for message in hands.told)
     assert sum(one.startswith("Move pan") for one in hands.asked) == 2
 
 
