@@ -41,7 +41,7 @@ EVALUATIONS = {
 }
 NOT_MET = 3
 """Exit code of an evaluation that measured everything and missed a goal."""
-FREE_TEXT = frozenset({"sentence", "reason", "refusal"})
+FREE_TEXT = frozenset({"detail", "reason", "refusal", "rejection", "sentence", "text"})
 LEFT_OUT = ("status/", "clock")
 LAST_MESSAGES = 50
 RENAMED: dict[str, str] = {"camera/light": "camera/image_raw"}
