@@ -200,7 +200,8 @@ def test_beside_another_speaker_it_does_not_begin(folder):
 
 def test_in_a_narrow_terminal_the_line_is_written_anew_and_ended(folder, monkeypatch):
     monkeypatch.setattr("paramove.cli.arm.jog.sys", SimpleNamespace(stdout=SimpleNamespace(isatty=lambda: True)))
-    monkeypatch.setattr("paramove.cli.arm.jog.shutil.get_terminal_size", lambda: os.terminal_size((20, 2)))
+    narrow = SimpleNamespace(get_terminal_size=lambda: os.terminal_size((20, 2)))
+    monkeypatch.setattr("paramove.cli.arm.jog.shutil", narrow)  # and not that of pytest, which asks for the width too
     with running(folder, ["1+", "q"]) as arm:
         done = jogged(monkeypatch, arm, "a")
     shown = [piece for piece in done.stdout.split("\r")[1:] if not piece.endswith("\n")]
